@@ -139,7 +139,7 @@ def test_a_page_in_german_stays_german_and_nothing_is_cut(
     assert page.evaluate("levilab.data.bench.text") == (
         "der Antrieb hat den Kreisel verloren: ausschalten, angleichen und langsamer hinauf"
     )
-    assert page.inner_text("#spin-value") == "30,5000"
+    until(page, "document.getElementById('spin-value').textContent == '30,5000'")
     assert page.inner_text("#field-value") == "1,250"
     assert page.evaluate("document.documentElement.scrollWidth") == viewport["width"]
     parts = "[...document.querySelectorAll('button, select, h2, dt')]"

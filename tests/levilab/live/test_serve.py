@@ -113,7 +113,7 @@ def test_an_analysis_ends_with_the_view(tmp_path: Path, started: Queue[subproces
     analyses.end()
     assert process.returncode not in {None, 0}
     assert not analyses.running
-    (tmp_path / "result.json").write_text(json.dumps({"runs": [{"verdict": "earlier"}]}), encoding="utf-8")
+    (tmp_path / "result.json").write_text(json.dumps({"text": "earlier"}), encoding="utf-8")
     (tmp_path / "report.html").touch()
     (tmp_path / "spindown.png").touch()
     assert [analyses.about(tmp_path)[key] for key in ("verdict", "figures")] == [["earlier"], ["spindown.png"]]
@@ -146,7 +146,7 @@ def test_a_second_analysis_replaces_the_result_that_is_shown(tmp_path: Path, mon
     def analyze(words: list[str]) -> tuple[int, str]:
         if words[0] == "analyze":
             meanwhile.append(analyses.about(tmp_path).get("verdict"))
-            text = json.dumps({"runs": [{"verdict": next(verdicts)}]})
+            text = json.dumps({"text": next(verdicts)})
             (tmp_path / "result.json").write_text(text, encoding="utf-8")
         return 0, ""
 

@@ -14,14 +14,14 @@ from levilab.cli.analyze import takes_options
 from levilab.errors import UsageError
 from levilab.pipelines.options import KINDS, OPTIONS, read_options, typed_name
 
+#: What is analyzed, beside the options.
+READINGS = {"data", "kind", "time", "frequency", "light"}
 DEFAULTS = {one.name: one.default for kind in KINDS.values() for one in fields(kind) if one.name in OPTIONS}
 
 
 def test_the_notebook_has_each_option_with_its_default_and_a_sentence() -> None:
     parameters = inspect.signature(levilab.analyze).parameters
-    assert {
-        name: one.default for name, one in parameters.items() if name not in {"data", "kind", "time", "frequency", "light"}
-    } == DEFAULTS
+    assert {name: one.default for name, one in parameters.items() if name not in READINGS} == DEFAULTS
     lines = (inspect.getdoc(levilab.analyze) or "").splitlines()  # Python 3.13 takes the indentation off itself
     assert all(any(line.startswith(f"    {name}: ") for line in lines) for name in OPTIONS)
 
