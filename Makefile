@@ -16,7 +16,7 @@ setup: .venv/ready  ## make the environment in .venv
 
 .venv/ready: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "levilab needs Python 3.11 or newer, this is " + sys.version.split()[0] + ": make PYTHON=python3.12 …")'
-	@echo 'making an environment in .venv (2.1 GB, with the tools of the tests) and installing into it: one to three minutes'
+	@echo 'making an environment in .venv (2.1 GB, with the tools of the tests) and installing into it: one to four minutes'
 	@$(PYTHON) -m venv .venv
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
 	@touch $@

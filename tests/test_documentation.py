@@ -158,14 +158,14 @@ def test_what_a_shell_would_change_is_seen(line, special):
     assert bool(SPECIAL.search(unquoted(line))) is special
 
 
-def test_make_demo_and_make_test_stand_at_the_top_of_the_readme_and_in_the_makefile():
+def test_the_readme_begins_with_the_browser_then_make_demo_and_make_test():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     first = blocks("console")[0][1]
     assert [line.split("#")[0].strip("$ ") for line in first.splitlines()] == ["make demo", "make test"]
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     assert re.search(r"^demo:", makefile, re.MULTILINE)
     assert re.search(r"^test:", makefile, re.MULTILINE)
-    assert readme.index("make demo") < 1000
+    assert readme.index("levilab live --mock") < readme.index("make demo") < 1600
 
 
 def test_links_between_the_pages_lead_somewhere():

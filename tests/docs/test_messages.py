@@ -1,0 +1,35 @@
+"""The messages that docs/messages.md quotes stand in the program."""
+
+import ast
+import re
+
+import pytest
+
+from support.paths import DOCS, ROOT
+
+QUOTED = re.findall(r"^\| \*(.+?)\* \|", (DOCS / "messages.md").read_text(encoding="utf-8"), re.MULTILINE)
+
+
+def as_printed(node):
+    """A literal text, with ``…`` for its values; empty for another node."""
+    if isinstance(node, ast.JoinedStr):
+        return "".join(as_printed(part) or "…" for part in node.values)
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return re.sub(r"\{[^{}]*\}", "…", node.value)
+    return ""
+
+
+@pytest.fixture(scope="module")
+def texts():
+    """Every literal text of the program."""
+    sources = (path for room in ("levilab", "instruments") for path in (ROOT / room).rglob("*.py"))
+    nodes = (node for path in sources for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    return "\n".join(filter(None, map(as_printed, nodes)))
+
+
+def test_the_page_quotes_messages():
+    assert 10 <= len(QUOTED) <= 15
+
+
+def test_each_quoted_message_stands_in_the_program(texts):
+    assert [message for message in QUOTED if message.removesuffix("…") not in texts] == []
