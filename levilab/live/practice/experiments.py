@@ -6,6 +6,10 @@ The settings take some minutes of the bench at most: the usual ones are those of
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from levilab.simulator.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -83,7 +87,15 @@ PRACTICE: dict[str, PracticeExperiment] = {
     ),
     "field": PracticeExperiment(
         "field of the base", "What holds the top up? A Hall probe on the axis, with the top taken off.", "field",
-        # the base and the top of the practice scene: a thin ring, and what of the moment lies along the axis
-        _prefixed("field", "base_thickness_m=0", "top_moment_a_m2=0.7", "top_moment_u_a_m2=0.004"), 68.0,
+        _prefixed("field", "base_thickness_m=0"), 68.0,  # a thin ring, as in the practice scene
     ),
 }  # fmt: skip
+
+
+def settings_for(plan: PracticeExperiment, scene: Scene) -> tuple[str, ...]:
+    """Return the settings of an experiment on the bench of a scene: a scan knows the moment of its top, to 1 %."""
+    if plan.experiment != "field":
+        return plan.settings
+    moment = abs(scene.top.moment_a_m2) * scene.top.moment_tilt[1]
+    known = _prefixed("field", f"top_moment_a_m2={moment:.3f}", f"top_moment_u_a_m2={0.01 * moment:.3f}")
+    return (*known, *plan.settings)

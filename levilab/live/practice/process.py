@@ -44,7 +44,7 @@ from levilab.live.practice.commands import (
     TakeSeed,
     TuneDrive,
 )
-from levilab.live.practice.experiments import PRACTICE, PracticeExperiment
+from levilab.live.practice.experiments import PRACTICE, PracticeExperiment, settings_for
 from levilab.live.practice.fall import cause_of_fall
 from levilab.live.practice.seeds import keys_of_seed, seed_of_group
 from levilab.live.practice.tasks import TASKS, Look, Progress, exponent_of
@@ -808,15 +808,15 @@ class PracticeProcess:
     # --- runs ---
 
     def _request(self, plan: PracticeExperiment, command: RecordRun) -> Any:
+        scene = self._scene_of_seed(plan.scene) if plan.scene else self.scene
         options = AcquisitionOptions(
             mock=True,
             out=Path(self._options.out),
             seed=self._seed,
             group=command.group.strip() or None,
             note=command.note,
-            settings=plan.settings,
+            settings=settings_for(plan, scene),
         )
-        scene = self._scene_of_seed(plan.scene) if plan.scene else self.scene
         return request_at(self._wiring, scene, plan.experiment, options)
 
     def _record(self, command: RecordRun) -> None:
