@@ -20,7 +20,7 @@ from levilab.world.bench import scene_world, virtual_wiring
 
 @pytest.mark.parametrize("seed", [0, 7])
 def test_the_mass_to_set_by_the_scan_floats_on_the_same_bench(tmp_path, seed):
-    """A seed changes base and moment; the scan finds the base, and is told the moment."""
+    """A seed changes base and moment; the scan finds the base, and its settings have the moment."""
     scene = preset("practice")
     scene = scene.changed(keys_of_seed(scene, seed))
     options = AcquisitionOptions(mock=True, out=tmp_path, seed=seed, settings=settings_for(PRACTICE["field"], scene))
