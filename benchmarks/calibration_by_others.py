@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import argparse
 import math
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +25,7 @@ from scipy.special import expit
 
 from levilab.benchmark.simulator.motion import A2, B2, I1, I3, MU, G, K
 from levilab.benchmark.simulator.taylor import VARIABLES, heyoka_system
+from levilab.crosscheck.calibration import by_ranks
 from levilab.crosscheck.command import print_studies
 from levilab.crosscheck.figure import calibration_figure
 from levilab.crosscheck.stored import as_json
@@ -114,8 +115,8 @@ def field(seed: int, folder: Path) -> list[Pull]:
 
 MASS_KG, ALONG, FIRST_HZ, LAST_HZ = 0.0244, 0.97, 34.0, 24.0
 INTERVAL_S, GATE_S, STEPS = 4.0, 2.0, 200
-#: A top that leans so far falls, and its last reading is before that; the field is that near the axis.
-FALLEN_RAD = 0.1
+#: The last reading is before the top leans by this; the field is that near the axis.
+LEAN_RAD = 0.1
 
 
 @cache
@@ -135,22 +136,16 @@ def integrator() -> Any:
     return hy.taylor_adaptive(system, np.ones(15), tol=1e-10, fast_math=True)
 
 
-def derivative(z: float, order: int = 1) -> float:
-    """Return a derivative of the field along the axis [T/m], [T]; order 0: the field."""
-    terms = ((A2, 1.0), (B2, -1.0))
-    if order == 0:
-        return K * sum(sign * a2 / (a2 + z * z) ** 1.5 for a2, sign in terms)
-    return K * sum(-3 * sign * a2 * z / (a2 + z * z) ** 2.5 for a2, sign in terms)
-
-
 def floating() -> tuple[float, float]:
     """Return the height at which an upright top rests [m], and the field there [T]."""
-    pull = abs(MU) * ALONG
-    z = float(brentq(lambda z: abs(derivative(z)) * pull - MASS_KG * G, 0.070, 0.080))
-    return z, abs(derivative(z, 0))
+    rings = ((A2, 1.0), (B2, -1.0))
+    field_at = lambda z: K * sum(sign * a2 / (a2 + z * z) ** 1.5 for a2, sign in rings)  # noqa: E731
+    slope_at = lambda z: K * sum(-3 * sign * a2 * z / (a2 + z * z) ** 2.5 for a2, sign in rings)  # noqa: E731
+    z = float(brentq(lambda z: abs(slope_at(z) * MU) * ALONG - MASS_KG * G, 0.070, 0.080))
+    return z, abs(field_at(z))
 
 
-def motion(seed: int, folder: Path) -> list[Pull]:
+def motion(seed: int, folder: Path, lean: float) -> list[Pull]:
     """Try the counts of a top that spins down, with tilt and nutation as makers of magnets and the eye allow them."""
     by = np.random.default_rng((seed, 3))
     tilt, constant = by.rayleigh(math.sqrt(0.000915 / 2)), by.uniform(2.0e-4, 2.7e-4)
@@ -164,7 +159,7 @@ def motion(seed: int, folder: Path) -> list[Pull]:
     grid = np.arange(math.floor(duration) * STEPS + 1) / STEPS
     states = top.propagate_grid(grid)[-1]
     turns = np.unwrap(np.arctan2(states[:, 13], states[:, 12])) / (2 * math.pi)
-    leaning = np.hypot(states[:, 6], states[:, 7]) > FALLEN_RAD
+    leaning = np.hypot(states[:, 6], states[:, 7]) > lean
     end = grid[np.argmax(leaning)] if leaning.any() else grid[-1]
     first = np.arange(0, end - GATE_S, INTERVAL_S)
     counted = (np.interp(first + GATE_S, grid, turns) - np.interp(first, grid, turns)) / GATE_S
@@ -191,11 +186,13 @@ def start_of(tilt: float, nutation: Any) -> list[float]:
     return [0.0, 0.0, z, 0.0, 0.0, 0.0, *axis, *momentum, *(body / np.linalg.norm(body))]
 
 
-SUBJECTS = (
-    Subject("light by scipy", "the spin of a record", light),
-    Subject("field by magpylib", "the base of a scan", field),
-    Subject("motion by heyoka", "the drag of a spin-down in full motion", motion),
-)
+def subjects(lean: float) -> tuple[Subject, ...]:
+    """Return what is calibrated."""
+    return (
+        Subject("light by scipy", "the spin of a record", light),
+        Subject("field by magpylib", "the base of a scan", field),
+        Subject("motion by heyoka", "the drag of a spin-down in full motion", partial(motion, lean=lean)),
+    )
 
 
 def main() -> None:
@@ -203,14 +200,15 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--trials", type=int, default=200)
     options.add_argument("--seed", type=int, default=0)
-    options.add_argument("--only", choices=[subject.name.split()[0] for subject in SUBJECTS])
+    options.add_argument("--only", choices=("light", "field", "motion"))
+    options.add_argument("--lean", type=float, default=LEAN_RAD, help="the last reading is before this lean [rad]")
     given = options.parse_args()
     studies = [
         study_world(subject, given.trials, given.seed, ShareBar(subject.name))
-        for subject in SUBJECTS
-        if given.only in (None, subject.name.split()[0])
+        for subject in subjects(given.lean)
+        if subject.name.startswith(given.only or "")
     ]
-    print_studies(studies, calibrate=True)
+    print_studies(studies, by_ranks)
     if given.only is None:
         RESULT.write_text(as_json(studies) + "\n", encoding="utf-8")
         FIGURE.parent.mkdir(exist_ok=True)

@@ -42,6 +42,9 @@ if TYPE_CHECKING:
     from levilab.runs.run import Run
     from levilab.simulator.scene import Scene
 
+#: Arguments of `analyze` that are data, and no options.
+_DATA = {"data", "kind", "time", "frequency", "light"}
+
 __all__ = [
     "LevilabError", "acquire", "analyze", "export", "load", "open_sweep", "report", "runs", "scenes", "simulate",
     "stability", "sweep",
@@ -268,8 +271,7 @@ def analyze(
         UsageError: an argument is wrong, or the data suit several analyses equally.
         DataError: the data suit none, or cannot be used; the text names file and line.
     """
-    data_names = {"data", "kind", "time", "frequency", "light", "data_names"}
-    options = {name: value for name, value in locals().items() if name not in data_names}
+    options = {name: value for name, value in locals().items() if name not in _DATA}
     from levilab.notebook.analysis import analyze_data
 
     if light is not None:

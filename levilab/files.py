@@ -126,6 +126,11 @@ def finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+def as_json(value: Any) -> str:
+    """Return the text of a file for people and programs; numbers must be finite."""
+    return json.dumps(value, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
+
+
 def _whole_number(digits: str) -> int:
     if len(digits) > 302 or abs(number := int(digits)) > LARGEST:
         raise ValueError(_TOO_LARGE)

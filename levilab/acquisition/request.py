@@ -61,6 +61,11 @@ class CannotResume(LevilabError):
     """This run cannot be gone on with."""
 
 
+def _unfit(template: str, **values: object) -> CannotResume:
+    """Return the error for a run that does not fit the experiment."""
+    return CannotResume(Text("{said}; {advice}", said=Text(template, **values), advice=_ADVICE))
+
+
 @dataclass(frozen=True)
 class AcquisitionOptions:
     """How an experiment is to be carried out.
@@ -377,35 +382,15 @@ def _check_readings(run: Run, request: AcquisitionRequest) -> None:
     settings = settings_of(request.config, experiment.name)
     channels = request.columns
     names = [channel.name for channel in channels]
+    listed = ", ".join(names)
     if [channel.get("name") for channel in run.record.channels] != names:
-        raise CannotResume(
-            Text(
-                "{folder}/run.json: channels: {names} are expected here; {advice}",
-                folder=run.folder,
-                names=", ".join(names),
-                advice=_ADVICE,
-            )
-        )
+        raise _unfit("{folder}/run.json: channels: {names} are expected here", folder=run.folder, names=listed)
     readings = run.readings()
     if list(readings.header) != names:
-        raise CannotResume(
-            Text(
-                "{path}: the columns {names} are expected; {advice}",
-                path=readings.path,
-                names=", ".join(names),
-                advice=_ADVICE,
-            )
-        )
+        raise _unfit("{path}: the columns {names} are expected", path=readings.path, names=listed)
     for channel in channels:
         if channel.unit == "Hz" and channel.name in readings.columns and not (readings.column(channel.name) > 0).all():
-            raise CannotResume(
-                Text(
-                    "{path}: {name}: only numbers above 0 are expected; {advice}",
-                    path=readings.path,
-                    name=channel.name,
-                    advice=_ADVICE,
-                )
-            )
+            raise _unfit("{path}: {name}: only numbers above 0 are expected", path=readings.path, name=channel.name)
     last = float(readings.column("time_s")[-1])
     if isinstance(settings, CounterSettings) and settings.one_top and last > settings.longest_s:
         raise CannotResume(
@@ -532,13 +517,7 @@ def _scene(name: str | None, run: Run | None) -> Scene | None:
     if name is None and begun is None:
         return None
     if begun is not None and not isinstance(begun, dict):
-        raise CannotResume(
-            Text(
-                "{folder}/run.json: configuration.scene: a table is expected; {advice}",
-                folder=run.folder if run else "",
-                advice=_ADVICE,
-            )
-        )
+        raise _unfit("{folder}/run.json: configuration.scene: a table is expected", folder=run.folder if run else "")
     scene = scene_of(begun) if begun is not None else read_scene(str(name))
     if scene.top.aligned:
         raise SceneError(

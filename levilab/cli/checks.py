@@ -46,8 +46,11 @@ def crosscheck(
 ) -> None:
     """Check the analyses, and end with 1 where an estimate or an uncertainty is wrong."""
     from levilab.crosscheck import command
+    from levilab.crosscheck.calibration import by_ranks
     from levilab.crosscheck.stored import as_json as as_text
+    from levilab.crosscheck.study import by_pulls
 
+    judge = by_ranks if calibrate else by_pulls
     if like:
         if calibrate:
             raise UsageError("calibrate", "does not go with `like`: it is of worlds at random")
@@ -62,10 +65,10 @@ def crosscheck(
     if as_json:
         result(as_text(studies))
     else:
-        command.print_studies(studies, calibrate=calibrate)
+        command.print_studies(studies, judge)
     for path in written:
         message(f"wrote {path}")
-    if not all(command.is_as_wanted(one, calibrate=calibrate) for one in studies):
+    if not all(one.holds_by(judge) for one in studies):
         raise typer.Exit(exit_codes.FAILED)
 
 

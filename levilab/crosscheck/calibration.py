@@ -17,7 +17,7 @@ from scipy.special import betaincinv, ndtr, stdtr
 from scipy.stats import poisson
 
 from analysis.pulses.regression import student
-from levilab.crosscheck.study import FALSE_ALARM, Spread, Study, Verdict
+from levilab.crosscheck.study import FALSE_ALARM, Spread, Verdict
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -73,7 +73,7 @@ def probability_within(lower: Array, upper: Array) -> float:
     return float(alive[n] / poisson.pmf(n, n))
 
 
-def calibration_of(spread: Spread) -> Verdict:
+def by_ranks(spread: Spread) -> Verdict:
     """Judge pulls and ranks: too many ranks in a tail are a u that is too small, too few a u that is too large."""
     if spread.n < 2 or spread.verdict is Verdict.WRONG:
         return spread.verdict
@@ -83,8 +83,3 @@ def calibration_of(spread: Spread) -> Verdict:
     if np.any(low & (ranks < 0.5)) or np.any(high & (ranks > 0.5)):
         return Verdict.WRONG
     return Verdict.TOO_LARGE if np.any(low | high) else Verdict.RIGHT
-
-
-def is_calibrated(study: Study) -> bool:
-    """Return whether no quantity has a bias or a u that is too small."""
-    return bool(study.spreads) and all(calibration_of(one) is not Verdict.WRONG for one in study.spreads)

@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 from rich.markup import escape
 
-from levilab.crosscheck.calibration import calibration_of, is_calibrated
 from levilab.crosscheck.catalogue import SUBJECTS
 from levilab.crosscheck.own.study import OWN, TRIALS, study_result
 from levilab.crosscheck.stored import NAME, as_json, store
-from levilab.crosscheck.study import study_world
-from levilab.crosscheck.table import as_text, crosscheck_table, failures_as_text, verdict_of
+from levilab.crosscheck.study import by_pulls, study_world
+from levilab.crosscheck.table import as_text, crosscheck_table, failures_as_text
 from levilab.errors import UsageError
 from levilab.files import replace_atomically, writing
 from levilab.pipelines.catalogue import ANALYSES
@@ -24,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
     from pathlib import Path
 
-    from levilab.crosscheck.study import Study
+    from levilab.crosscheck.study import Judge, Study
     from levilab.pipelines.result import Place
 
 FIGURE, RANKS = "crosscheck.png", "calibration.png"
@@ -78,14 +77,8 @@ def _check(names: Iterable[str], known: Iterable[str], words: str) -> None:
             raise UsageError("subject", f"{words} {', '.join(known)}", value=name)
 
 
-def is_as_wanted(study: Study, *, calibrate: bool) -> bool:
-    """Return whether no quantity is wrong, by the pulls or by the ranks of the truths."""
-    return is_calibrated(study) if calibrate else study.holds
-
-
-def print_studies(studies: Sequence[Study], *, calibrate: bool = False) -> None:
+def print_studies(studies: Sequence[Study], judge: Judge = by_pulls) -> None:
     """Print the tables: one of all worlds, with a note on failures; one of each result, with its text."""
-    judge = calibration_of if calibrate else verdict_of
     console = terminal()
     worlds = [one for one in studies if not one.inputs]
     if worlds:

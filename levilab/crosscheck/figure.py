@@ -10,8 +10,8 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from levilab.crosscheck.calibration import band_of, calibration_of, ranks_of
-from levilab.crosscheck.study import FALSE_ALARM, Verdict
+from levilab.crosscheck.calibration import band_of, by_ranks, ranks_of
+from levilab.crosscheck.study import FALSE_ALARM, Verdict, by_pulls
 from levilab.present.drawing import SMALL, headline, panel, write
 from levilab.present.looks import BLUE, VERMILION
 from levilab.present.numbers import with_sign
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from levilab.crosscheck.study import Spread, Study
+    from levilab.crosscheck.study import Judge, Spread, Study
 
 _COLUMNS = 3
 #: Left edge of the first panel, a panel's size, and from one to the next [inch].
@@ -37,7 +37,7 @@ def crosscheck_figure(checked: Sequence[Study]) -> Figure:
     """Draw histograms of pulls; vermilion and hatched where they are not as wanted."""
     about = "Bars: trials (vermilion and hatched where they are not as wanted); curve: as the uncertainties say"
     labels = "pull, (estimate − truth)/u", "trials"
-    return _panels(checked, lambda spread: spread.verdict, _draw_pulls, about, labels)
+    return _panels(checked, by_pulls, _draw_pulls, about, labels)
 
 
 def calibration_figure(checked: Sequence[Study]) -> Figure:
@@ -46,12 +46,12 @@ def calibration_figure(checked: Sequence[Study]) -> Figure:
         "Line: share of trials below a rank, less the rank (vermilion: not as wanted); grey: within chance.\n"
         "Low on the left and high on the right: u is too large; high on the left and low on the right: too small."
     )
-    return _panels(checked, calibration_of, _draw_ranks, about, ("rank of the truth", ""))
+    return _panels(checked, by_ranks, _draw_ranks, about, ("rank of the truth", ""))
 
 
 def _panels(
     checked: Sequence[Study],
-    judge: Callable[[Spread], Verdict],
+    judge: Judge,
     draw: Callable[[Axes, Spread, Verdict], None],
     about: str,
     labels: tuple[str, str],

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from levilab.crosscheck.study import Study
 from levilab.errors import DataError
+from levilab.files import as_json as to_json
 from levilab.files import finite, parse_json, replace_atomically, writing
 from levilab.settings import in_one_line
 from levilab.software import software_versions
@@ -45,7 +45,7 @@ def _numbers(spread: Spread) -> dict[str, Any]:
 
 def as_json(studies: Sequence[Study]) -> str:
     """Return the text of the file."""
-    return json.dumps(document(studies), indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    return to_json(document(studies))
 
 
 def file_of(place: Place) -> Path:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 import tempfile
-from collections.abc import Mapping  # pydantic reads the fields of Study from it
+from collections.abc import Callable, Mapping  # pydantic reads the fields of Study from it
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
@@ -24,7 +24,7 @@ from levilab.crosscheck.subject import Trial, TrialFailed
 from levilab.errors import LevilabError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from levilab.crosscheck.subject import Pull, Subject
 
@@ -154,6 +154,15 @@ class Spread:
         return Verdict.TOO_LARGE if min(wider, fewer) < -self.room else Verdict.RIGHT
 
 
+#: From the pulls of a quantity to what they say.
+Judge = Callable[[Spread], Verdict]
+
+
+def by_pulls(spread: Spread) -> Verdict:
+    """Judge mean, width and coverage of the pulls."""
+    return spread.verdict
+
+
 @dataclass(frozen=True)
 class Study:
     """A subject with its trials.
@@ -191,8 +200,12 @@ class Study:
 
     @property
     def holds(self) -> bool:
-        """Whether no quantity is wrong."""
-        return bool(self.spreads) and all(spread.verdict is not Verdict.WRONG for spread in self.spreads)
+        """Whether no quantity is wrong, by its pulls."""
+        return self.holds_by(by_pulls)
+
+    def holds_by(self, judge: Judge) -> bool:
+        """Return whether no quantity is wrong."""
+        return bool(self.spreads) and all(judge(spread) is not Verdict.WRONG for spread in self.spreads)
 
 
 def study_world(subject: Subject, trials: int, seed: int, progress: Callable[[float], None]) -> Study:

@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING
 from analysis.numbers import digits
 from levilab.crosscheck.own.model import OF_ONE_RUN
 from levilab.crosscheck.own.study import ENOUGH, TRIALS
-from levilab.crosscheck.study import LONG_TAILS, Spread, Verdict
+from levilab.crosscheck.study import LONG_TAILS, Spread, Verdict, by_pulls
 from levilab.present.document.blocks import Note, Paragraph, Tabular
 from levilab.present.numbers import enumeration, with_sign
 from levilab.present.tables import Row, Table, table
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
-    from levilab.crosscheck.study import Study
+    from levilab.crosscheck.study import Judge, Study
     from levilab.present.document.blocks import Block
 
 _NUMBERS = ("pulls", "mean pull", "s.d. of pulls\n(wanted)", "within 1 u\n(wanted)", "u/value")
@@ -24,15 +24,10 @@ _NUMBERS = ("pulls", "mean pull", "s.d. of pulls\n(wanted)", "within 1 u\n(wante
 _MANY = 30
 
 
-def verdict_of(spread: Spread) -> Verdict:
-    """Judge the mean, the width and the coverage of the pulls."""
-    return spread.verdict
-
-
 def crosscheck_table(
     studies: Sequence[Study],
     symbols: Mapping[str, str] | None = None,
-    judge: Callable[[Spread], Verdict] = verdict_of,
+    judge: Judge = by_pulls,
 ) -> Table:
     """Return a table with a row a quantity; behind ± stands the standard error, in parentheses what is wanted.
 
@@ -49,7 +44,7 @@ def crosscheck_table(
     )
 
 
-def _rows(studies: Sequence[Study], symbols: Mapping[str, str], judge: Callable[[Spread], Verdict]) -> Iterator[Row]:
+def _rows(studies: Sequence[Study], symbols: Mapping[str, str], judge: Judge) -> Iterator[Row]:
     for study in studies:
         for k, one in enumerate(study.spreads):
             cells = (

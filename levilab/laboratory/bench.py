@@ -126,7 +126,7 @@ class LaboratoryPerson:
 
     def __init__(self, fate: Fate, clock: LaboratoryClock, random: Random) -> None:
         self._fate, self._clock, self._random = fate, clock, random
-        self.slip, self.missed = "", 0
+        self.slip = ""
         self.world: World | None = None
 
     def __call__(self, task: Task) -> str:
@@ -146,8 +146,6 @@ class LaboratoryPerson:
                 if slip == "types a height":
                     height = round(height + self._random.uniform(-2e-3, 2e-3), 4)
                     answer = f"{1e3 * height:.1f}".replace(".", self._random.choice(".,"))
-                if slip == "misses":
-                    self.missed += 1
                 world.place_probe(height + (3e-3 if slip == "misses" else 0.0))
             case ShieldProbe():
                 world.place_probe(None)

@@ -102,7 +102,7 @@ def _ended_well(life: Life) -> Iterator[Finding]:
 
 
 def message(text: str, whose: str) -> Iterator[Finding]:
-    """Yield what is wrong with the text of a failure: it is one line, in words, and says what to do."""
+    """Yield what is wrong with the text of a failure: it is one line, without words of Python."""
     if not text.strip() or "\n" in text or _PYTHON.search(text):
         yield Finding("message", f"{whose}: {text!r}")
 

@@ -34,11 +34,10 @@ class Life:
         number: from 0 on.
         ended: finished, interrupted, failed, killed, refused (before anything was begun) or broken (by a defect).
         status: its exit status; None: it was killed, or is broken.
-        text: what it says at the end.
+        text: its last message.
         error: that ended it.
         folder: of its run.
-        shown: rows that were shown, and texts of events that were.
-        told: other lines that were shown.
+        shown, events: rows, and texts of events, that were shown.
         zero: time on the bench of time_s = 0 [s].
         first: index of the first of the rows that this process has read.
         left: the status of its run, as others read it then; empty where there is none.
@@ -54,7 +53,6 @@ class Life:
     folder: Path | None = None
     shown: list[Row] = field(default_factory=list)
     events: list[str] = field(default_factory=list)
-    told: list[str] = field(default_factory=list)
     zero: float | None = None
     first: int = 0
     left: str = ""

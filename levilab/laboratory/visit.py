@@ -68,8 +68,8 @@ class _Screen(Display):
 
     def message(self, text: str) -> None:
         session = self._visit.session
-        is_event = session is not None and session.doing.text == text
-        (self._life.events if is_event else self._life.told).append(text)
+        if session is not None and session.doing.text == text:
+            self._life.events.append(text)
         self._visit.fate.step(f"says {text}")
 
 
@@ -269,7 +269,6 @@ class Told:
         findings: what is wrong.
         trace: a line for each step.
         story: a line for each process, and for what struck it.
-        steps: of all processes.
     """
 
     plan: Plan

@@ -31,7 +31,7 @@ _POINTS, _DPI, _COLOURS = 200, 110, 24
 
 
 def residuals_figure(
-    frame: pd.DataFrame, residual: str, title: str, made_up: Sequence[bool], curves: Mapping[str, Curve | None]
+    frame: pd.DataFrame, residual: str, title: str, synthetic: Sequence[bool], curves: Mapping[str, Curve | None]
 ) -> Figure:
     """Draw the readings of each input with its curve, and beside them the residuals.
 
@@ -39,12 +39,12 @@ def residuals_figure(
         frame: the readings, with the column input.
         residual: the column of the residuals.
         title: of the figure.
-        made_up: whether each input is synthetic.
+        synthetic: whether each input is synthetic.
         curves: input → its fitted curve, None where there is none.
     """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, _HEIGHT))
-        headline(figure, title, synthetic_mark(made_up))
+        headline(figure, title, synthetic_mark(synthetic))
         left = panel(figure, _LEFT, _TOP, _WIDTH, _PANEL)
         right = panel(figure, _RIGHT, _TOP, _WIDTH, _PANEL, sharex=left)
         for axes, kind in ((left, "fit"), (right, "residuals")):
@@ -92,7 +92,7 @@ def drawn(
     *,
     title: str | None = None,
     logy: bool = False,
-    made_up: Sequence[bool] = (True,),
+    synthetic: Sequence[bool] = (True,),
 ) -> Figure | Axes:
     """Draw one panel into the given axes, which are returned, or into a figure of its own.
 
@@ -101,14 +101,14 @@ def drawn(
         ax: a person's axes, whose style stays as it is; None: there are none.
         title: above it.
         logy: whether the ordinate is logarithmic.
-        made_up: whether each input is synthetic, which a figure of its own says.
+        synthetic: whether each input is synthetic, which a figure of its own says.
     """
     with mpl.rc_context({} if ax else STYLE):
         figure = Figure(figsize=(WIDE, _HEIGHT + 0.6))
         axes = ax or panel(figure, _LEFT, _TOP, WIDE - 1.2 * _LEFT, _PANEL + 0.6)
         draw(axes)
         if ax is None:
-            headline(figure, title or "", synthetic_mark(made_up))
+            headline(figure, title or "", synthetic_mark(synthetic))
         elif title is not None:
             ax.set_title(title)
         if logy:

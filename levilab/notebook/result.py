@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 import shutil
 import tempfile
 import weakref
@@ -17,7 +16,7 @@ import numpy as np
 
 import levilab
 from levilab.errors import UsageError, unquote
-from levilab.files import CannotWrite, replace_atomically
+from levilab.files import CannotWrite, as_json, replace_atomically
 from levilab.notebook.fit import FIT, METHODS, FittedModel, axes_of
 from levilab.notebook.labels import as_dataset, head_as_html
 from levilab.notebook.names import Helpful, bare
@@ -368,7 +367,7 @@ class AnalysisResult(Helpful):
 
     def to_json(self) -> str:
         """Return the text of result.json, which has all of it."""
-        return json.dumps(self.document, indent=2, sort_keys=True, ensure_ascii=False)
+        return as_json(self.document)
 
     def to_latex(self) -> str:
         """Return the values as a small table of LaTeX; `levilab.report(result, …, tables=True)` writes all tables."""
@@ -473,7 +472,7 @@ class AnalysisResult(Helpful):
         if not of_panel and what == "residuals":
             return for_notebooks(self._residuals_figure())
         panel = self._panel(model)
-        return drawn(lambda axes: draw_fit(axes, what, *panel), ax, title=title, logy=logy, made_up=self._made_up)
+        return drawn(lambda axes: draw_fit(axes, what, *panel), ax, title=title, logy=logy, synthetic=self._synthetic)
 
     def _panel(self, model: str | None) -> tuple[pd.DataFrame, str, dict[str, Any]]:
         """Return the readings with a model's residuals, their column, and its curves.  Raises UsageError."""
@@ -495,10 +494,10 @@ class AnalysisResult(Helpful):
         best = self.best_model
         title = f"{self.kind}{f', {best}' * bool(best)}: readings, and residuals"
         frame, residual, curves = self._panel(None)
-        return residuals_figure(frame, residual, title, self._made_up, curves)
+        return residuals_figure(frame, residual, title, self._synthetic, curves)
 
     @property
-    def _made_up(self) -> list[bool]:
+    def _synthetic(self) -> list[bool]:
         return [source.synthetic for source in self.found.sources]
 
     def save(self, folder: str | PathLike[str]) -> list[Path]:

@@ -113,7 +113,7 @@ class RecordedRun(Helpful, Run):
             ax,
             title=title,
             logy=logy,
-            made_up=[self.record.synthetic],
+            synthetic=[self.record.synthetic],
         )
 
     def to_xarray(self) -> xarray.Dataset:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -13,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from analysis.budget import Budget, Component
 from levilab.errors import DataError
-from levilab.files import parse_json, replace_atomically, writing
+from levilab.files import as_json, parse_json, replace_atomically, writing
 from levilab.formats.texts import locate
 from levilab.pipelines.dump import Dump
 from levilab.runs.find import RECORD
@@ -209,7 +208,7 @@ def save(
         tables: for other analyses, by the names of their files.
         first: whether the analysis is the first here, so that result.json is its own.
     """
-    text = json.dumps(result.as_dict(), indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False)
+    text = as_json(result.as_dict())
     files = [place.result("" if first else result.analysis)]
     advice = "choose another place with `out`, or print only with `save` = False"
     with writing(f"the result could not be written into {place.folder}", advice):

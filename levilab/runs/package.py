@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import re
 from typing import TYPE_CHECKING, Any
+
+from levilab.files import as_json
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
@@ -85,4 +86,4 @@ def package(
         "resources": [*resources],
     }
     kept = {key: value for key, value in described.items() if value not in (None, "")}
-    return json.dumps(kept, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
+    return as_json(kept) + "\n"

@@ -5,7 +5,6 @@ It is written by `levilab.runs.writer`.
 
 from __future__ import annotations
 
-import json
 import re
 from collections import Counter
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from levilab.computer import computer
 from levilab.errors import DataError
-from levilab.files import parse_json
+from levilab.files import as_json, parse_json
 from levilab.formats.table import read_run_readings
 from levilab.present.html import facts_as_html, table_as_html
 from levilab.runs.events import RunEvent
@@ -81,8 +80,7 @@ class RunRecord(BaseModel):
 
     def as_json(self) -> str:
         """Return the file's text."""
-        data = self.model_dump(mode="json", by_alias=True)
-        return json.dumps(data, indent=2, sort_keys=True, ensure_ascii=False, allow_nan=False) + "\n"
+        return as_json(self.model_dump(mode="json", by_alias=True)) + "\n"
 
 
 def utc_now() -> str:

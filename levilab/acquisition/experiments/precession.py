@@ -299,7 +299,7 @@ def _calm(session: Session[PrecessionSettings], drive: float, swing: Swing | Non
     session.bench.generator.frequency = drive
     session.event(
         RunEvent.CALMED,
-        Text("the top swung {size:.2f} turns about the drive: the drive was moved by as much", size=swing.size),
+        Text("the top swung {size:.2f} turns about the drive: the drive was moved by this angle", size=swing.size),
     )
 
 

@@ -144,7 +144,7 @@ class SpinRun:
         """The slope of a straight line through several records [Hz/s]; None of a single one, and where phases differ.
 
         Records far apart show a slope that is far too small for one of them.  A record in which a drive was switched
-        has several slopes.  Where they scatter about the line by more than their u, u grows by as much.
+        has several slopes.  Where they scatter about the line by more than their u, u grows by the same factor.
         """
         return self._line[0] if self._line else None
 

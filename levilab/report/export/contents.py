@@ -14,6 +14,7 @@ import numpy as np
 
 from analysis.errors import AnalysisError
 from levilab.errors import DataError, unquote
+from levilab.files import as_json
 from levilab.pipelines.result import Place
 from levilab.pipelines.suits import recall_suiting
 from levilab.present.units import split
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
     from levilab.formats.waveforms.waveform import Waveform
     from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.result import Result
     from levilab.sweeps.store import Store
 
     #: Analyses with what they found.
@@ -158,7 +160,11 @@ def contents_of_results(path: Path, run: Run | None, results: Results) -> Conten
         path, run = next((path, source.run) for path, source in inputs.items())
     waveforms = run_waveforms(run) if run else _waveforms_of(results)
     tables = [*_readings(run), *map(_of_analysis, results), *map(_of_waveform, enumerate(waveforms, 1))]
-    files = {f"result{f'.{one.name}' * (k > 0)}.json": _document(one, found) for k, (one, found) in enumerate(results)}
+    written = [analysis.result.of(found, Place(Path())) for analysis, found in results]
+    files = {
+        f"result{f'.{one.analysis}' * (k > 0)}.json": f"{as_json(one.as_dict())}\n".encode(errors="replace")
+        for k, one in enumerate(written)
+    }
     names = (RECORD, EVENTS) if run else ()
     files |= {name: (path / name).read_bytes() for name in names if (path / name).exists()}
     if not any(len(table.columns[0].values) for table in tables):
@@ -168,7 +174,7 @@ def contents_of_results(path: Path, run: Run | None, results: Results) -> Conten
         title=f"levilab {run.record.experiment} run {path.name}" if run else f"readings of {path.name}",
         tables=tuple(table for table in tables if len(table.columns[0].values)),
         about=_facts(run, path, results),
-        values=tuple(value for one in results for value in _values(*one)),
+        values=tuple(value for one in written for value in _values(one)),
         files=files,
     )
 
@@ -186,7 +192,7 @@ def _readings(run: Run | None) -> Iterator[Table]:
     columns = []
     for name in map(str, frame):
         unit, source = (described.get(name, {}).get(key, "") for key in ("unit", "source"))
-        columns.append(Column(name, frame[name].to_numpy(), unit or unit_of_name(name), _in_words(name), source))
+        columns.append(Column(name, frame[name].to_numpy(), unit or unit_of_name(name), _meaning(name), source))
     yield Table("readings", tuple(columns), "a reading")
 
 
@@ -194,7 +200,7 @@ def _of_analysis(result: tuple[Analysis[Any], Any]) -> Table:
     """Return the readings that an analysis used or made, with their residuals."""
     analysis, found = result
     columns = next(iter(analysis.columns(found)))
-    made = (Column(name, np.asarray(values), unit_of_name(name), _in_words(name)) for name, values in columns.items())
+    made = (Column(name, np.asarray(values), unit_of_name(name), _meaning(name)) for name, values in columns.items())
     return Table(analysis.name, tuple(made), f"a reading of the analysis {analysis.name}")
 
 
@@ -218,18 +224,12 @@ def _waveforms_of(results: Results) -> list[Waveform]:
     return list(dict.fromkeys(found))
 
 
-def _values(analysis: Analysis[Any], found: Any) -> Iterator[Value]:
+def _values(written: Result) -> Iterator[Value]:
     """Yield the values of a result, and the parameters of its models."""
-    written = analysis.result.of(found, Place(Path()))
     parts = [("", written.values), *((model.name, model.parameters) for model in written.models)]
     for model, quantities in parts:
         for name, one in quantities.items():
-            yield Value(analysis.name, model, name, one.value, one.u, one.unit)
-
-
-def _document(analysis: Analysis[Any], found: Any) -> bytes:
-    content = analysis.document(found, Path())
-    return (json.dumps(content, indent=2, sort_keys=True, ensure_ascii=False) + "\n").encode(errors="replace")
+            yield Value(written.analysis, model, name, one.value, one.u, one.unit)
 
 
 def _facts(run: Run | None, path: Path, results: Results) -> dict[str, str]:
@@ -298,10 +298,10 @@ def unit_of_name(name: str) -> str:
     return unit.si if unit else "1"
 
 
-def _in_words(name: str) -> str:
+def _meaning(name: str) -> str:
     """Return a column's name as people say it.
 
-    >>> _in_words("spin_frequency_u_hz"), _in_words("used")
+    >>> _meaning("spin_frequency_u_hz"), _meaning("used")
     ('standard uncertainty of spin frequency', 'used')
     """
     quantity = split(name)[0]

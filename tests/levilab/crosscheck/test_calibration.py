@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import expon, t
 
-from levilab.crosscheck.calibration import band_of, calibration_of, probability_within, ranks_of
+from levilab.crosscheck.calibration import band_of, by_ranks, probability_within, ranks_of
 from levilab.crosscheck.figure import calibration_figure
 from levilab.crosscheck.study import Spread, Study, Verdict
-from levilab.present.style import as_png
+from levilab.present.looks import BLUE, VERMILION
 
 
 def quantiles(law, n: int = 200) -> tuple[float, ...]:
@@ -41,7 +41,7 @@ def test_the_probability_within_bounds_is_exact():
     ],
 )
 def test_each_wrong_distribution_is_named(pulls, verdict):
-    assert calibration_of(Spread("x", pulls)) is verdict
+    assert by_ranks(Spread("x", pulls)) is verdict
 
 
 def test_a_skew_that_mean_and_width_hide_is_seen():
@@ -49,7 +49,7 @@ def test_a_skew_that_mean_and_width_hide_is_seen():
     assert skew.mean == pytest.approx(0, abs=0.01)
     assert skew.deviation == pytest.approx(1, abs=0.02)
     assert skew.verdict is not Verdict.WRONG
-    assert calibration_of(skew) is Verdict.WRONG
+    assert by_ranks(skew) is Verdict.WRONG
 
 
 def test_ranks_of_few_degrees_of_freedom_are_by_student():
@@ -58,6 +58,19 @@ def test_ranks_of_few_degrees_of_freedom_are_by_student():
         assert ranks_of(spread) == pytest.approx((np.arange(200) + 0.5) / 200, abs=1e-4)
 
 
-def test_a_figure_is_drawn():
-    study = Study("made-up", "five", 200, 0, (Spread("x", quantiles(expon(-1))),))
-    assert as_png(calibration_figure([study])).startswith(b"\x89PNG")
+@pytest.mark.parametrize(("law", "colour"), [(t(1e6), BLUE), (expon(-1), VERMILION)])
+def test_the_figure_has_the_ranks_and_the_band_and_shows_what_is_wrong(law, colour):
+    study = Study("made-up", "five", 200, 0, (Spread("x", quantiles(law)),))
+    figure = calibration_figure([study])
+    (axes,) = figure.axes
+    line, band = axes.lines[0], axes.collections[0]
+    assert line.get_color() == colour
+    share = np.searchsorted(ranks_of(study.spreads[0]), line.get_xdata(), "right") / 200
+    assert line.get_ydata() == pytest.approx(share - line.get_xdata())
+    least, most = band_of(200, 0.01)
+    at_half = band.get_paths()[0].vertices
+    at_half = at_half[np.isclose(at_half[:, 0], 0.5)][:, 1]
+    assert {round(float(one), 9) for one in at_half} == {
+        round(float(np.mean(ends <= 0.5)) - 0.5, 9) for ends in (most, least)
+    }
+    assert ("do not lie about the truth" in figure.texts[0].get_text()) == (colour == VERMILION)

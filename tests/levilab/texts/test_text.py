@@ -30,7 +30,7 @@ LANGUAGES = [code for code in languages() if code != "en"]
 SAYING = {
     "_say": 0, "CommandRefused": 0, "event": 1, "warn": 0, "progress": 0, "tell": 0,
     "Task": 0, "FloatTop": 0, "PlaceProbe": 0, "ShieldProbe": 0,
-    "ExperimentFailed": 0, "DidNotFollow": 0, "NoLight": 0,
+    "ExperimentFailed": 0, "DidNotFollow": 0, "NoLight": 0, "_unfit": 0,
 }  # fmt: skip
 ROOMS = ("levilab.live.", "levilab.acquisition.")
 _LITERAL = r'"((?:[^"\\]|\\.)*)"'

@@ -123,7 +123,7 @@ def test_a_top_that_swings_is_calmed_at_each_point(tmp_path, monkeypatch):
     swing = Swing(frequency=0.25, size=0.3, crest=3.0)
     monkeypatch.setattr("levilab.acquisition.experiments.precession.swing_of", lambda _: swing)
     run = acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock())), Silent())
-    assert events(run, "calmed") == 3 * ["the top swung 0.30 turns about the drive: the drive was moved by as much"]
+    assert events(run, "calmed") == 3 * ["the top swung 0.30 turns about the drive: the drive was moved by this angle"]
     np.testing.assert_allclose(run.readings().column("spin_frequency_hz"), [30.5, 31.0, 32.0], atol=0.2)
 
 
