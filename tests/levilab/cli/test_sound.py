@@ -41,7 +41,7 @@ def test_a_file_played_to_a_sound_card_is_recorded_bit_for_bit(tmp_path):
         assert done.returncode == 0, done.stderr
     run = Run.load(tmp_path / json.loads(done.stdout)["run"])
     assert not run.record.synthetic
-    (stored,) = run.traces()
+    *_, stored = run.traces()  # a machine that is busy loses samples: that record is cut short, and taken again
     recorded = (stored.trace.codes.astype(np.int32) - (1 << 15)).astype(np.int16)
     assert recorded.size == 2 * RATE
     at = samples.tobytes().find(recorded.tobytes())

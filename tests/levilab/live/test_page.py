@@ -290,6 +290,7 @@ def test_who_hears_the_page_hears_events_and_not_each_number(served: Hall, page:
         state = State(1.0, last={"spin_frequency_hz": 31.0}, virtual=True, speed=1.0)
         publish(watch[run.folder.name], state)
         until(page, "document.getElementById('spin-value').textContent === '31.0000'")
+        until(page, "document.getElementById('plot').getAttribute('aria-label')?.endsWith(': no top is counted')")
         page.evaluate(f"void ({WRITTEN})(3).then((written) => {{ window.written = written; }})")
         for k in range(1, 100):
             publish(watch[run.folder.name], replace(state, time_s=1.0 + 0.001 * k))
