@@ -68,7 +68,7 @@ app = typer.Typer(
     name="levilab",
     cls=Commands,
     help="The lab application for experiments on the Levitron: acquire, analyze, report.",
-    epilog="Try: levilab acquire spin --mock",
+    epilog="Try: levilab live --mock, or in the terminal levilab acquire spin --mock",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -102,142 +102,154 @@ class Row(NamedTuple):
     is_hidden: bool = False
 
 
-#: The commands by their names; what each is made of is imported by its call.
+#: The commands by their names, in the groups of the help; what each is made of is imported by its call.
 COMMANDS = {
-    "report": Row(
-        "report.report",
-        """Report runs and simulations in one file, HTML or PDF: what was measured, how, figures, numbers, warnings.
+    "Measure": {
+        "live": Row(
+            "live.live",
+            r"""Show the bench in a web browser: a run as it grows, a finished one, or with --mock a bench to play with.
 
-        A PATH is a run folder, a data file, a folder to search, a simulated motion, a sweep's NAME.zarr, or the output
-        of levilab stability --json; all of them go together.
+            A view only, in a process of its own: a run goes on when it is closed, and it can be opened again at any
+            time. No program of another machine reaches it.  Needs the extra live: pip install ".\[live]" in the
+            clone.""",
+            "levilab live --mock",
+        ),
+        "acquire": Row("acquire.acquire_app", "Run an experiment on the bench and write a run folder."),
+        "bench": Row("bench.bench_app", "Check the instruments, or serve a virtual bench to practise."),
+        "tune": Row(
+            "tune.tune",
+            """Say which washers to put on today: by your trials, the temperature, and a Hall scan if there is one.
 
-        The numbers are those that levilab analyze wrote beside the runs, of every analysis; where it wrote them
-        elsewhere (--out), give that folder or result.json.  What has no result, or one of other readings or options
-        than the given, is analyzed for the page.""",
-        "levilab report sample_data/ -o report.html, or -o report.pdf --tables",
-    ),
-    "export": Row(
-        "export.export_data",
-        r"""Write a run, file or sweep for other programs: readings, traces in volts and seconds, results with u.
+            Asks what it needs to know, and keeps it in tune.toml: with each trial it knows your top better.""",
+            'levilab tune --temperature 21.5 --top 24.9 --washers "0.06,0.06,0.1,0.2" --trial "0.1 g, 20.5 C, rises"',
+        ),
+        "top": Row(
+            "report.top",
+            "Calculate mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties.",
+            "levilab top sample_data/device.toml",
+        ),
+    },
+    "Analyze": {
+        "open": Row(
+            "open.open_files",
+            """Open data files: which columns hold what, in which units; correct that, keep it, analyze and report.
 
-        The ending of the name chooses: .nc is netCDF with the CF conventions, .h5 the same as HDF5 (needs
-        levilab\[hdf5]), .csv a table and one more for each trace and the result, .zip a data package.  The result is
-        the one that levilab analyze wrote; what has none is analyzed.""",
-        "levilab export sample_data/spin-down-1 -o spin-down.nc, or -o spin-down.zip --licence CC-BY-4.0",
-    ),
-    "class": Row(
-        "groups.of_class",
-        """Put the groups of a class beside each other: values with u, residuals, warnings, distance from the class.
+            Shows the files in the browser, where a click corrects them, or in the terminal with the option for each
+            answer. What is understood is analyzed, as by levilab analyze; -o writes the report.""",
+            r'levilab open my.csv --columns "t=1,f=3 \[rpm]" --keep -o my.html',
+        ),
+        "analyze": Row(
+            "analyze.analyze_app",
+            "Analyze runs or data files.  Without a COMMAND: each analysis that suits, as levilab analyze runs/.",
+        ),
+        "runs": Row("report.runs", "List runs: when, what, status, length.", "levilab runs runs/"),
+        "report": Row(
+            "report.report",
+            """Report runs and simulations in one file, HTML or PDF: what was measured, how, figures, numbers, warnings.
 
-        A run has its group by levilab acquire --group.  On a virtual bench each group's seed made a top of its own: its
-        distance from that truth is shown, too.""",
-        "levilab class runs/ -o class.html, or -o class.pdf, or -o class.xlsx",
-    ),
-    "worksheet": Row(
-        "groups.worksheet",
-        """Write worksheets for students and keys for their teacher, in English or German.
+            A PATH is a run folder, a data file, a folder to search, a simulated motion, a sweep's NAME.zarr, or the
+            output of levilab stability --json; all of them go together.
 
-        Each group has a seed, and by it a top of its own; the numbers of the key come from the virtual bench.""",
-        "levilab worksheet spin --language de --groups 20",
-    ),
-    "open": Row(
-        "open.open_files",
-        """Open data files: which columns hold what, in which units; correct that, keep it, analyze and report.
+            The numbers are those that levilab analyze wrote beside the runs, of every analysis; where it wrote them
+            elsewhere (--out), give that folder or result.json.  What has no result, or one of other readings or options
+            than the given, is analyzed for the page.""",
+            "levilab report sample_data/ -o report.html, or -o report.pdf --tables",
+        ),
+        "export": Row(
+            "export.export_data",
+            r"""Write a run, file or sweep for other programs: readings, traces in volts and seconds, results with u.
 
-        Shows the files in the browser, where a click corrects them, or in the terminal with the option for each answer.
-        What is understood is analyzed, as by levilab analyze; -o writes the report.""",
-        r'levilab open my.csv --columns "t=1,f=3 \[rpm]" --keep -o my.html',
-    ),
-    "runs": Row("report.runs", "List runs: when, what, status, length.", "levilab runs runs/"),
-    "simulate": Row(
-        "simulate.simulate",
-        """Simulate the motion: does the top stay up, where and how fast does it turn, which frequencies are in it.
+            The ending of the name chooses: .nc is netCDF with the CF conventions, .h5 the same as HDF5 (needs
+            levilab\[hdf5]), .csv a table and one more for each trace and the result, .zip a data package.  The result
+            is the one that levilab analyze wrote; what has none is analyzed.""",
+            "levilab export sample_data/spin-down-1 -o spin-down.nc, or -o spin-down.zip --licence CC-BY-4.0",
+        ),
+    },
+    "Teach a class": {
+        "worksheet": Row(
+            "groups.worksheet",
+            """Write worksheets for students and keys for their teacher, in English or German.
 
-        The first run for a kind of scene compiles for about 2 s of processor time.  Ctrl-C ends it, and nothing is
-        written then.""",
-        "levilab simulate driven --duration 60 --set drive.frequency_hz=30.1 --out runs",
-    ),
-    "stability": Row(
-        "simulate.stability",
-        "Find where the top floats: heights, masses and spins, from the field and the theory of small motions.",
-        "levilab stability undriven --set top.mass_kg=0.0255",
-    ),
-    "sweep": Row(
-        "sweep.sweep",
-        """Map a scene over its parameters: does the top survive, and how long, at each of thousands of points.
+            Each group has a seed, and by it a top of its own; the numbers of the key come from the virtual bench.""",
+            "levilab worksheet spin --language de --groups 20",
+        ),
+        "class": Row(
+            "groups.of_class",
+            """Put the groups of a class beside each other: values with u, residuals, warnings, distance from the class.
 
-        Results go chunk by chunk into a store of Zarr.  Ctrl-C costs only the chunks under way, and --resume goes on.
-        The store's name instead of a scene shows its summary and draws its figure again, without simulating.""",
-        "levilab sweep undriven --sweep start.spin_hz=18:40:23 --sweep top.mass_kg=0.0250:0.0255:11 "
-        "--duration 5 --out map.zarr",
-    ),
-    "crosscheck": Row(
-        "checks.crosscheck",
-        """Check the analyses: simulate, acquire through the real drivers, analyze, compare with the truth, many times.
+            A run has its group by levilab acquire --group.  On a virtual bench each group's seed made a top of its own:
+            its distance from that truth is shown, too.""",
+            "levilab class runs/ -o class.html, or -o class.pdf, or -o class.xlsx",
+        ),
+    },
+    "Simulate": {
+        "simulate": Row(
+            "simulate.simulate",
+            """Simulate the motion: does the top stay up, where and how fast does it turn, which frequencies are in it.
 
-        A pull is (estimate − truth)/u.  Where estimates and uncertainties are right, pulls have the mean 0 and the
-        standard deviation 1, and 68 % of the truths lie within u.  Ends with 1 where they do not.""",
-        "levilab crosscheck spindown --trials 100",
-    ),
-    "reproduce": Row(
-        "checks.reproduce",
-        """Compute the tables and figures of the Levitron thesis and of two papers again: published value beside ours.
+            The first run for a kind of scene compiles for about 2 s of processor time.  Ctrl-C ends it, and nothing is
+            written then.""",
+            "levilab simulate driven --duration 60 --set drive.frequency_hz=30.1 --out runs",
+        ),
+        "stability": Row(
+            "simulate.stability",
+            "Find where the top floats: heights, masses and spins, from the field and the theory of small motions.",
+            "levilab stability undriven --set top.mass_kg=0.0255",
+        ),
+        "sweep": Row(
+            "sweep.sweep",
+            """Map a scene over its parameters: does the top survive, and how long, at each of thousands of points.
 
-        Prints published, ours and agreement, and writes all with figures as a report.  A minute on two cores.  Ends
-        with 1 where a value neither agrees nor differs for the reason that is shown.""",
-        'levilab reproduce --only "limits,errata" -o reproduce.html',
-    ),
-    "top": Row(
-        "report.top",
-        "Calculate mass and moments of inertia of a top from its parts, taken as cylinders, with uncertainties.",
-        "levilab top sample_data/device.toml",
-    ),
-    "tune": Row(
-        "tune.tune",
-        """Say which washers to put on today: by your trials, the temperature, and a Hall scan if there is one.
+            Results go chunk by chunk into a store of Zarr.  Ctrl-C costs only the chunks under way, and --resume goes
+            on. The store's name instead of a scene shows its summary and draws its figure again, without
+            simulating.""",
+            "levilab sweep undriven --sweep start.spin_hz=18:40:23 --sweep top.mass_kg=0.0250:0.0255:11 "
+            "--duration 5 --out map.zarr",
+        ),
+    },
+    "Check levilab": {
+        "crosscheck": Row(
+            "checks.crosscheck",
+            """Check the analyses: simulate, acquire by the real drivers, analyze, compare with the truth, many times.
 
-        Asks what it needs to know, and keeps it in tune.toml: with each trial it knows your top better.""",
-        'levilab tune --temperature 21.5 --top 24.9 --washers "0.06,0.06,0.1,0.2" --trial "0.1 g, 20.5 C, rises"',
-    ),
-    "acquire": Row("acquire.acquire_app", "Run an experiment on the bench and write a run folder."),
-    "analyze": Row(
-        "analyze.analyze_app",
-        "Analyze runs or data files.  Without a COMMAND: each analysis that suits, as levilab analyze runs/.",
-    ),
-    "bench": Row("bench.bench_app", "Check the instruments, or serve a virtual bench to practise."),
-    "live": Row(
-        "live.live",
-        r"""Show the bench in a web browser: a run as it grows, a finished one, or with --mock a bench to play with.
+            A pull is (estimate − truth)/u.  Where estimates and uncertainties are right, pulls have the mean 0 and the
+            standard deviation 1, and 68 % of the truths lie within u.  Ends with 1 where they do not.""",
+            "levilab crosscheck spindown --trials 100",
+        ),
+        "reproduce": Row(
+            "checks.reproduce",
+            """Compute tables and figures of the Levitron thesis and of two papers again: published value beside ours.
 
-        A view only, in a process of its own: a run goes on when it is closed, and it can be opened again at any time.
-        No program of another machine reaches it.  Needs the extra live: pip install ".\[live]" in the clone.""",
-        "levilab live --mock",
-    ),
-    "benchmark": Row("simulate.benchmark_app", "Compare speed and error with other programs."),
-    "fuzz": Row(
-        "fuzz.fuzz",
-        """Carry out simulated laboratories, one a seed: acquire, kill, resume, analyze, and judge what is left.
+            Prints published, ours and agreement, and writes all with figures as a report.  A minute on two cores.  Ends
+            with 1 where a value neither agrees nor differs for the reason that is shown.""",
+            'levilab reproduce --only "limits,errata" -o reproduce.html',
+        ),
+        "benchmark": Row("simulate.benchmark_app", "Compare speed and error with other programs."),
+        "fuzz": Row(
+            "fuzz.fuzz",
+            """Carry out simulated laboratories, one a seed: acquire, kill, resume, analyze, and judge what is left.
 
-        For people who work on levilab.  Where something is wrong it prints the shortest story that still fails, and
-        ends with 1.""",
-        "levilab fuzz --number 1000",
-        is_hidden=True,
-    ),
+            For people who work on levilab.  Where something is wrong it prints the shortest story that still fails, and
+            ends with 1.""",
+            "levilab fuzz --number 1000",
+            is_hidden=True,
+        ),
+    },
 }
 
 
-def _add(name: str, row: Row) -> None:
+def _add(name: str, row: Row, group: str) -> None:
     module, _, made = row.made_of.partition(".")
-
     epilog = f"Example: {row.example}" if row.example else None
 
-    @app.command(name, cls=Later, help=row.help, epilog=epilog, hidden=row.is_hidden)
+    @app.command(name, cls=Later, help=row.help, epilog=epilog, hidden=row.is_hidden, rich_help_panel=group)
     def command() -> Any:
         return getattr(import_module(f"levilab.cli.{module}"), made)
 
 
-for _name, _row in COMMANDS.items():
-    _add(_name, _row)
+for _group, _rows in COMMANDS.items():
+    for _name, _row in _rows.items():
+        _add(_name, _row, _group)
 
 
 def main() -> None:
