@@ -10,52 +10,50 @@ from levilab.errors import unquote
 from levilab.pipelines.analyzed import A
 from levilab.pipelines.budget import budgets_of_result
 from levilab.pipelines.field.document import DOCUMENT as FIELD
-from levilab.pipelines.field.quantities import FIELD_ROW
-from levilab.pipelines.field.quantities import QUANTITIES as FIELD_QUANTITIES
-from levilab.pipelines.field.report import field_part
-from levilab.pipelines.field.table import field_columns, field_curve, field_curve_u, field_tables
+from levilab.pipelines.field.report import field_columns, field_curve, field_curve_u, field_part, field_tables
+from levilab.pipelines.field.words import FIELD_ROW
+from levilab.pipelines.field.words import QUANTITIES as FIELD_QUANTITIES
+from levilab.pipelines.hold.analysis import HOLD_ROW
+from levilab.pipelines.hold.analysis import QUANTITIES as HOLD_QUANTITIES
 from levilab.pipelines.hold.document import DOCUMENT as HOLD
-from levilab.pipelines.hold.quantities import HOLD_ROW
-from levilab.pipelines.hold.quantities import QUANTITIES as HOLD_QUANTITIES
-from levilab.pipelines.hold.report import hold_part
-from levilab.pipelines.hold.table import hold_columns, hold_tables
+from levilab.pipelines.hold.report import hold_columns, hold_part, hold_tables
+from levilab.pipelines.limit.analysis import LIMIT_ROW
+from levilab.pipelines.limit.analysis import QUANTITIES as LIMIT_QUANTITIES
 from levilab.pipelines.limit.document import DOCUMENT as LIMIT
-from levilab.pipelines.limit.quantities import LIMIT_ROW
-from levilab.pipelines.limit.quantities import QUANTITIES as LIMIT_QUANTITIES
-from levilab.pipelines.limit.report import limit_part
-from levilab.pipelines.limit.table import limit_columns, limit_tables
+from levilab.pipelines.limit.report import limit_columns, limit_part, limit_tables
 from levilab.pipelines.precession.document import DOCUMENT as PRECESSION
-from levilab.pipelines.precession.quantities import PRECESSION_ROW
-from levilab.pipelines.precession.quantities import QUANTITIES as PRECESSION_QUANTITIES
-from levilab.pipelines.precession.report import precession_part
-from levilab.pipelines.precession.table import (
+from levilab.pipelines.precession.report import (
     precession_columns,
     precession_curve,
     precession_curve_u,
+    precession_part,
     precession_tables,
 )
+from levilab.pipelines.precession.words import PRECESSION_ROW
+from levilab.pipelines.precession.words import QUANTITIES as PRECESSION_QUANTITIES
 from levilab.pipelines.result import Place
 from levilab.pipelines.row import symbols_of
+from levilab.pipelines.spin.analysis import QUANTITIES as SPIN_QUANTITIES
+from levilab.pipelines.spin.analysis import SPIN_ROW
 from levilab.pipelines.spin.document import DOCUMENT as SPIN
-from levilab.pipelines.spin.quantities import QUANTITIES as SPIN_QUANTITIES
-from levilab.pipelines.spin.quantities import SPIN_ROW
-from levilab.pipelines.spin.report import spin_part
-from levilab.pipelines.spin.table import spin_columns, spin_tables
+from levilab.pipelines.spin.report import spin_columns, spin_part, spin_tables
 from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
-from levilab.pipelines.spindown.laws import SYMBOLS
-from levilab.pipelines.spindown.quantities import SPINDOWN_ROW
-from levilab.pipelines.spindown.report import spindown_part
-from levilab.pipelines.spindown.table import spindown_columns, spindown_curve, spindown_curve_u, spindown_tables
+from levilab.pipelines.spindown.report import (
+    spindown_columns,
+    spindown_curve,
+    spindown_curve_u,
+    spindown_part,
+    spindown_tables,
+)
+from levilab.pipelines.spindown.words import SPINDOWN_ROW, SYMBOLS
+from levilab.pipelines.sway.analysis import QUANTITIES as SWAY_QUANTITIES
+from levilab.pipelines.sway.analysis import SWAY_ROW
 from levilab.pipelines.sway.document import DOCUMENT as SWAY
-from levilab.pipelines.sway.quantities import QUANTITIES as SWAY_QUANTITIES
-from levilab.pipelines.sway.quantities import SWAY_ROW
-from levilab.pipelines.sway.report import sway_part
-from levilab.pipelines.sway.table import sway_columns, sway_tables
+from levilab.pipelines.sway.report import sway_columns, sway_part, sway_tables
+from levilab.pipelines.video.analysis import QUANTITIES as VIDEO_QUANTITIES
+from levilab.pipelines.video.analysis import VIDEO_ROW
 from levilab.pipelines.video.document import DOCUMENT as VIDEO
-from levilab.pipelines.video.quantities import QUANTITIES as VIDEO_QUANTITIES
-from levilab.pipelines.video.quantities import VIDEO_ROW
-from levilab.pipelines.video.report import video_part
-from levilab.pipelines.video.table import video_columns, video_files, video_tables
+from levilab.pipelines.video.report import video_columns, video_files, video_part, video_tables
 from levilab.present.clock import moment
 from levilab.present.numbers import short_name
 

@@ -1,17 +1,140 @@
-"""Scans of a field ↔ result.json."""
+"""Scans of a field → uncertainty budgets and result.json."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
+import numpy as np
+
+from analysis.budget import Budget, Component
+from analysis.field.fit import UNITS, parts_of
+from levilab.pipelines.budget import setting_of
 from levilab.pipelines.document import Document, result_model, statistics_of, value_of, values_of
 from levilab.pipelines.field.analysis import METHOD, FieldAnalysis, FieldRun, Mean
-from levilab.pipelines.field.budget import budget_of_all, budget_of_run
 from levilab.pipelines.field.words import remark
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from analysis.field.fit import FieldScan, UPart
     from analysis.uncertainty import Estimate
+    from levilab.pipelines.field.readings import FieldReadings
+    from levilab.pipelines.options import FieldOptions
+    from levilab.pipelines.sources import Source
+
+
+EXPERIMENT = "field"
+#: The parameters that have a budget.
+SHOWN = ("strength", "origin", "thickness", "background")
+#: Name of a part → what it is, and what would make it smaller.
+_WORDS = {
+    "readings": ("readings of the probe", "more readings at each height"),
+    "heights": ("setting of the heights", "a stand that sets heights better, or more heights"),
+    "excess": ("scatter beyond the stated u", "the probe on the axis, and the radii measured again"),
+    "gain": ("calibration of the probe: its scale", "a calibrated probe, or a reference magnet"),
+    "origin": ("height of the base on the scale", "the zero of the heights measured again"),
+    "thickness": ("thickness by the calliper", "a better calliper"),
+    "background": ("zero of the probe and the earth's field", "the probe zeroed in its chamber, and the base away"),
+    "inner_radius": ("inner radius by the calliper", "a better calliper"),
+    "outer_radius": ("outer radius by the calliper", "a better calliper"),
+}  # fmt: skip
+#: Those that were seen to scatter.
+_TYPE_A = frozenset({"readings", "excess"})
+
+
+def budget_of_run(source: Source[FieldReadings], run: FieldRun, _: FieldOptions) -> tuple[Budget, ...]:
+    """Return the budgets of the parameters of one scan."""
+    scan, readings = run.scan, source.readings
+    u_z = np.zeros(len(readings)) if readings.height_u is None else readings.height_u
+    parts = parts_of(scan, u_z[np.argsort(readings.height, kind="stable")])
+    return tuple(
+        Budget(
+            name, found.value, found.u, found.unit,
+            (*(_row(source, scan, found.unit, part) for part in parts[name]), *_not_in_u(scan, name)),
+        )
+        for name in SHOWN
+        if name in parts and (found := scan.parameters[name]).value is not None and found.u
+    )  # fmt: skip
+
+
+def _row(source: Source[FieldReadings], scan: FieldScan, unit: str, part: UPart) -> Component:
+    """Return a part as a row: by the input's own u where it has one."""
+    what, remedy = _WORDS[part.name]
+    kind: Literal["A", "B"] = "A" if part.name in _TYPE_A else "B"
+    u, unit_u, note = _input(source, scan, part)
+    if u is None:
+        return Component(part.name, what, kind, abs(part.size), unit, 1.0, note=note, remedy=remedy)
+    return Component(part.name, what, kind, u, unit_u, part.size / u, note=note, remedy=remedy)
+
+
+def _input(source: Source[FieldReadings], scan: FieldScan, part: UPart) -> tuple[float | None, str, str]:
+    """Return an input's standard uncertainty, its unit and its origin; None where that says too little."""
+    if part.name == "gain":
+        return scan.known.gain_u, "1", "relative, common to all readings"
+    prior = scan.known.prior(part.name)
+    if prior is not None:
+        return prior.u, UNITS[part.name], "before the scan, common to all readings"
+    readings = source.readings
+    if part.name == "heights" and readings.height_u is not None:
+        return (
+            float(np.sqrt(np.mean(readings.height_u**2))),
+            "m",
+            "each height by itself, by the slope of the field there",
+        )
+    if part.name == "readings":
+        if readings.u is None:
+            return None, "", "their scatter about the fit"
+        number = setting_of(source, EXPERIMENT, "readings")
+        text = f"mean of {number:g} readings; the last digit is in it" if number else "each reading by itself"
+        return float(np.sqrt(np.mean(readings.u**2))), "T", text
+    return None, "", ""
+
+
+def _not_in_u(scan: FieldScan, name: str) -> tuple[Component, ...]:
+    if name != "strength":
+        return ()
+    strength = scan.parameters["strength"].value or 0.0
+    note = "the scan is of that temperature; ferrite loses 0.2 % a kelvin"
+    return (
+        Component("temperature", "temperature of the base", "B", None, "K", 2e-3 * abs(strength), included=False,
+                  note=note, remedy="a thermometer at the base"),
+    )  # fmt: skip
+
+
+# --- several scans -------------------------------------------------------------------------------------
+
+
+def budget_of_all(analysis: FieldAnalysis) -> tuple[Budget, ...]:
+    """Return the budgets of the means over several scans: what is common to them is no smaller than in one."""
+    of_runs = [{budget.quantity: budget for budget in origin.budget or ()} for origin in analysis.origins]
+    return tuple(
+        _of_mean(analysis, name, [one[name] for one in of_runs])
+        for name in SHOWN
+        if all(name in one for one in of_runs)
+    )
+
+
+def _of_mean(analysis: FieldAnalysis, name: str, budgets: Sequence[Budget]) -> Budget:
+    """Return u of a mean: that of one scan, in the square mean, or s/√N where the scans scatter more."""
+    mean, n = analysis.values[name], len(budgets)
+    u = mean.u or 0.0
+    own = math.sqrt(sum(one.u**2 for one in budgets) / n)
+    if u > own * (1 + 1e-9):
+        remedy = f"more scans: it takes {4 * n} instead of {n} to halve it"
+        scatter = Component("runs", "scatter between the scans", "A", u * math.sqrt(n), mean.unit, 1 / math.sqrt(n),
+                            note=f"standard deviation of one scan from another, {n} scans", remedy=remedy)  # fmt: skip
+        return Budget(name, mean.value or 0.0, u, mean.unit, (scatter,))
+    rows = []
+    for part in dict.fromkeys(row.name for one in budgets for row in one.included):
+        found = [row for one in budgets for row in one.included if row.name == part]
+        size = math.sqrt(sum((row.contribution or 0.0) ** 2 for row in found) / n)
+        first = found[0]
+        same = len({row.u for row in found}) == 1 and first.u
+        size_u, unit, by = (first.u, first.unit, size / first.u) if same and first.u else (size, mean.unit, 1.0)
+        rows.append(Component(part, first.source, first.kind, size_u, unit, by, note=first.note, remedy=first.remedy))
+    return Budget(name, mean.value or 0.0, u, mean.unit, (*rows, *budgets[0].left_out))
 
 
 def _entries(analysis: FieldAnalysis) -> dict[str, Any]:

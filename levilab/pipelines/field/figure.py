@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from analysis.field.floating import floating_spins, floating_top
 from analysis.field.magnet import axial_field
-from levilab.pipelines.field.quantities import QUANTITIES
+from levilab.pipelines.field.words import QUANTITIES
 from levilab.present.drawing import SMALL, band, headline, panel, sigma_bands, synthetic_mark
 from levilab.present.looks import BLUE, GREY, LOOKS, PURPLE, SKY, VERMILION
 from levilab.present.numbers import short_name, with_uncertainty

@@ -13,9 +13,10 @@ from analysis.uncertainty import Estimate  # noqa: TC001 - pydantic reads it
 from levilab.pipelines.analyzed import Analyzed, Method
 from levilab.pipelines.hold.readings import HoldReadings, read_hold_file, read_hold_run
 from levilab.pipelines.options import HoldOptions, SpinDownOptions
+from levilab.pipelines.row import Quantity, columns_of
 from levilab.pipelines.sources import Needs
 from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
-from levilab.pipelines.spindown.laws import SYMBOLS
+from levilab.pipelines.spindown.words import SYMBOLS
 from levilab.present.numbers import list_in_words, plain, with_uncertainty
 from levilab.runs.run import read_record
 
@@ -25,6 +26,19 @@ if TYPE_CHECKING:
 
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
+
+
+#: Of `analysis.held.Hold`.
+QUANTITIES = (
+    Quantity("spin_frequency", "Hz", "the held spin, mean of the readings", "ν", of="spin"),
+    Quantity("scatter", "Hz", "standard deviation of the readings of the held spin", "s.d. of ν"),
+    Quantity("share", "1", "share of the full amplitude that held the spin", "s", has_u=False),
+    Quantity("gain", "Hz/s", "rate at which the full amplitude raises the spin there", "g", optional=True),
+    Quantity("drag", "Hz/s", "drag at this spin, from the amplitude that balanced it", "d", optional=True),
+)
+
+HOLD_ROW = tuple(columns_of(QUANTITIES))
+
 
 HOLD = "hold"
 NEEDS = Needs(analysis=HOLD, experiments=frozenset({HOLD}), read_file=read_hold_file, read_run=read_hold_run)

@@ -1,24 +1,103 @@
-"""Limits ↔ result.json."""
+"""Limits → uncertainty budgets and result.json."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
+from analysis.budget import Budget, Component, printed_step, rest, u_of_step
+from analysis.numbers import digits
+from levilab.pipelines.budget import time_base
 from levilab.pipelines.document import Document, result_model, values_of
 from levilab.pipelines.dump import Dump
-from levilab.pipelines.limit.analysis import METHOD, LimitAnalysis, Limits
-from levilab.pipelines.limit.budget import budget_of_all, budget_of_run
-from levilab.pipelines.limit.quantities import QUANTITIES
+from levilab.pipelines.limit.analysis import METHOD, QUANTITIES, LimitAnalysis, Limits
 from levilab.pipelines.result import Result
 from levilab.pipelines.row import find_all
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from analysis.limits import Statistics
+    from levilab.pipelines.limit.readings import LimitReadings
+    from levilab.pipelines.options import LimitOptions
+    from levilab.pipelines.sources import Source
+
+
+#: Four times as many tops halve what scatters from one to the next.
+_TO_HALVE = 4
+
+
+def budget_of_run(source: Source[LimitReadings], run: Limits, options: LimitOptions) -> tuple[Budget, ...]:
+    """Return the budget of the mean of one run."""
+    return _budgets([source], run, options)
+
+
+def budget_of_all(analysis: LimitAnalysis) -> tuple[Budget, ...]:
+    """Return the budgets of the means of all conditions."""
+    return tuple(
+        replace(budget, group=k)
+        for k, (sources, group) in enumerate(zip(analysis.averaged, analysis.groups, strict=True))
+        for budget in _budgets(sources, group, analysis.options)
+    )
+
+
+def _budgets(sources: Sequence[Source[LimitReadings]], limits: Limits, options: LimitOptions) -> tuple[Budget, ...]:
+    mean = limits.statistics.mean
+    if mean.value is None or not mean.u:
+        return ()
+    # an upper limit lies between what was counted and what the generator was set to
+    clocks = "time bases of counter and generator" if limits.which == "upper" else ""
+    rows = (*_rows(sources, limits), time_base(sources[0], "counter", mean.value, options.clock_u, what=clocks))
+    return (Budget("mean", mean.value, mean.u, mean.unit, rows, limits.which),)
+
+
+def _rows(sources: Sequence[Source[LimitReadings]], limits: Limits) -> Iterator[Component]:
+    found = limits.statistics
+    whole = found.mean.u or 0.0
+    if found.scatter is None:
+        yield Component("reading", "the limit by itself", "B", whole, "Hz", 1.0,
+                        note="of a single top: its scatter is not known", remedy="more tops")  # fmt: skip
+        return
+    step = min(found.step, whole)
+    common = found.common
+    by_tops = rest(whole, math.hypot(step, common))
+    if by_tops > 0:
+        root = math.sqrt(found.n)
+        each = by_tops * root
+        printed = printed_step([float(limit) for source in sources for limit in source.readings.limit]) or 0.0
+        rounding = u_of_step(printed)
+        if 0 < rounding < each and not step:
+            yield Component("resolution", "last digit of the limits", "B", rounding, "Hz", 1 / root,
+                            note=f"steps of {printed:g} Hz; a part of the scatter", remedy="more digits")  # fmt: skip
+            each = rest(each, rounding)
+        yield Component("scatter", "scatter from top to top", "A", each, "Hz", 1 / root,
+                        note=_about_scatter(limits), remedy=_more(limits))  # fmt: skip
+    if step > 0:
+        note = "the drive goes on in steps, the same for all tops, and each limit lies somewhere within one"
+        yield Component("step", "steps of the drive", "B", step, "Hz", 1.0, note=note,
+                        remedy="smaller steps (limit.creep_hz_per_s, limit.interval_s)")  # fmt: skip
+    if common > 0:
+        note = "the tops were still getting faster; the rest of the way is estimated, for all in the same way"
+        yield Component("way", "rest of the way", "B", common, "Hz", 1.0, note=note)
+
+
+def _more(limits: Limits) -> str:
+    found = limits.statistics
+    if found.between and found.between.value:
+        return f"more runs: the {found.runs} differ by more than their tops"
+    return f"more tops: it takes {_TO_HALVE * found.n} instead of {found.n} to halve it"
+
+
+def _about_scatter(limits: Limits) -> str:
+    found = limits.statistics
+    scatter = (found.scatter.value or 0.0) if found.scatter else 0.0
+    text = f"standard deviation of one top from another {digits(scatter)} Hz, of {found.n} tops"
+    if found.between and found.between.value:
+        text += f"; {found.runs} runs differ by {digits(found.between.value)} Hz beyond that, which is in it"
+    return f"{text}; what the counter and the moment of the fall leave to each limit is part of it"
 
 
 class LimitResult(Result):

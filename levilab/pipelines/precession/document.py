@@ -1,22 +1,164 @@
-"""Sweeps ↔ result.json."""
+"""Sweeps → uncertainty budgets and result.json."""
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from analysis.budget import Budget, Component, printed_step, rest, u_of_step
+from analysis.numbers import digits
 from analysis.precession.sweep import SweepFit
+from levilab.pipelines.budget import gate_of, setting_of, time_base
 from levilab.pipelines.document import Document, number, result_model, values_of
 from levilab.pipelines.precession.analysis import METHOD, PrecessionAnalysis, PrecessionRun
-from levilab.pipelines.precession.budget import budget_of_all, budget_of_run
-from levilab.pipelines.precession.quantities import QUANTITIES
-from levilab.pipelines.precession.words import intercept_of, slope_of, verdict
+from levilab.pipelines.precession.words import QUANTITIES, intercept_of, slope_of, verdict
 from levilab.pipelines.row import find_all
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator
+
     from analysis.precession.line import Line
+    from levilab.pipelines.options import PrecessionOptions
+    from levilab.pipelines.precession.readings import SweepReadings
+    from levilab.pipelines.sources import Source
+
+    Array = np.ndarray[tuple[int], np.dtype[np.float64]]
+
+
+EXPERIMENT = "precession"
+#: Relative uncertainties of the drive's frequency that differ by less than this are those of one clock.
+_ONE_CLOCK = 1e-3
+#: Four times as many points of the same range halve u.
+_TO_HALVE = 4
+
+
+def budget_of_run(source: Source[SweepReadings], run: PrecessionRun, options: PrecessionOptions) -> tuple[Budget, ...]:
+    """Return the budgets of slope and intercept of one sweep."""
+    return _budgets(source, run.fit, options)
+
+
+def budget_of_all(analysis: PrecessionAnalysis) -> tuple[Budget, ...]:
+    """Return the budgets of the line through the points of all sweeps."""
+    return _budgets(analysis.sources[0], analysis.combined, analysis.options)
+
+
+def _budgets(source: Source[SweepReadings], fit: SweepFit, options: PrecessionOptions) -> tuple[Budget, ...]:
+    line = fit.line
+    if not line.u_slope or not line.u_intercept or not line.u_height:
+        return ()
+    used = np.array([point.used for point in fit.points])
+    x = fit.column("drive")[used]
+    u, u_drive = (fit.column(name)[used] for name in ("u", "u_drive"))
+    along_y = np.ones_like(x) if not np.isfinite(u).all() else u
+    along_x = np.zeros_like(x)
+    if line.orthogonal:
+        along_x = along_y if not np.isfinite(u_drive).all() or not np.isfinite(u).all() else u_drive
+    weight = 1 / (along_y**2 + (line.slope * along_x) ** 2)
+    off = x - line.centre
+    by_slope = weight * off * (line.u_slope / line.scale) ** 2  # change of the slope with each point
+    by_intercept = weight * (line.u_height / line.scale) ** 2 - line.centre * by_slope
+    made = (
+        ("slope", line.slope, line.u_slope, "1", by_slope),
+        ("intercept", line.intercept, line.u_intercept, "Hz", by_intercept),
+    )
+    return tuple(
+        Budget(
+            name, value, u_value, unit,
+            (
+                *_of_points(source, fit, options, u_value, (by, along_y, line.slope * along_x)),
+                *_of_clocks(source, fit, options, name),
+            ),
+        )
+        for name, value, u_value, unit, by in made
+    )  # fmt: skip
+
+
+def _of_points(
+    source: Source[SweepReadings],
+    fit: SweepFit,
+    options: PrecessionOptions,
+    whole: float,
+    influence: tuple[Array, Array, Array],
+) -> Iterator[Component]:
+    """Yield what the points scatter.
+
+    Args:
+        source: the sweep.
+        fit: its line.
+        options: of the analysis.
+        whole: u of the result.
+        influence: change of the result with each point, and u of each along both axes, shape (n,) each [Hz].
+    """
+    by, along_y, along_x = influence
+    line = fit.line
+    stated = all(point.u is not None for point in fit.points if point.used)
+    own_scale = min(line.scale, 1.0) if stated else line.scale
+    # an orthogonal fit moves its points along x, too: the squares are shared out as the variances of the points are
+    share = float(np.sum((by * along_x) ** 2) / np.sum(by**2 * (along_x**2 + along_y**2)))
+    scatter = whole * own_scale / line.scale
+    of_counts, of_drive = scatter * (1 - share) ** 0.5, scatter * share**0.5
+    each = own_scale * float(np.sqrt(np.mean(along_y**2)))
+    counts = source.readings.precession
+    step = printed_step(counts.tolist()) or 0.0
+    rounding, is_part = u_of_step(step), u_of_step(step) < each
+    sensitivity = of_counts / each
+    if rounding > 0:
+        note = f"steps of {step:g} Hz, {'a part of what a point scatters' if is_part else 'more than the u of a point'}"
+        yield Component("resolution", "last digit of the counts", "B", rounding, "Hz", sensitivity,
+                        included=is_part, note=note, remedy="more digits")  # fmt: skip
+    what, kind, note = _what_points(options, stated=stated)
+    own = rest(each, rounding) if is_part else each
+    yield Component("scatter", what, kind, own, "Hz", sensitivity, note=note, remedy=_better(source, fit))
+    if of_drive > 0:
+        yield Component("drive", "frequency of the drive, point by point", "B", of_drive, _unit(fit, whole), 1.0,
+                        note="its u counts along the other axis", remedy="a generator of a better clock")  # fmt: skip
+    excess = rest(whole, scatter)
+    if stated and line.scale > 1:
+        note = f"the points scatter {digits(line.scale)} times as much as their u says"
+        yield Component("excess", "scatter beyond the u of the points", "A", excess, _unit(fit, whole), 1.0,
+                        note=note, remedy="finding what moves the points, such as miscounts")  # fmt: skip
+
+
+def _unit(fit: SweepFit, whole: float) -> str:
+    return "1" if whole == fit.line.u_slope else "Hz"
+
+
+def _what_points(options: PrecessionOptions, *, stated: bool) -> tuple[str, Literal["A", "B"], str]:
+    """Return what the scatter is called, its type, and where its size comes from."""
+    if not stated:
+        return "scatter of the points", "A", "standard deviation about the line"
+    if options.reading_u:
+        return "points, by their stated u", "B", "as given to the analysis"
+    return "points, by their own u", "A", "of a run: what its gates leave beside the swing of the locked top"
+
+
+def _better(source: Source[SweepReadings], fit: SweepFit) -> str:
+    counts, gate = setting_of(source, EXPERIMENT, "counts"), gate_of(source, EXPERIMENT)
+    n = fit.line.n
+    text = f"a wider range of drive frequencies (u falls with it), or {_TO_HALVE * n} points instead of {n} to halve it"
+    if counts and gate:
+        text += f"; or longer or more gates a point ({counts:g} of {gate:g} s now)"
+    return text
+
+
+def _of_clocks(
+    source: Source[SweepReadings], fit: SweepFit, options: PrecessionOptions, name: str
+) -> Iterator[Component]:
+    """Yield the clocks of counter and generator: their ratio is a factor of the slope, and common to all points."""
+    line = fit.line
+    value = line.slope if name == "slope" else line.intercept
+    used = [point for point in fit.points if point.used]
+    ratios = np.array([point.u_drive / point.drive for point in used if point.u_drive])
+    known = float(np.median(ratios)) if len(ratios) == len(used) else None
+    one_clock = known is not None and float(np.ptp(ratios)) <= _ONE_CLOCK * known
+    if options.clock_u is None and one_clock and not line.orthogonal and name == "slope":
+        note = "the generator's clock by the counter's, from the column of the drive's u; one factor for all points"
+        yield Component("clocks", "clocks of counter and generator", "B", known, "1", value,
+                        included=False, note=note, remedy="one reference for both")  # fmt: skip
+    elif not line.orthogonal or name == "intercept":
+        yield time_base(source, "counter", value, options.clock_u)
 
 
 def _entries(analysis: PrecessionAnalysis) -> dict[str, Any]:

@@ -1,24 +1,248 @@
-"""Spin frequencies → their part of a report."""
+"""Spin frequencies → tables, the meaning of the numbers, and their part of a report."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+
+import numpy as np
 
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
-from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts
-from levilab.pipelines.spin.analysis import MOST_DRAWN, in_a_sentence
-from levilab.pipelines.spin.meaning import meaning
-from levilab.pipelines.spin.table import frequency_table, quality_tables, series_table
+from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, title_of
+from levilab.pipelines.row import cells_of
+from levilab.pipelines.spin.analysis import MOST_DRAWN, OF_A_RUN, in_a_sentence
+from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
-from levilab.present.numbers import enumeration, with_uncertainty
+from levilab.present.numbers import column, enumeration, plain, short_name, with_decimals, with_uncertainty
+from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spin.analysis import SpinAnalysis, SpinRun
     from levilab.pipelines.spin.readings import Records
     from levilab.present.document.blocks import Block
+
+
+#: A slope, or a scatter of records, is seen beyond this multiple of u.
+_SEEN = 3.0
+#: What air takes of the spin of a free top at 20 to 45 Hz, a second: 0.3 %, and twice or half of it for other tops.
+_AIR = (1.5e-3, 6e-3)
+#: An uncertainty within this factor of the bound can hardly be made better by another method.
+_AT_BOUND = 1.5
+#: Inputs that sentences are made of; of more there is a table.
+_MOST = 4
+
+
+def meaning(analysis: SpinAnalysis) -> tuple[str, ...]:
+    """Return the sentences, of each input."""
+    several = len(analysis.runs) > 1
+    made = (
+        (source.name, " ".join(_sentences(run)))
+        for source, run in zip(analysis.sources[:_MOST], analysis.runs[:_MOST], strict=True)
+    )
+    return tuple(f"{name}: {text}" if several else text for name, text in made if text)
+
+
+@dataclass(frozen=True)
+class _Change:
+    """How the spin changes.
+
+    Attributes:
+        slope: [Hz/s]; u: its standard uncertainty [Hz/s].
+        lasts_s: how long it was watched [s].
+    """
+
+    slope: float
+    u: float
+    lasts_s: float
+
+
+def _change(run: SpinRun) -> _Change | None:
+    """Return the slope through all records, or of the one; None where it is not known."""
+    spin, trend = run.spin, run.trend
+    if trend and trend.value is not None and trend.u is not None:
+        return _Change(trend.value, trend.u, float(np.ptp(run.series.time)))
+    if spin.chirp.value is None or not spin.chirp.u or not spin.frequency.value:
+        return None
+    turns = spin.pulses + spin.missing - spin.doubled
+    return _Change(spin.chirp.value, spin.chirp.u, turns / spin.frequency.value)
+
+
+def _sentences(run: SpinRun) -> Iterator[str]:
+    spin = run.spin
+    frequency = spin.frequency
+    if not frequency.value:
+        return
+    at = f" at {spin.reference_time:.3g} s" if len(run.series) > 1 else ""
+    yield f"The top turns with {with_uncertainty(frequency)}{at}, {60 * frequency.value:.0f} times a minute."
+    if run.swing and run.swing[1] > _SEEN:
+        far, units = run.swing
+        yield (
+            f"That is one {run.series.of} of {len(run.series)}: they scatter about a line by {digits(far)} Hz, "
+            f"{digits(units)} times their uncertainties, so the spin itself swings, as that of a driven top does."
+        )
+    yield from _about_line(run)
+    if (change := _change(run)) is None:
+        return
+    yield from _about_change(change, frequency.value)
+    if spin.bound and "frequency" in run.parts:
+        ratio = run.parts["frequency"].pulses / spin.bound
+        if ratio < _AT_BOUND:
+            yield "With such noise no other method would find it much better."
+        elif not run.line:
+            yield (
+                f"The uncertainty is {digits(ratio)} times the least that any method could reach with such noise: the "
+                "pulses themselves scatter, or the samples lie far apart."
+            )
+
+
+def _about_line(run: SpinRun) -> Iterator[str]:
+    """Yield the sense of rotation, and the part of the moment that turns."""
+    if run.line and run.line.sense:
+        # beside the top a dipole's field turns against the dipole
+        way = "clockwise" if run.line.sense > 0 else "counterclockwise"
+        yield f"Seen from above it turns {way}, if the phone lay beside it with its screen up."
+    if run.transverse and run.transverse.value:
+        text = f"The part of its moment that turns is {with_uncertainty(run.transverse)}"
+        yield f"{text}: the moment leans by {with_uncertainty(run.tilt)} from the axis." if run.tilt else f"{text}."
+
+
+def _about_change(change: _Change, frequency: float) -> Iterator[str]:
+    """Yield what the change of a spin [Hz] means."""
+    share = change.slope / frequency
+    lost = with_uncertainty(Estimate(100 * abs(share), 100 * change.u / frequency, "%"))
+    if abs(change.slope) < _SEEN * change.u:
+        most = (abs(change.slope) + 2 * change.u) / frequency
+        yield (
+            f"In {digits(change.lasts_s)} s no change of its spin shows beyond the uncertainty: it loses or gains less "
+            f"than {digits(100 * most)} % a second."
+        )
+        yield (
+            "A free top loses some 0.3 % a second to the air: a longer record shows that, or one more a while later."
+            if most > _AIR[0]
+            else "That is less than air takes from a free top: does a drive hold it?"
+        )
+    elif share > 0:
+        yield f"It gains {lost} of its spin a second: something drives it."
+    elif _AIR[0] < -share < _AIR[1]:
+        yield f"It loses {lost} of its spin a second, as a free top does in air."
+    else:
+        why = "more than air takes: does it touch something, or does a drive brake it?" if -share > _AIR[1] else (
+            "less than air takes from a free top: does a drive hold it?"
+        )  # fmt: skip
+        yield f"It loses {lost} of its spin a second, {why}"
+
+
+#: Values of a series that are printed; result.json has all.
+MOST_IN_TERMINAL = 12
+
+
+def spin_tables(analysis: SpinAnalysis) -> tuple[Table, ...]:
+    """Return frequency, slope and time of each input; the quality of its pulses; of one input its series."""
+    tables = [frequency_table(analysis), *quality_tables(analysis).values()]
+    if len(analysis.runs) == 1 and len(analysis.runs[0].series) > 1:
+        tables.append(series_table(analysis.sources[0], analysis.runs[0], MOST_IN_TERMINAL))
+    return tuple(tables)
+
+
+def frequency_table(analysis: SpinAnalysis) -> Table:
+    """Return the result."""
+    spins, slopes = (column(getattr(run.spin, name) for run in analysis.runs) for name in ("frequency", "chirp"))
+    several = any(run.which for run in analysis.runs)
+    rows = [
+        (
+            short_name(source.name),
+            spin,
+            slope,
+            *([run.which or "all"] * several),
+            with_decimals(run.spin.reference_time, 4),
+            run.spin.method,
+            plain(None if run.spin.bound is None else 1e3 * run.spin.bound, 2),
+        )
+        for source, run, spin, slope in zip(analysis.sources, analysis.runs, spins, slopes, strict=True)
+    ]
+    heads = ("input", "spin [Hz]", "slope [Hz/s]", *(["of"] * several), "at [s]", "method", "bound\n[mHz]")
+    return table(title_of("Spin frequency", analysis.sources, "input"), heads, rows, numbers=["at [s]", heads[-1]])
+
+
+def quality_tables(analysis: SpinAnalysis) -> dict[str, Table]:
+    """Return the tables of the quality of the pulses, and of the lines of magnetometers, by their names."""
+    made = {"spin-pulses": pulse_table} if any(not run.line for run in analysis.runs) else {}
+    made |= {"spin-line": line_table} if any(run.line for run in analysis.runs) else {}
+    return {name: make(analysis) for name, make in made.items()}
+
+
+def line_table(analysis: SpinAnalysis) -> Table:
+    """Return a table of the lines of magnetometers: amplitude and noise of each axis, and the moment that turns."""
+    of_lines = [(source, run) for source, run in zip(analysis.sources, analysis.runs, strict=True) if run.line]
+    several = any(run.which for _, run in of_lines)
+    quantities = [one for one in OF_A_RUN if any(one.find(run) for _, run in of_lines)]
+    cells = zip(*cells_of(quantities, [run for _, run in of_lines]), strict=True)
+    rows = [
+        (
+            short_name(source.name),
+            source.readings.kind,
+            *row,
+            " ".join(plain(1e6 * noise, 2) for noise in run.line.noise),
+            plain(run.line.snr_db),
+        )
+        for (source, run), row in zip(of_lines, cells, strict=True)
+        if run.line
+    ]
+    title = "The line" + (", of several windows that of the one above" if several else "")
+    heads = ("input", "what it is", *(one.head for one in quantities), "noise [µT]", "S/N\n[dB]")
+    return table(title, heads, rows, numbers=heads[2:])
+
+
+def pulse_table(analysis: SpinAnalysis) -> Table:
+    """Return a table of the quality of the pulses."""
+    several = any(run.which for run in analysis.runs)
+    rows = [
+        (
+            short_name(source.name),
+            source.readings.kind,
+            str(run.spin.pulses),
+            str(run.spin.missing),
+            str(run.spin.doubled),
+            plain(1e6 * run.spin.scatter),
+            plain(run.spin.snr_db),
+        )
+        for source, run in zip(analysis.sources, analysis.runs, strict=True)
+        if not run.line
+    ]
+    numbers = ("pulses", "missing", "doubled", "scatter\n[µs]", "S/N\n[dB]")
+    title = "The pulses" + (", of several records or windows those of the one above" if several else "")
+    return table(title, ("input", "what it is", *numbers), rows, numbers=numbers)
+
+
+def series_table(source: Source[Records], run: SpinRun, most: int) -> Table:
+    """Return frequency against time, thinned out evenly."""
+    series = run.series
+    step = max(-(-len(series) // most), 1)
+    heads, clocks = with_clock(source.time_zero, series.time.tolist(), ("time [s]", "spin [Hz]", "u [mHz]"))
+    rows = [
+        (*clocks[k], with_decimals(series.time[k], 2), f"{series.frequency[k]:.4f}", plain(1e3 * float(series.u[k]), 2))
+        for k in range(0, len(series), step)
+    ]
+    which = "each" if step == 1 else f"every {step}th"
+    return table(f"Frequency against time, {which} of {len(series)} {series.of}s", heads, rows, numbers=heads)
+
+
+# --- readings as columns of tables for programs ---
+
+
+def spin_columns(analysis: SpinAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield the series of each input: a row for each window of a long record, or for each of several records."""
+    for run in analysis.runs:
+        yield {
+            "time_s": run.series.time,
+            "spin_frequency_hz": run.series.frequency,
+            "spin_frequency_u_hz": run.series.u,
+        }
+
 
 #: Values of a series printed in the page; more stay in result.json.
 MOST_VALUES = 40

@@ -15,9 +15,8 @@ from matplotlib.lines import Line2D
 
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
-from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
-from levilab.pipelines.spindown.table import is_best, laws_of, tilt_part
-from levilab.pipelines.spindown.words import finding
+from levilab.pipelines.spindown.report import is_best, laws_of, tilt_part
+from levilab.pipelines.spindown.words import STRAIGHT_LINES, SYMBOLS, finding
 from levilab.present.drawing import (
     SMALL,
     band,

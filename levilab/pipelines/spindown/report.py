@@ -1,12 +1,18 @@
-"""Spin-downs → their part of a report."""
+"""Spin-downs → tables, the meaning of the fits, and their part of a report."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from analysis.numbers import digits
+from analysis.spindown.drag import LAWS
+from analysis.spindown.tilt import PARAMETERS as WOBBLE
+from analysis.spindown.tilt import count_of
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import (
     VALUE_U,
@@ -17,35 +23,422 @@ from levilab.pipelines.part import (
     labels_of,
     origin_of_u,
     size_of_u,
+    title_of,
 )
-from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
-from levilab.pipelines.spindown.meaning import answer, meaning
-from levilab.pipelines.spindown.quantities import OF_RUN
-from levilab.pipelines.spindown.table import (
-    QUALITY_IN_WORDS,
-    count_table,
-    is_best,
-    law_constants,
-    quality_table,
-)
-from levilab.pipelines.spindown.words import verdict_of_run
+from levilab.pipelines.row import cells_of
+from levilab.pipelines.spindown.words import OF_RUN, STRAIGHT_LINES, SYMBOLS, is_seen, verdict_of_run
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Details, Listing, Note, Paragraph, Points, Tabular
-from levilab.present.numbers import column, off, reading, short_name, with_decimals, with_uncertainty
+from levilab.present.numbers import (
+    column,
+    enumeration,
+    off,
+    plain,
+    reading,
+    share,
+    short_name,
+    with_decimals,
+    with_uncertainty,
+    without_unit,
+)
 from levilab.present.tables import Row, Table, table
+from levilab.present.units import unit
 from levilab.present.units import unit as unit_row
 from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from analysis.spindown.combine import CombinedLaw, Mean
     from analysis.spindown.fit import SpinDown
+    from analysis.spindown.lawfit import LawFit
+    from analysis.spindown.selection import Statistics
     from levilab.pipelines.options import SpinDownOptions
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
     from levilab.pipelines.spindown.readings import SpinReadings
     from levilab.present.document.blocks import Block
+
+    Array = NDArray[np.float64]
+
+
+#: Laws of one power, and the power, in its order.
+_POWERS: Mapping[str, float] = MappingProxyType(
+    {law.name: n for law in sorted(LAWS.values(), key=lambda one: one.orders) if (n := law.exponent) is not None}
+)
+#: C₃/₂ of a bare disc as large as the thesis's top in laminar air, without a free parameter (PHYSICS.md §5) [SI].
+KARMAN = 2.235e-4
+#: Power of the laminar layer of air on a disc.
+_LAMINAR = 1.5
+#: A difference of so many u is one.
+_DIFFERS = 2.0
+#: Runs that scatter by so many times what their readings explain differ.
+_SCATTERS = 1.5
+
+
+def meaning(analysis: SpinDownAnalysis) -> tuple[str, ...]:
+    """Return the sentences, of all runs together."""
+    return tuple(text for part in _PARTS for text in part(analysis))
+
+
+def _law(analysis: SpinDownAnalysis) -> Iterator[str]:
+    verdict = analysis.combined.verdict
+    if not verdict.describes:
+        yield (
+            "No constant below is one of the top: something other than drag moved its spin, or the counter counted "
+            "something else."
+        )
+    elif verdict.decided:
+        yield _torque(verdict.best)
+
+
+def _torque(law: str) -> str:
+    """Return what the drag's torque depends on, as a sentence."""
+    return f"The torque of the drag is proportional to {LAWS[law].torque}."
+
+
+def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
+    """Yield how fast the top gets slower, which needs no law."""
+    combined = analysis.combined
+    if not combined.verdict.describes:
+        return
+    run = analysis.runs[0]
+    fit = run.fit(combined.best)
+    if fit.has_tilt:
+        return
+    reference, duration = fit.reference
+    spins = np.array([float(run.frequency[0]), float(run.frequency[-1])])
+    loss = LAWS[fit.name].slowing(spins / reference, fit.solution) * reference / duration
+    first, last = (
+        f"{digits(float(each))} Hz a second at {spin:.3g} Hz" for each, spin in zip(loss, spins, strict=True)
+    )
+    which = "In the first run the" if len(analysis.runs) > 1 else "The"
+    yield f"{which} top loses {first}, and {last}."
+
+
+def answer(analysis: SpinDownAnalysis) -> str:
+    """Return the constants of the best law with their u, as a sentence; empty where no law describes the readings."""
+    verdict = analysis.combined.verdict
+    known = [
+        f"{SYMBOLS[name]} = {with_uncertainty(value)}"
+        for name, value in _constants(analysis).items()
+        if value.value is not None and value.u
+    ]
+    if not verdict.describes or not known:
+        return ""
+    law = f"by the {verdict.best} law" if verdict.decided else f"if the {verdict.best} law holds"
+    return f"{enumeration(known)} {law}."
+
+
+def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
+    """Yield the constants of the best law, and the meaning of that of a law of one power."""
+    if not (named := answer(analysis)):
+        return
+    yield named
+    combined = analysis.combined
+    if combined.best not in _POWERS:
+        return
+    ((name, value),) = _constants(analysis).items()
+    if value.value is None or not value.u or value.value <= 0:
+        return
+    n = _POWERS[combined.best]
+    if n == 1:
+        yield f"The spin halves in {plain(math.log(2) / value.value)} s, whatever it is."
+    elif n == _LAMINAR:
+        off = value.value / KARMAN - 1
+        u = value.u / KARMAN
+        way = "above" if off > 0 else "below"
+        compared = f"{SYMBOLS[name]} lies {digits(100 * abs(off))} % {way}"
+        karman = "von Kármán's value for a bare disc as large as the thesis's top, 2.235×10⁻⁴"
+        if abs(off) < _DIFFERS * u:
+            yield f"{SYMBOLS[name]} agrees with {karman}."
+        elif off > 0:
+            yield f"{compared} {karman}: rim, stem and washers drag, too, if this top is as large."
+        else:
+            yield f"{compared} {karman}: this top is smaller or heavier, if nothing drives it."
+
+
+def _exponent(analysis: SpinDownAnalysis) -> Iterator[str]:
+    """Yield the distance of the exponent from those of the laws of one power."""
+    combined = analysis.combined
+    power = next((fit for fit in combined.fits if fit.name == "power"), None)
+    if power is None or not combined.verdict.describes:
+        return
+    estimates = power.constants if len(analysis.runs) > 1 else analysis.runs[0].fit("power").parameters
+    exponent: Estimate = estimates["exponent"]
+    if exponent.value is None or not exponent.u:
+        return
+    away = {name: abs(exponent.value - n) / exponent.u for name, n in _POWERS.items()}
+    near = [f"{name} ({_POWERS[name]:g})" for name, far in away.items() if far < _DIFFERS]
+    far = [f"{name} ({_POWERS[name]:g}) by {far:.0f} u" for name, far in away.items() if far >= _DIFFERS]
+    agrees = f"agrees with {enumeration(near)}" if near else "agrees with none of the laws of one power"
+    misses = f" and misses {enumeration(far)}" if far else ""
+    yield f"With a free exponent the readings choose n = {with_uncertainty(exponent)}: that {agrees}{misses}."
+
+
+def _tilt(analysis: SpinDownAnalysis) -> Iterator[str]:
+    tilt = analysis.combined.tilt
+    if tilt and tilt.value and is_seen(tilt):
+        yield (
+            f"The magnet's moment points {digits(math.degrees(tilt.value))}° off the axis of the top: it wobbles with "
+            "its spin, more and more towards the fall, and the counter counts a little more than the spin."
+        )
+
+
+def _runs(analysis: SpinDownAnalysis) -> Iterator[str]:
+    """Yield the meaning of the scatter between runs."""
+    if len(analysis.runs) == 1:
+        yield (
+            "This is one run. Another one of the same top may differ by more than this u: draught, temperature and "
+            "how the top was set spinning are not in it."
+        )
+        return
+    # the constants of a general law trade against each other: their large u would hide that the runs differ
+    verdict = analysis.combined.verdict
+    law = next((name for name in (*verdict.indistinguishable, *verdict.weak) if name in _POWERS), verdict.best)
+    for name, mean in analysis.combined.fit(law).constants.items():
+        if name == "exponent" or mean.value is None or mean.scatter is None:
+            continue
+        scatter: float = mean.scatter
+        own = [run.fit(law).parameters[name].u for run in analysis.runs]
+        known = [u for u in own if u]
+        if len(known) != len(own):
+            continue
+        ratio = scatter / math.sqrt(sum(u**2 for u in known) / len(known))
+        share = f"{digits(100 * scatter / abs(mean.value))} %"
+        if ratio > _SCATTERS:
+            yield (
+                f"From one run to the next {SYMBOLS[name]} differs by {share}, {digits(ratio)} times as much as the "
+                "readings of each explain: the runs differ, and the mean is as good as their scatter lets it be."
+            )
+        else:
+            yield f"The {len(own)} runs agree: {SYMBOLS[name]} differs by {share}, no more than their readings explain."
+
+
+def _constants(analysis: SpinDownAnalysis) -> Mapping[str, Estimate]:
+    """Return the constants of the best law: of one run its own, of several their means."""
+    combined = analysis.combined
+    if len(analysis.runs) > 1:
+        return combined.fit(combined.best).constants
+    parameters = analysis.runs[0].fit(combined.best).parameters
+    return {name: parameters[name] for name in LAWS[combined.best].constants}
+
+
+_PARTS = (_constant, _law, _loss, _exponent, _tilt, _runs)
+
+
+#: How well a law fits: heads for 80 columns, and in words.
+QUALITY = ("constants", "rms [Hz]", "χ²/dof", "ΔAICc", "weight", "order p", "DW")
+QUALITY_IN_WORDS = (*QUALITY[:5], "order test p", "Durbin–Watson")
+#: Below it ΔAICc has a digit behind the point: only there does it decide anything.
+_WITH_TENTHS = 100.0
+
+
+def spindown_tables(analysis: SpinDownAnalysis) -> tuple[Table, ...]:
+    """Return the runs, the laws, how well they fit, the straight lines.  Each fits a terminal of 80 columns."""
+    quality = quality_table(analysis, QUALITY)
+    count = count_table(analysis, symbols=True)
+    return _runs_table(analysis), _laws_table(analysis), quality, *([count] if count else []), _lines_table(analysis)
+
+
+def _runs_table(analysis: SpinDownAnalysis) -> Table:
+    rows = [
+        (
+            source.name,
+            str(len(run.time)),
+            *cells,
+            f"{run.frequency[0]:.2f} → {run.frequency[-1]:.2f}",
+            run.best if run.verdict.decided else "undecided",
+        )
+        for source, run, *cells in zip(analysis.sources, analysis.runs, *cells_of(OF_RUN, analysis.runs), strict=True)
+    ]
+    heads = ("run", "readings", *(one.head for one in OF_RUN), "spin [Hz]", "best law")
+    return table(title_of("Spin-down", analysis.sources), heads, rows, numbers=["readings"])
+
+
+def _laws_table(analysis: SpinDownAnalysis) -> Table:
+    of = "" if len(analysis.runs) == 1 else f", means over {len(analysis.runs)} runs, u from their scatter"
+    rows = [
+        (
+            fit.name,
+            "best" if is_best(analysis, fit.name) else "",
+            "\n".join(_equations(law_constants(analysis, fit.name))),
+        )
+        for fit in analysis.combined.fits
+    ]
+    return table(f"Drag laws{of}", ("law", "", "constants"), rows)
+
+
+def laws_of(analysis: SpinDownAnalysis) -> list[str]:
+    """Return the laws that were fitted, in the order of their table; a result of earlier may lack some."""
+    fitted = {fit.name for fit in analysis.combined.fits}
+    return [name for name in LAWS if name in fitted]
+
+
+def is_best(analysis: SpinDownAnalysis, law: str) -> bool:
+    """Return whether the readings single a law out."""
+    verdict = analysis.combined.verdict
+    return verdict.decided and law == verdict.best
+
+
+def law_constants(analysis: SpinDownAnalysis, name: str) -> Mapping[str, Estimate]:
+    """Return a law's constants: means over the runs, or with its start those of the only one."""
+    if len(analysis.runs) > 1:
+        return analysis.combined.fit(name).constants
+    found = analysis.runs[0].fit(name).parameters
+    excluded = name in analysis.combined.verdict.excluded
+    return {one: value for one, value in found.items() if not (excluded and one in WOBBLE)}
+
+
+def quality_table(analysis: SpinDownAnalysis, heads: Sequence[str]) -> Table:
+    """Return how well the laws fit."""
+    rows = [
+        Row((fit.name, *_quality(fit.statistics, len(analysis.runs))), "best" if is_best(analysis, fit.name) else "")
+        for fit in analysis.combined.fits
+    ]
+    return table("How well they fit", ("law", *heads), rows, numbers=heads)
+
+
+def _quality(statistics: Statistics, runs: int) -> list[str]:
+    difference = statistics.difference
+    return [
+        str(statistics.n_parameters - runs),  # each run has a start besides, under every law
+        plain(statistics.rms_residual),
+        plain(statistics.reduced_chi_square),
+        "—" if difference is None else f"{difference:.1f}" if difference < _WITH_TENTHS else f"{difference:.0f}",
+        share(statistics.weight),
+        plain(statistics.runs_test_p, 2),
+        plain(statistics.durbin_watson),
+    ]
+
+
+#: For the terminal, where nothing else explains them.
+_WOBBLE_SYMBOLS = "δ: tilt of the moment; ν_r: resonance, below the last reading"
+_NUTATION = "; K, with the laws: nutation"
+
+
+def count_table(analysis: SpinDownAnalysis, *, symbols: bool = False) -> Table | None:
+    """Return tilt, wobble and correlation in the count, and the effective number of readings; None: none is seen."""
+    if not any(run.has_tilt or run.is_correlated for run in analysis.runs):
+        return None
+    heads = ("run", "δ [rad]", "ν_r [Hz]", "adds at the end [Hz]", "correlation", "count as")
+    rows = []
+    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+        fit = run.fit(run.best)
+        tilt, resonance = (fit.parameters.get(name) for name in ("moment_tilt", "resonance"))
+        added = tilt_part(fit, run.time)
+        seen = run.correlation if run.is_correlated else None
+        rho, n = (seen.value or 0.0) if seen else 0.0, len(run.time)
+        rows.append(
+            Row(
+                (
+                    short_name(source.name),
+                    without_unit(tilt) if tilt else "none",
+                    without_unit(resonance) if resonance else "—",
+                    plain(float(added[-1]), 2) if tilt else "—",
+                    f"{rho:.2f} ± {seen.u:.2f}" if seen else "none",
+                    f"{digits(n * (1 - rho) / (1 + rho))} of {n}" if seen else f"{n}",
+                )
+            )
+        )
+    tilted = any(run.has_tilt for run in analysis.runs)
+    title = "What the counter sees of the wobble, by the best law"
+    if tilted and symbols:
+        title += f". {_WOBBLE_SYMBOLS}{_NUTATION if len(analysis.runs) == 1 else ''}"
+    return table(title, heads, rows)
+
+
+def tilt_part(fit: LawFit, time: Array) -> Array:
+    """Return the share of tilt and wobble in the count at some times [Hz], shape (n,); zeros without them."""
+    p = len(fit.law.parameters)
+    tau = (time - fit.start_time) / fit.reference[1]
+    spin: Array = fit.reference[0] * count_of(fit.law, tau, fit.solution[:p], fit.top)
+    return fit.spin_frequency(time) - spin
+
+
+def _lines_table(analysis: SpinDownAnalysis) -> Table:
+    """Return the thesis's straight lines, run by run, beside the fit of the favoured law."""
+    best = analysis.combined.fit(analysis.combined.best)
+    lines = [fit for fit in analysis.combined.fits if fit.linearised]
+    heads = [f"{STRAIGHT_LINES[fit.name].quantity}\n{_head(fit.linearised or {})}" for fit in lines]
+    means = [_first(fit.linearised or {}) for fit in lines] + [_first(best.constants)]
+    of_runs = [
+        [_first(run.fit(fit.name).linearised or {}) for fit in lines]
+        + [run.fit(best.name).parameters[next(iter(best.constants))]]
+        for run in analysis.runs
+    ]
+    several = len(analysis.runs) > 1
+    columns = [column(cells) for cells in zip(*of_runs, *([means] if several else []), strict=True)]
+    names = [*(short_name(source.name) for source in analysis.sources), *(["mean"] if several else [])]
+    rows = [
+        Row((name, *cells), "together" if several and name is names[-1] else "")
+        for name, *cells in zip(names, *columns, strict=True)
+    ]
+    title = f"Run by run: unweighted straight lines, and the fit of the {best.name} law"
+    return table(title, ("run", *heads, f"{best.name} fit\n{_head(best.constants)}"), rows)
+
+
+def _equations(estimates: Mapping[str, Estimate]) -> list[str]:
+    return [f"{SYMBOLS[name]} = {with_uncertainty(estimate)}" for name, estimate in estimates.items()]
+
+
+def _head(estimates: Mapping[str, Estimate]) -> str:
+    name, estimate = next(iter(estimates.items()))
+    return f"{SYMBOLS[name]} [{unit(estimate.unit).text}]"
+
+
+def _first(estimates: Mapping[str, Estimate]) -> Estimate:
+    return next(iter(estimates.values()))
+
+
+# --- readings as columns of tables for programs ---
+
+
+def spindown_columns(analysis: SpinDownAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield the readings of each run; residual_hz: reading less the best law of all runs, NaN for unused readings."""
+    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+        readings, n = source.readings, len(source.readings)
+        used = np.isin(readings.time, run.time)
+        residual = np.full(n, np.nan)
+        residual[used] = run.fit(analysis.combined.best).residuals
+        given = analysis.options.reading_u
+        own = np.full(n, np.nan) if readings.u is None else readings.u
+        yield {
+            "time_s": readings.time,
+            "spin_frequency_hz": readings.frequency,
+            "spin_frequency_u_hz": own if given is None else np.full(n, given),
+            "residual_hz": residual,
+            "used": used,
+        }
+
+
+def spindown_curve_u(analysis: SpinDownAnalysis, number: int, law: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the standard uncertainty [Hz] of a law's curve, of times [s]; NaN: undefined, or of a tilt elsewhere."""
+    run = analysis.runs[number]
+    fit = run.fit(law)
+
+    def curve_u(time: np.ndarray) -> np.ndarray:
+        u = fit.u_spin_frequency(time)
+        unknown = fit.has_tilt & ((time < run.time[0]) | (time > run.time[-1]))
+        return np.where(unknown, np.nan, np.nan if u is None else u)
+
+    return curve_u
+
+
+def spindown_curve(analysis: SpinDownAnalysis, number: int, law: str) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the spin frequency [Hz] of a law fitted to one run, of times [s]; beyond the readings by the law alone."""
+    run = analysis.runs[number]
+    fit, first, last = run.fit(law), float(run.time[0]), float(run.time[-1])
+
+    def curve(time: np.ndarray) -> np.ndarray:
+        inside = fit.spin_frequency(np.clip(time, first, last))
+        beyond = np.where(time < first, fit.forecast(time, first), fit.forecast(time, last))
+        return np.where((time >= first) & (time <= last), inside, beyond)
+
+    return curve
+
 
 #: Readings printed in the page; more stay in the run folder.
 MOST_READINGS = 200
@@ -128,7 +521,7 @@ def _laws(analysis: SpinDownAnalysis) -> tuple[Tabular, Tabular]:
         "shape."
     )
     return (
-        Tabular("spindown-laws", _laws_table(analysis), constants),
+        Tabular("spindown-laws", _constants_table(analysis), constants),
         Tabular("spindown-models-compared", quality_table(analysis, QUALITY_IN_WORDS), quality),
     )
 
@@ -164,7 +557,7 @@ def _run_by_run(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
     return Paragraph(paper), shown
 
 
-def _laws_table(analysis: SpinDownAnalysis) -> Table:
+def _constants_table(analysis: SpinDownAnalysis) -> Table:
     several = len(analysis.runs) > 1
     heads = ("law", "mean over the runs", "scatter s between the runs") if several else ("law", "constants")
     rows = [
@@ -226,15 +619,17 @@ def _columns(analysis: SpinDownAnalysis) -> list[_Column]:
     best = combined.fit(combined.best)
     fits = [run.fit(best.name).parameters for run in analysis.runs]
     starts = tuple(fit["start_frequency"] for fit in fits)
-    columns.append(_Column(_head(f"{best.name} fit", "start_frequency", starts[0].unit), starts))
+    columns.append(_Column(_head_of(f"{best.name} fit", "start_frequency", starts[0].unit), starts))
     return columns + _of_law(f"{best.name} fit", best.constants, fits)
 
 
 def _of_law(of: str, means: Mapping[str, Mean], runs: Sequence[Mapping[str, Estimate]]) -> list[_Column]:
-    return [_Column(_head(of, name, mean.unit), tuple(run[name] for run in runs), mean) for name, mean in means.items()]
+    return [
+        _Column(_head_of(of, name, mean.unit), tuple(run[name] for run in runs), mean) for name, mean in means.items()
+    ]
 
 
-def _head(of: str, name: str, unit: str) -> str:
+def _head_of(of: str, name: str, unit: str) -> str:
     shown = unit_row(unit).text
     return f"{of}\n{SYMBOLS[name]}" + (f" [{shown}]" if shown else "")
 

@@ -1,25 +1,135 @@
-"""The verdict of spin-downs, and what to know before using their numbers, as sentences."""
+"""Quantities of a spin-down, symbols of the drag laws, the verdict and remarks on the numbers."""
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
+from fractions import Fraction
 from math import floor, log10
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from analysis.numbers import digits
+from analysis.spindown.drag import LAWS
 from analysis.spindown.verdict import is_simple
-from levilab.pipelines.spindown.laws import SYMBOLS
+from levilab.pipelines.row import Column, Quantity, columns_of, entry, estimate, statistic
 from levilab.present.numbers import enumeration
+from levilab.present.units import name_with_unit
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
+
+    from numpy.typing import NDArray
 
     from analysis.remarks import Remark
     from analysis.spindown.combine import Combined, CombinedLaw
+    from analysis.spindown.drag import DragLaw
     from analysis.spindown.fit import SpinDown
     from analysis.spindown.lawfit import LawFit
     from analysis.spindown.verdict import Verdict
     from analysis.uncertainty import Estimate
+
+    Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StraightLine:
+    """The function of ω that is a straight line in time where a law of one power holds.
+
+    Attributes:
+        quantity: for text.
+        axis: for the axis of a figure, with its unit.
+        transform: of ω [rad/s].
+    """
+
+    quantity: str
+    axis: str
+    transform: Callable[[Array], Array]
+
+
+def straight_line(law: DragLaw) -> StraightLine | None:
+    """Return the straight line of a law; None for a law of several terms or of a free exponent.
+
+    >>> [straight_line(LAWS[name]).quantity for name in ("stokes", "newton", "disc")]
+    ['ln ω', '1/ω', 'ω^−½']
+    """
+    if law.exponent is None:
+        return None
+    (m,) = law.orders
+    if m == 0:
+        return StraightLine("ln ω", "ln ω   (ω in rad/s)", np.log)
+    if m == 1:
+        return StraightLine("1/ω", "1/ω  [s/rad]", lambda omega: 1 / omega)
+    power = str(Fraction(m).limit_denominator(100))
+    text = "½" if math.isclose(m, 0.5) else power
+    return StraightLine(f"ω^−{text}", f"ω$^{{−{power}}}$  [(s/rad)$^{{{power}}}$]", lambda omega: np.asarray(omega**-m))
+
+
+#: The laws that have a straight line.
+STRAIGHT_LINES = MappingProxyType({law.name: line for law in LAWS.values() if (line := straight_line(law))})
+#: Parameters of the laws in the field's letters, then of what the counter sees beside the spin.
+SYMBOLS = MappingProxyType(
+    {"start_frequency": "ν₀"}
+    | {name: symbol for law in LAWS.values() for name, symbol in zip(law.constants, law.symbols, strict=True)}
+    | {"moment_tilt": "δ", "resonance": "ν_r", "wobble": "K"}
+)
+
+
+#: Of `analysis.spindown.fit.SpinDown`, each with a column in the tables of runs; the constants of laws are in
+#: `analysis.spindown.drag.LAWS`.
+OF_RUN = (
+    Quantity("start_time", "s", "time of the first reading", "begins at", has_u=False),
+    Quantity("duration", "s", "time from the first reading to the last", "lasts", has_u=False,
+             of=lambda run: float(run.time[-1] - run.time[0])),
+)  # fmt: skip
+#: Of what the counter sees of the wobble, by the best law, and of the noise; they have a table of their own.
+TILT = Quantity("moment_tilt", "rad", "angle between moment and axis, where the count shows it", "δ", fine=True,
+                of=lambda run: run.fit(run.best).parameters.get("moment_tilt"), optional=True)  # fmt: skip
+CORRELATION = Quantity("residual_correlation", "1", "correlation of neighbouring residuals", "correlation",
+                       of="correlation.value", u="correlation.u", optional=True)  # fmt: skip
+QUANTITIES = (*OF_RUN, TILT, CORRELATION)
+
+#: Statistics of a law: name in the result, name of the column, unit, meaning.
+_STATISTICS = (
+    ("reduced_chi_square", "reduced_chi_square", "1", "χ² per degree of freedom"),
+    ("rms_residual", "rms_residual", "Hz", "root mean square of the residuals"),
+    ("difference", "delta_aicc", "1", "ΔAICc, its criterion above that of the best law"),
+)
+
+
+def _of_law(law: DragLaw) -> Iterator[Column]:
+    """Yield the columns of a law: its constants with their uncertainties, and how well it fits."""
+
+    def model(part: Mapping[str, Any]) -> Mapping[str, Any]:
+        found: Mapping[str, Any] = next(model for model in part["models"] if model["name"] == law.name)
+        return found
+
+    for name, unit in zip(law.parameters, law.parameter_units, strict=True):
+        yield from estimate(
+            f"{law.name}_{name}", unit, f"{name} of the law {law.name}",
+            lambda part, name=name: model(part)["parameters"].get(name),  # type: ignore[misc]
+        )  # fmt: skip
+    for name, heading, unit, meaning in _STATISTICS:
+        yield Column(
+            name_with_unit(f"{law.name}_{heading}", unit), "number", f"of the law {law.name}: {meaning}",
+            lambda part, name=name: model(part)["statistics"][name],  # type: ignore[misc]
+        )  # fmt: skip
+
+
+SPINDOWN_ROW = (
+    statistic("n", "1", "readings in the fits", "readings_used", kind="count"),
+    entry("outliers", "count", "readings that do not belong to the others", "result.outliers"),
+    *columns_of(OF_RUN),
+    entry("best_model", "text", "the law with the smallest criterion"),
+    entry("decided", "truth", "whether the readings single it out"),
+    entry("describes", "truth", "whether any law describes the readings"),
+    *(column for law in LAWS.values() for column in _of_law(law)),
+    *columns_of((TILT, CORRELATION)),
+    entry("verdict", "text", "what the readings say about the laws"),
+)
+
 
 #: u of an exponent, or of an angle [rad], that no measurement has.
 TOO_SMALL = 5e-10

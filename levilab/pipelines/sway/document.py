@@ -1,18 +1,59 @@
-"""Tracks of swaying tops ↔ result.json."""
+"""Tracks of swaying tops → uncertainty budgets and result.json."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from analysis.budget import Budget
+from levilab.pipelines.budget import direct_row
 from levilab.pipelines.document import Document, result_model, values_of
 from levilab.pipelines.row import find_all
-from levilab.pipelines.sway.analysis import METHOD, SwayRun
-from levilab.pipelines.sway.budget import budget_of_run
-from levilab.pipelines.sway.quantities import QUANTITIES
+from levilab.pipelines.sway.analysis import METHOD, QUANTITIES, SwayRun
 
 if TYPE_CHECKING:
+    from levilab.pipelines.options import SwayOptions
+    from levilab.pipelines.sources import Source
     from levilab.pipelines.sway.analysis import SwayAnalysis
+    from levilab.pipelines.sway.readings import SwayReadings
+
+
+#: Name of a part → what it is, whether it was seen to scatter, where it comes from, what would make it smaller.
+_ROWS = {
+    "lines": ("frequencies of the swings", "A", "noise of the places, and scatter of the windows",
+              "a longer spin-down, or a sharper picture"),
+    "amplitude": ("shift at finite amplitude", "B", "computed for a top without a vertical swing",
+                  "smaller swings, or another washer"),
+    "mistake": ("which line is which", "B", "lines of the vertical swing lie beside the swings",
+                "a longer spin-down, or smaller swings"),
+    "motion": ("changes within a window", "B", "as tops in full motion scatter", "a slower spin-down"),
+    "lean": ("tilt of the precession", "B", "by the size of its line, as of the centre of mass",
+             "a top that precesses less, or a mark nearer to the centre of mass"),
+    "base": ("sizes of the base", "B", "calliper or Hall scan", "a Hall scan"),
+    "mass": ("mass of the top", "B", "scales", "better scales"),
+    "inertia": ("moment of inertia I₃", "B", "parts of the top", "each part weighed and measured"),
+}  # fmt: skip
+
+
+def budget_of_run(_: Source[SwayReadings], run: SwayRun, __: SwayOptions) -> tuple[Budget, ...]:
+    """Return the budgets of one track."""
+    found = run.geometry
+    each = (("geometric_magnetism", found.measured, found.parts), ("predicted", found.predicted, found.parts_predicted))
+    return tuple(
+        Budget(
+            name,
+            estimate.value or 0.0,
+            estimate.u,
+            "Hz",
+            tuple(
+                direct_row(part, what, size, "Hz", note, remedy, "A" if kind == "A" else "B")
+                for part, (what, kind, note, remedy) in _ROWS.items()
+                if (size := parts.get(part))
+            ),
+        )
+        for name, estimate, parts in each
+        if estimate.u
+    )
 
 
 def _entries(analysis: SwayAnalysis) -> dict[str, Any]:

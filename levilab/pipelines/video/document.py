@@ -9,8 +9,7 @@ from analysis.budget import Budget
 from levilab.pipelines.budget import direct_row
 from levilab.pipelines.document import Document, result_model, values_of
 from levilab.pipelines.row import find_all
-from levilab.pipelines.video.analysis import METHOD, Video
-from levilab.pipelines.video.quantities import QUANTITIES
+from levilab.pipelines.video.analysis import METHOD, QUANTITIES, Video
 
 if TYPE_CHECKING:
     from levilab.pipelines.options import VideoOptions

@@ -1,19 +1,66 @@
-"""Films → their part of a report."""
+"""Films → tables, and their part of a report."""
 
 from __future__ import annotations
 
+import io
 from typing import TYPE_CHECKING
 
-from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts
-from levilab.pipelines.video.table import video_tables
+import numpy as np
+
+from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, title_of
+from levilab.pipelines.row import cells_of
+from levilab.pipelines.video.analysis import QUANTITIES
 from levilab.present.document.blocks import Listing, Paragraph, Tabular
-from levilab.present.numbers import with_decimals
-from levilab.present.tables import table
+from levilab.present.numbers import short_name, with_decimals
+from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Mapping
+
     from levilab.pipelines.sources import Source
     from levilab.pipelines.video.analysis import FilmReadings, Video, VideoAnalysis
     from levilab.present.document.blocks import Block
+
+
+def video_tables(analysis: VideoAnalysis) -> tuple[Table, ...]:
+    """Return the quantities that were found in any of the films, a column a film."""
+    cells = cells_of(QUANTITIES, analysis.runs)
+    found = [any(one.find(run) for run in analysis.runs) for one in QUANTITIES]
+    rows = [(one.head, *row) for one, row, any_ in zip(QUANTITIES, cells, found, strict=True) if any_]
+    heads = ("", *(short_name(source.name) for source in analysis.sources))
+    return (table(title_of("Top from above", analysis.sources, "film"), heads, rows, numbers=heads[1:]),)
+
+
+def video_columns(analysis: VideoAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
+    """Yield place and smooth spin in the pictures of each film."""
+    for run in analysis.runs:
+        spin = {"spin_frequency_hz": np.abs(run.turning.smooth)} if run.turning else {}
+        lean = {"axis_x": run.leaning.x, "axis_y": run.leaning.y} if run.leaning else {}
+        rise = {"z_m": run.rising.z} if run.rising else {}
+        yield {"time_s": run.time, "x_m": run.x, "x_u_m": run.u, "y_m": run.y, "y_u_m": run.u, **rise, **lean, **spin}
+
+
+def video_files(analysis: VideoAnalysis) -> dict[str, str]:
+    """Return the tables of each film for other analyses, by the names of their files."""
+    files: dict[str, str] = {}
+    for source, run, track in zip(analysis.sources, analysis.runs, video_columns(analysis), strict=True):
+        tables = (("tracks", track), *_readings(run))
+        files |= {f"{source.path.stem}.{name}.csv": _csv(columns) for name, columns in tables}
+    return files
+
+
+def _readings(run: Video) -> Iterator[tuple[str, Mapping[str, np.ndarray]]]:
+    """Yield the readings of the spin, and the spin at the fall, where they are known."""
+    if (spin := run.turning) is not None:
+        yield "spin", {"time_s": spin.time, "spin_frequency_hz": np.abs(spin.spin), "spin_frequency_u_hz": spin.u}
+    if (fall := run.spin_at_fall) is not None:
+        yield "limit", {"spin_frequency_hz": np.array([fall.value])}  # u: a table of two columns needs three rows
+
+
+def _csv(columns: Mapping[str, np.ndarray]) -> str:
+    text = io.StringIO()
+    np.savetxt(text, np.column_stack([*columns.values()]), "%.9g", ",", header=",".join(columns), comments="")
+    return text.getvalue()
 
 
 def video_part(analysis: VideoAnalysis) -> ReportPart:

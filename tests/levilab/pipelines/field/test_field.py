@@ -15,8 +15,7 @@ from levilab.pipelines.field.analysis import METHOD, NEEDS
 from levilab.pipelines.field.device import known_of
 from levilab.pipelines.field.document import DOCUMENT
 from levilab.pipelines.field.figure import field_figure
-from levilab.pipelines.field.report import field_part
-from levilab.pipelines.field.table import scans_table
+from levilab.pipelines.field.report import field_part, scans_table
 from levilab.pipelines.options import FieldOptions
 from levilab.pipelines.result import save
 from levilab.pipelines.sources import collect

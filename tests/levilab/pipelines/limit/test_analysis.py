@@ -20,8 +20,7 @@ from levilab.pipelines.limit.analysis import (
     UPPER_EDGE,
     LimitOptions,
 )
-from levilab.pipelines.limit.report import limit_part
-from levilab.pipelines.limit.table import limit_tables
+from levilab.pipelines.limit.report import limit_part, limit_tables
 from levilab.pipelines.sources import SkippedRuns, mark_of
 from levilab.pipelines.suits import analyze_suiting, save
 from levilab.present.document.blocks import Listing

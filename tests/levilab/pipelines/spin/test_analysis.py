@@ -18,9 +18,7 @@ from levilab.pipelines.options import SpinDownOptions, SpinOptions
 from levilab.pipelines.spin import words
 from levilab.pipelines.spin.analysis import METHOD, Series, drive_offset
 from levilab.pipelines.spin.figure import spin_figure
-from levilab.pipelines.spin.meaning import meaning
-from levilab.pipelines.spin.report import spin_part
-from levilab.pipelines.spin.table import spin_tables
+from levilab.pipelines.spin.report import meaning, spin_part, spin_tables
 from levilab.pipelines.spindown.analysis import METHOD as SPINDOWN
 from levilab.pipelines.suits import analyze_suiting
 from levilab.pipelines.suits import save as save_found

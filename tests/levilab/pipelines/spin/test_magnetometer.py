@@ -10,7 +10,7 @@ from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import LimitOptions, SpinDownOptions, SpinOptions
 from levilab.pipelines.spin.figure import spin_figure
-from levilab.pipelines.spin.meaning import meaning
+from levilab.pipelines.spin.report import meaning
 from levilab.pipelines.suits import analyze_suiting
 from support.figures import faults
 from support.paths import ROOT

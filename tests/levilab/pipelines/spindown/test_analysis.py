@@ -18,8 +18,7 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.analysis import METHOD
 from levilab.pipelines.spindown.readings import read_spin_file
-from levilab.pipelines.spindown.report import spindown_part
-from levilab.pipelines.spindown.table import spindown_tables
+from levilab.pipelines.spindown.report import spindown_part, spindown_tables
 from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Tabular
 from levilab.runs.run import Run

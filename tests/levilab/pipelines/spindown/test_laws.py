@@ -9,7 +9,7 @@ import pytest
 
 from analysis.spindown.drag import LAWS, spin
 from analysis.spindown.tilt import PARAMETERS
-from levilab.pipelines.spindown.laws import STRAIGHT_LINES, SYMBOLS
+from levilab.pipelines.spindown.words import STRAIGHT_LINES, SYMBOLS
 from levilab.present.looks import LOOKS
 from support.paths import ROOT, SAMPLE_DATA
 

@@ -10,10 +10,8 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.analysis import METHOD
 from levilab.pipelines.spindown.figure import spindown_figure
-from levilab.pipelines.spindown.laws import SYMBOLS
-from levilab.pipelines.spindown.meaning import answer, meaning
-from levilab.pipelines.spindown.report import spindown_part
-from levilab.pipelines.spindown.table import spindown_tables
+from levilab.pipelines.spindown.report import answer, meaning, spindown_part, spindown_tables
+from levilab.pipelines.spindown.words import SYMBOLS
 from levilab.present.document.blocks import Section, Verdict
 from levilab.present.numbers import with_uncertainty
 from levilab.report.document import blocks_of_part
