@@ -12,7 +12,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Generic, TypeVar
 
 from instruments.drivers import Instrument
-from instruments.drivers.counter.keysight_34461a import Keysight34461A
+from instruments.drivers.counter.keysight_34461a import GATES, Keysight34461A
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.drivers.counter.phyphox import Phyphox
@@ -67,6 +67,7 @@ class Model(Generic[I_co]):
         address: an address as one of it may have; one without a host, as ``sound://``, is complete for any of them.
         answers_as: the model field of ``*IDN?``, whole (regular expression), where it does not hold the name.
         inputs: of a counter, those for slow pulses.
+        gates: of a counter, their lengths, the shorter one is taken of a length between two [s]; empty: any length.
     """
 
     name: str
@@ -75,6 +76,7 @@ class Model(Generic[I_co]):
     address: str
     answers_as: str = ""
     inputs: int = 2
+    gates: tuple[float, ...] = ()
 
     @property
     def scheme(self) -> str:
@@ -126,6 +128,7 @@ COUNTERS: tuple[Model[Counter], ...] = (
             ),
             "TCPIP0::192.168.1.21::5025::SOCKET",
             inputs=1,
+            gates=GATES,
         )
         for name in ("34461A", "34460A", "34465A")
     ),
@@ -135,6 +138,7 @@ COUNTERS: tuple[Model[Counter], ...] = (
         partial(Virtual34461A, lacks=("LOWer", "ABORt"), identity="HEWLETT-PACKARD,34401A,VIRTUAL,11-5-2"),
         "GPIB0::22::INSTR",
         inputs=1,
+        gates=GATES,
     ),
     Model("phyphox", Phyphox, VirtualPhyphox, "phyphox://192.168.1.40:8080"),
 )

@@ -91,7 +91,7 @@ class DriveSettings(CounterSettings):
                 "a triggered drive needs a wire from the tape's phototransistor to the generator's trigger input: say "
                 'in the bench file which edge of its pulse starts a cycle, generator.trigger = "rising" or "falling"'
             )
-        return self
+        return super().for_bench(config)
 
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""

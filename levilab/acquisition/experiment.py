@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar
 from pydantic import Field, PositiveFloat, model_validator
 from pydantic_core import PydanticCustomError
 
+from levilab.bench.kinds import COUNTER
 from levilab.runs.channel import Channel
 from levilab.settings import Settings
 
@@ -70,6 +71,15 @@ class CounterSettings(ExperimentSettings):
                 {"gate": f"{self.gate_s:g}", "interval": f"{self.interval_s:g}"},
             )
         return self
+
+    def for_bench(self, config: BenchConfig) -> Self:
+        """See the base: the gate is one that the counter has; its driver refuses what is far from all of them."""
+        if config.count_with != COUNTER.name or config.counter is None:
+            return self
+        gates = COUNTER.model(config.counter.model).gates
+        if not gates or not gates[0] <= self.gate_s <= 2 * gates[-1]:
+            return self
+        return self.model_copy(update={"gate_s": max(gate for gate in gates if gate <= self.gate_s)})
 
     def with_jitter(self, jitter_s: float) -> Self:
         """Add the uncertainty of a reading from pulses that scatter by this much [s]: √2 jitter/gate turns."""

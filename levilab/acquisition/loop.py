@@ -10,6 +10,7 @@ import math
 import sys
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Any, Literal
 
 from instruments.errors import InstrumentError
@@ -17,7 +18,7 @@ from levilab.acquisition.onlooker import publishing
 from levilab.acquisition.session import Earlier, Session
 from levilab.acquisition.table import EXPERIMENTS, settings_of
 from levilab.bench.bench import open_bench
-from levilab.bench.kinds import estimates_u
+from levilab.bench.kinds import GENERATOR, estimates_u
 from levilab.errors import LevilabError, unquote
 from levilab.files import CannotWrite
 from levilab.interruption import Interrupted, watching_for_interruption
@@ -30,7 +31,6 @@ from levilab.texts.text import Text, text_of
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
 
-    from levilab.acquisition.experiment import Experiment
     from levilab.acquisition.onlooker import Watch
     from levilab.bench.config import BenchConfig
     from levilab.bench.wiring import Wiring
@@ -38,6 +38,12 @@ if TYPE_CHECKING:
     from levilab.present.progress import Display
     from levilab.runs.channel import Channel
     from levilab.runs.run import Status
+
+
+#: What is said where an acquisition ends before it could see that the drive is off.
+_NOT_SEEN_OFF = Text(
+    "the generator was not reached: if a run was killed before, THE DRIVE MAY STILL BE ON, switch it off by hand"
+)
 
 
 @dataclass(frozen=True)
@@ -94,14 +100,28 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
         show: the terminal.
         watch: what others see of it; by default it is published for views.
     """
-    experiment = EXPERIMENTS[request.experiment]
+    off = Event()
+    try:
+        return _acquire(request, show, watch, off)
+    finally:
+        if not off.is_set() and request.synthetic_how is None and GENERATOR.name in _kinds(request):
+            show.message(_NOT_SEEN_OFF)
+
+
+def _acquire(request: AcquisitionRequest, show: Display, watch: Watch, off: Event) -> Run:
+    """Acquire, and set `off` once the outputs are seen to be off."""
     with watching_for_interruption() as stop, _writer(request, show) as writer, contextlib.closing(show):
         try:
             with stop.let_second_signal_through():
-                _at_the_bench(experiment, request, writer, show, stop, watch=watch)
+                _at_the_bench(request, writer, show, stop, watch=watch, off=off.set)
             status: Status = "finished"
         except Interrupted as interruption:
-            text = Text("interrupted by {by}, outputs are off", by=interruption.by)
+            seen = (
+                "interrupted by {by}, outputs are off"
+                if off.is_set()
+                else "interrupted by {by} before the bench was open"
+            )
+            text = Text(seen, by=interruption.by)
             writer.event(None, RunEvent.INTERRUPTED, text)
             show.close()  # its picture of the bench is from before the outputs went off
             show.message(text)
@@ -133,21 +153,28 @@ def _writer(request: AcquisitionRequest, show: Display) -> RunWriter:
     return RunWriter.reopen(request.resume, note=request.note, tell=show.message)
 
 
+def _kinds(request: AcquisitionRequest) -> tuple[str, ...]:
+    """Return the kinds of instruments that the experiment needs."""
+    experiment = EXPERIMENTS[request.experiment]
+    return experiment.kinds(settings_of(request.config, experiment.name))
+
+
 def _at_the_bench(
-    experiment: Experiment[Any],
     request: AcquisitionRequest,
     writer: RunWriter,
     show: Display,
     stop: Stop,
     *,
     watch: Watch,
+    off: Callable[[], object],
 ) -> None:
-    """Return the steps of the experiment, between opening the bench and leaving it."""
+    """Carry out the experiment, between opening the bench and leaving it."""
+    experiment = EXPERIMENTS[request.experiment]
     settings = settings_of(request.config, experiment.name)
     earlier = _earlier(request)
     log = writer.wire if request.wire_log else None
     wiring = replace(request.wiring(), count_with=request.config.count_with)
-    with open_bench(wiring, experiment.kinds(settings), log=log, check=stop.check) as bench:
+    with open_bench(wiring, _kinds(request), log=log, check=stop.check, off=off) as bench:
         session: Session[Any] = Session(
             bench,
             settings,

@@ -120,6 +120,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     without = with_settings(without, experiment, settings_of(without, experiment).for_bench(without))
     config = _with_given_settings(without, experiment, options.settings)
     _check_given(config, without, experiment)
+    config = with_settings(config, experiment, settings_of(config, experiment).for_bench(config))
     _refuse_unused(options, config, experiment)
     request = AcquisitionRequest(
         experiment,

@@ -112,13 +112,15 @@ def open_bench(
     *,
     log: TrafficLog | None = None,
     check: Callable[[], None] = lambda: None,
+    off: Callable[[], object] = lambda: None,
 ) -> Iterator[Bench]:
     """Open the bench with the instruments of these kinds; outputs are off at the beginning and at the end.
 
     Where the wiring counts with the oscilloscope, a counter is made of it.
 
-    check: called before each instrument, may raise to give up.  Raises ConfigError for an instrument that is not
-    described or of an unknown model, InstrumentError when one does not answer as it should.
+    check: called before each instrument, may raise to give up; off: called once the outputs are seen to be off.  Raises
+    ConfigError for an instrument that is not described or of an unknown model, InstrumentError when one does not answer
+    as it should.
     """
     bench = Bench(wiring)
     sampled = COUNTER.name in kinds and wiring.count_with == OSCILLOSCOPE.name
@@ -142,6 +144,7 @@ def open_bench(
                 bench.generator = connect(GENERATOR, alone=False)
                 bench.generator.limits = wiring.limits.of_the_drive()
                 bench.outputs_off()
+            off()
             if COUNTER.name in kinds and not sampled:
                 bench.counter = connect(COUNTER)
             if MAGNETOMETER.name in kinds:

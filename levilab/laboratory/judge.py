@@ -58,7 +58,7 @@ def compare(session: Session[Any], world: World, plan: Plan, first: int) -> list
     if plan.experiment != "spin" or session.zero is None or not isinstance(world, SpinWorld):
         return []
     rows = session.rows[first:]
-    gate = float(session.bench.counter.last_set.get("gate_s", session.settings.gate_s))  # a multimeter has three
+    gate = session.settings.gate_s
     found = []
     for row in rows:
         at = session.zero + row["time_s"]
@@ -108,7 +108,7 @@ def message(text: str, whose: str) -> Iterator[Finding]:
 
 
 def _outputs(life: Life) -> Iterator[Finding]:
-    said = "MAY STILL BE ON" in life.text or ("generator" in life.text and "cannot be opened" in life.text)
+    said = any("MAY STILL BE ON" in text for text in (life.text, *life.messages))
     if life.output_on and life.ended != "killed" and not said:
         yield Finding("output", f"process {life.number + 1} {life.ended}, and the drive is on: {life.text}")
 

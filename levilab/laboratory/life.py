@@ -37,7 +37,7 @@ class Life:
         text: its last message.
         error: that ended it.
         folder: of its run.
-        shown, events: rows, and texts of events, that were shown.
+        shown, events, messages: rows, texts of events, and all texts that were shown.
         zero: time on the bench of time_s = 0 [s].
         first: index of the first of the rows that this process has read.
         left: the status of its run, as others read it then; empty where there is none.
@@ -53,6 +53,7 @@ class Life:
     folder: Path | None = None
     shown: list[Row] = field(default_factory=list)
     events: list[str] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
     zero: float | None = None
     first: int = 0
     left: str = ""

@@ -68,6 +68,7 @@ class _Screen(Display):
 
     def message(self, text: str) -> None:
         session = self._visit.session
+        self._life.messages.append(text)
         if session is not None and session.doing.text == text:
             self._life.events.append(text)
         self._visit.fate.step(f"says {text}")

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 #: Its gates [s]; the longest that may be asked for, as experiments vary theirs by a quarter; readings in one answer.
-_GATES, _LONGEST, _AT_ONCE = (0.01, 0.1, 1.0), 2.0, 100
+GATES, _LONGEST, _AT_ONCE = (0.01, 0.1, 1.0), 2.0, 100
 #: It waits this long for a period of a slow signal, and settles as long before a reading [s] (34980A, 34401A manuals).
 _SLOW, _SETTLING = 1.0, 1.0
 #: Ranges of the input, a.c. [V].
@@ -40,7 +40,7 @@ class Keysight34461A(ReciprocalCounter):
     MODELS: ClassVar[str] = r"344(01|6[015]|70)A"
     NUMBER: ClassVar[Form] = Form(r"[+-]\d\.\d{8}E[+-]\d{2}", "+1.00000000E-01")
 
-    gate = Setting("FREQ:APER", float, unit="s", values=_GATES)
+    gate = Setting("FREQ:APER", float, unit="s", values=GATES)
     slowest = Setting("FREQ:RANG:LOW", float, unit="Hz", values=(3.0, 20.0, 200.0))
     voltage_range = Setting("FREQ:VOLT:RANG", float, unit="V", values=_RANGES)
     automatic_range = Setting("FREQ:VOLT:RANG:AUTO", bool)
@@ -57,9 +57,9 @@ class Keysight34461A(ReciprocalCounter):
     def prepare(self, *, gate_s: float, trigger_level_v: float, channel: int = 1) -> None:
         """Set the multimeter up; see :class:`Counter`.  Raises OutOfRange for a level beyond its ranges."""
         address = self.transport.address
-        gate = max((gate for gate in _GATES if gate <= gate_s), default=None)
+        gate = max((gate for gate in GATES if gate <= gate_s), default=None)
         if gate is None or gate_s > _LONGEST:
-            raise OutOfRange(address, "gate", gate_s, f"{_GATES[0]:g} to {_LONGEST:g} s: it has 0.01, 0.1 and 1 s")
+            raise OutOfRange(address, "gate", gate_s, f"{GATES[0]:g} to {_LONGEST:g} s: it has 0.01, 0.1 and 1 s")
         if channel not in self.channels:
             raise OutOfRange(address, "channel", channel, "1")
         wide = next((limit for limit in _RANGES if limit >= abs(trigger_level_v)), None)

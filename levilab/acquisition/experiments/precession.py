@@ -96,8 +96,9 @@ class PrecessionSettings(DriveSettings):
                 "an oscilloscope cannot count the laser beside the spin: name a `counter`, too; the second input shows "
                 "the drive, that of a sound card a pickup coil, and would be taken for the laser"
             )
+        suited = super().for_bench(config)
         if config.counter is None:
-            return self
+            return suited
         model = COUNTER.model(config.counter.model)
         if model.driver.SIGNAL is not LIGHT:
             raise ConfigError(
@@ -107,7 +108,7 @@ class PrecessionSettings(DriveSettings):
                 )
             )
         if self.laser_input <= model.inputs:
-            return self
+            return suited
         if "laser_input" in self.model_fields_set:
             raise ConfigError(
                 Text(
@@ -117,7 +118,7 @@ class PrecessionSettings(DriveSettings):
                     model=model.name,
                 )
             )
-        return self.model_copy(update={"laser_input": 1})
+        return suited.model_copy(update={"laser_input": 1})
 
     def for_scene(self, scene: Scene) -> Self:
         """See the base.  Raises ConfigError where a person would have to change a cable."""

@@ -43,7 +43,7 @@ class SwaySettings(CounterSettings):
         """See the base.  Raises ConfigError for a real bench."""
         if config.visa_library != "@levilab":
             raise ConfigError(_NO_CAMERA)
-        return self
+        return super().for_bench(config)
 
 
 def channels(_: SwaySettings) -> tuple[Channel, ...]:

@@ -10,6 +10,7 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.bench.config import ConfigError, InstrumentSettings
 from levilab.bench.kinds import COUNTER
 from levilab.errors import UsageError
+from levilab.world.spin_world import random_scene
 from support.acquisitions import Impatient, Silent, mock
 
 BENCH = """
@@ -105,3 +106,13 @@ def test_an_instrument_that_cannot_be_named_so_is_refused(options, what, tmp_pat
     with pytest.raises(UsageError) as refused:
         request_for("spin", AcquisitionOptions(**options))
     assert what in str(refused.value)
+
+
+@pytest.mark.parametrize(("gate_s", "taken"), [(0.5, 0.1), (1.0, 1.0), (1.5, 1.0), (0.1, 0.1), (9.0, 9.0)])
+def test_a_multimeter_takes_the_shorter_gate_and_the_run_says_so(gate_s, taken):
+    """A u of 0.5 s would be five times too small, and the time of a reading 0.2 s too early."""
+    settings = (f"gate_s={gate_s}", "reading_u_hz=0.01")
+    request = request_for("spin", AcquisitionOptions(mock=True, counter="34461A", settings=settings))
+    assert (request.config.spin.gate_s, request.config.spin.reading_u_hz) == (taken, 0.01)
+    stated = request_for("spin", AcquisitionOptions(mock=True, seed=1, counter="34461A", settings=settings[:1]))
+    assert stated.config.spin.reading_u_hz == pytest.approx(2**0.5 * random_scene(1).jitter / taken, abs=1e-6)

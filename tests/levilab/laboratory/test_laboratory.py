@@ -43,11 +43,19 @@ def spin_down(*events: Event) -> Plan:
     return a_plan("spin", "drive_waveform=NONE", "interval_s=5", events=events)
 
 
+def left_on_before(*events: Event) -> Plan:
+    """A process that is killed while it drives, and another one."""
+    return a_plan("spin", "drive_frequency_hz=35", events=[Event("kill", 0, 300), *events])
+
+
 #: Each of these once failed.
 FAILED_ONCE = {
     "a loss of power took events": a_plan("spin", "hold_s=0", "drive_frequency_hz=35", events=[Event("power", 0, 121)]),
     "a record without a frequency was no row": a_plan("trace", "records=3", "points=1000", model="DSOX1000"),
     "the computer stood still during a count": spin_down(Event("slow disk", 0, 154)),
+    "no disk after a kill, and the drive on": left_on_before(Event("disk error", 1, 1)),
+    "no generator after a kill, and the drive on": left_on_before(*(Event("link", 1, 1, 0.05) for _ in range(3))),
+    "Ctrl-C after a kill, and the drive on": left_on_before(Event("ctrl-c", 1, 1)),
 }
 
 
