@@ -1,6 +1,6 @@
 """What a map of a thousand million points takes on a hundred machines, and what limits it first.
 
-    python benchmarks/sweeps_on_paper.py       # prints its tables and puts them into docs/sweeps-at-scale.md
+    python benchmarks/sweeps_on_paper.py       # prints its tables and writes results/sweeps_on_paper.md
 
 No such map was computed: the numbers follow from what `sweeps.py` has measured on one small machine
 (results/sweeps.json), and from the assumptions below.
@@ -17,8 +17,8 @@ from typing import Any
 from levilab.sweeps.plan import CHUNK_S, MOST
 
 RESULTS = Path(__file__).parent / "results" / "sweeps.json"
-PAGE = Path(__file__).parents[1] / "docs" / "sweeps-at-scale.md"
-BEGIN, END = "<!-- made by benchmarks/sweeps_on_paper.py -->", "<!-- end -->"
+PAGE = RESULTS.with_name("sweeps_on_paper.md")
+TITLE = "# A map of 10⁹ points, calculated from results/sweeps.json by benchmarks/sweeps_on_paper.py"
 
 # Assumed, not measured.
 POINTS = 10**9
@@ -139,7 +139,7 @@ def _short(number: float) -> str:
 
 
 def page(found: dict[str, Any]) -> str:
-    """Return the tables of docs/sweeps-at-scale.md."""
+    """Return the tables of results/sweeps_on_paper.md."""
     one = Measured.of(found)
     cores = MACHINES * CORES_A_MACHINE
     core_s = POINTS * one.point_s
@@ -203,8 +203,7 @@ def _table(one: Measured, chunk_s: float) -> list[str]:
 
 def main() -> None:
     tables = page(json.loads(RESULTS.read_text(encoding="utf-8")))
-    head, begin, rest = PAGE.read_text(encoding="utf-8").partition(BEGIN)
-    PAGE.write_text(f"{head}{begin}\n{tables}\n{END}{rest.partition(END)[2]}", encoding="utf-8")
+    PAGE.write_text(f"{TITLE}\n\n{tables}\n", encoding="utf-8")
     print(tables)
 
 

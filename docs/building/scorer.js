@@ -14,7 +14,7 @@ var Scorer = {
     if (Scorer.pages[typed] === page) return 1000 + score;
     if (typed && !anchor && title.toLowerCase().includes(typed)) score += 100;
     if (/^(decisions\/|reference\/|speed$|mutants$|fuzzing$|contributing$|changes$)/.test(page)) return 0.2 * score;
-    if (/^(reproduce$|sweeps-at-scale$)/.test(page)) return 0.4 * score;
+    if (/^(reproduce$)/.test(page)) return 0.4 * score;
     if (/^(data|install|bench|experiments\/|report|notebook)/.test(page)) return 1.5 * score;
     return score;
   },

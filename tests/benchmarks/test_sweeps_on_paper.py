@@ -5,7 +5,7 @@ import json
 import sweeps_on_paper
 from support.paths import ROOT
 
-PAGE = ROOT / "docs/sweeps-at-scale.md"
+PAGE = ROOT / "benchmarks/results/sweeps_on_paper.md"
 
 
 def test_the_page_holds_what_its_script_computes():
