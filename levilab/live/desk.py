@@ -60,7 +60,7 @@ class Desk:
             name: {key: value for key, value in vars(row).items() if key != "keys"} for name, row in WHAT_IF.items()
         }
         tasks = [
-            {"name": name, "title": row.title, "does": row.does, "answers": dict(row.answers)}
+            {key: value for key, value in vars(row).items() if key not in {"holds", "hidden"}} | {"name": name}
             for name, row in TASKS.items()
         ]
         return {"experiments": rows, "what_if": what_if, "tasks": tasks} | {

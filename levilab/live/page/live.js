@@ -234,10 +234,10 @@ function show() {
   put(document.body.dataset, {state});
   write("state-word", STATES[state] || state);
   const lost = bench?.lost?.length ? phrase("the {instruments} does not answer", {instruments: bench.lost.map((kind) => phrase(kind)).join(phrase(" and the "))}) : "";
-  const running = about?.status === "running" || practice;
   const down = Boolean(practice) && data.up === false && Boolean(bench) && !bench.silent && !bench.folder;
-  const advice = !down ? "" : [bench.text || phrase("the top is down"), ...practice.guest ? [] : [data.count ? phrase("“Analyze” the run, or “Top back”") : phrase("“Top back” floats it again")]].join("; ");
-  write("state-text", lost || LONGER[state] || advice || about?.problem || ended(about) || (running && !bench?.silent && bench?.text) || "");
+  const does = bench?.silent ? "" : bench?.text || (down ? phrase("the top is down") : "");
+  write("top-said", practice ? does : "");
+  write("state-text", lost || LONGER[state] || about?.problem || ended(about) || (!practice && about?.status === "running" && does) || "");
   put(by("state-text"), {title: by("state-text").textContent});
   put(by("synthetic"), {hidden: !(about?.synthetic || (!about && bench?.virtual))});
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;

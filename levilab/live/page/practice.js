@@ -1,10 +1,13 @@
 // The bench for practice: controls that send commands, and the guide that shows how far one is.
 
+import {numberField} from "./field.js";
 import {showResult} from "./result.js";
-import {by, fixed, lapse, local, make, numberIn, option, phrase, put, short, write} from "./words.js";
+import {by, fixed, lapse, local, make, option, phrase, put, short, write} from "./words.js";
 
 /** Least time between two messages of a slider [ms]. */
 const SENDS_EVERY_MS = 120;
+/** A drive takes hold of a top that spins as fast, within this [Hz]. */
+const CATCHES_HZ = 1;
 
 /** The bench for practice as guests see it: its controls stay hidden, and keys do nothing. */
 export function watchPractice() {
@@ -51,38 +54,34 @@ export function openPractice(about, command, run, isOwn, allowed) {
     [timer, latest] = [0, null];
     return values && !now.busy ? send("tune the drive", values) : undefined;
   }
-  const pair = (id, slider, key) => {
-    const field = by(id), {min, max, step: size} = field.dataset;  // a value between the steps is as good: the drive takes any
-    const pass = () => {
-      const value = numberIn(field.value), empty = field.value.trim() === "";
-      const wrong = !empty && !(value >= Number(min) && value <= Number(max));
-      write(`${id}-wrong`, wrong ? phrase(Number.isFinite(value) ? "from {min} to {max}, not {seen}" : "a number from {min} to {max}, not {seen}", {min, max, seen: field.value.trim()}) : "");
-      field.setAttribute("aria-invalid", String(wrong));
-      if (wrong || empty) return;
-      by(slider).value = String(value);
-      field.value = local(String(value));
+  const fields = Object.fromEntries([["frequency", "frequency_hz"], ["amplitude", "amplitude_vpp"]].map(([id, key]) => {
+    const slider = by(`${id}-slider`);
+    const field = numberField(id, (value) => {  // a value between the steps of the slider is as good: the drive takes any
+      slider.value = String(value);
       tune({[key]: value});
-    };
-    field.addEventListener("change", pass);
-    field.addEventListener("keydown", (event) => {
-      const way = {ArrowUp: 1, ArrowDown: -1}[event.key];
-      if (!way) return;
-      event.preventDefault();
-      stepBy(id, way * Number(size));
     });
-    by(slider).addEventListener("input", () => {
-      field.value = local(by(slider).value);
-      write(`${id}-wrong`, "");
-      field.setAttribute("aria-invalid", "false");
-      tune({[key]: Number(by(slider).value)});
+    slider.addEventListener("input", () => {
+      field.set(slider.value);
+      tune({[key]: Number(slider.value)});
     });
-  };
-  pair("frequency", "frequency-slider", "frequency_hz");
-  pair("amplitude", "amplitude-slider", "amplitude_vpp");
+    return [id, {
+      ...field,
+      follow(value) {
+        if (timer || !(value > 0) || document.activeElement === slider) return;
+        const text = String(Number(value.toFixed(2)));
+        field.show(text);
+        if (slider.value !== text) slider.value = text;
+      },
+    }];
+  }));
+  const seed = numberField("seed", (value) => send("take a seed", {seed: Number.isFinite(value) ? value : null}), true);
 
   const does = {
     drive: () => send("switch the drive", {on: !now.drive}),
-    match: () => send("match the drive"),
+    match: () => {
+      now.matched = true;
+      send("match the drive");
+    },
     back: () => send("put the top back"),
     hold: () => send("pause", {on: !now.paused}),
     record: () => now.busy ? send("stop the run") : send("record a run", {experiment: by("experiment").value, group: by("group").value}),
@@ -98,16 +97,18 @@ export function openPractice(about, command, run, isOwn, allowed) {
   by("speed").addEventListener("change", () => send("set the speed", {speed: Number(by("speed").value)}));
 
   by("group").addEventListener("change", () => send("take a seed", {group: by("group").value}));
-  by("seed").addEventListener("change", () => send("take a seed", {seed: numberIn(by("seed").value)}));
 
   // what if
   const knobs = Object.entries(about.what_if).map(([name, row]) => {
-    const label = make("label", "", "quantity"), value = make("output"), input = make("input"), small = make("small", phrase(row.shows)), title = phrase(row.title);
+    const label = make("label", "", "quantity"), value = make("output"), input = make("input"), title = phrase(row.title);
     value.ariaLive = "off";  // what the slider is at, its own text says
     Object.assign(input, {type: "range", min: row.low, max: row.high, step: row.step, value: row.usual});
+    input.id = name;
     input.setAttribute("aria-label", `${title}, ${row.unit || phrase("as a part of the moment")}`);
-    label.append(make("span", title), value, input, small);
+    input.setAttribute("aria-describedby", "shows");
+    label.append(make("span", title), input, value);
     by("quantities").append(label);
+    for (const kind of ["focusin", "pointerenter"]) label.addEventListener(kind, () => write("shows", phrase(row.shows)));
     const decimals = row.step < 0.01 ? 3 : row.step < 0.1 ? 2 : 1;
     let wait = 0;
     input.addEventListener("input", () => {
@@ -131,29 +132,69 @@ export function openPractice(about, command, run, isOwn, allowed) {
     };
   });
   const names = Object.keys(about.what_if);
+  write("shows", phrase(about.what_if[names[0]].shows));
   by("usual").addEventListener("click", () => send("change the bench"));
+
+  // the three tabs: arrow keys go from one to the next
+  const tabs = [...document.querySelectorAll("[role=tab]")];
+  function turnTo(chosen) {
+    for (const tab of tabs) {
+      const is = tab === chosen;
+      put(tab, {ariaSelected: String(is), tabIndex: is ? 0 : -1});
+      put(by(tab.getAttribute("aria-controls")), {hidden: !is});
+    }
+  }
+  tabs.forEach((tab, k) => {
+    tab.addEventListener("click", () => turnTo(tab));
+    tab.addEventListener("keydown", ({key}) => {
+      const next = {ArrowRight: k + 1, ArrowLeft: k - 1, Home: 0, End: -1}[key];
+      if (next === undefined) return;
+      turnTo(tabs.at(next % tabs.length));
+      tabs.at(next % tabs.length).focus();
+    });
+  });
+
+  let needed = "";
+  /** Mark the control that the step or the task needs; a task brings it into view, too. */
+  function need(id, isOfTask) {
+    if (id === needed) return;
+    by(needed)?.classList.remove("needed");
+    by(needed = id)?.classList.add("needed");
+    if (!isOfTask) return;
+    const panel = by(id)?.closest("[role=tabpanel]");
+    if (panel) turnTo(tabs.find((tab) => tab.getAttribute("aria-controls") === panel.id));
+    by(id)?.scrollIntoView({block: "nearest"});
+  }
 
   // tasks
   const tasks = Object.fromEntries(about.tasks.map((row) => {
     const item = make("li"), button = make("button", phrase(row.title));
+    button.title = phrase(row.does);
     button.addEventListener("click", () => send("begin a task", {task: row.name}));
     item.append(button);
     by("task-list").append(item);
     return [row.name, {...row, item}];
   }));
   by("leave-task").addEventListener("click", () => send("begin a task"));
-  let shownTask = "";
-  function showTask(bench) {
-    const row = tasks[bench.task];
-    put(by("task"), {hidden: !row});
-    put(by("guide"), {hidden: Boolean(row)});
-    put(by("task"), {inert: !allowed});
+  by("next-task").addEventListener("click", () => send("begin a task", {task: by("next-task").value}));
+  let shownTask = "", reached = "";
+
+  /** Show the task under way, else the first steps, and after those, or a task, the next one. */
+  function showTask(bench, isGuided) {
+    const row = tasks[bench.task], next = about.tasks.find(({name}) => !bench.tasks_done.includes(name));
+    if (shownTask && !row) reached = bench.tasks_done.includes(shownTask) ? shownTask : "";
+    put(by("task"), {hidden: !row, inert: !allowed});
+    put(by("guide"), {hidden: Boolean(row) || !isGuided});
+    put(by("offer"), {hidden: Boolean(row) || !(reached || !isGuided && next), inert: !allowed});
+    write("offer-text", reached ? `✓ ${phrase(tasks[reached].title)}: ${phrase(tasks[reached].teaches)}` : phrase("These were the first steps. Now a task:"));
+    put(by("next-task"), {hidden: !next, value: next?.name ?? "", textContent: next ? phrase(next.title) : ""});
     put(by("task-share"), {value: bench.task_share});
     write("tasks-done", bench.tasks_done.length ? phrase("{done} of {all} done", {done: bench.tasks_done.length, all: about.tasks.length}) : "");
     for (const [name, {item}] of Object.entries(tasks)) put(item, {className: bench.tasks_done.includes(name) ? "done" : ""});
     if (bench.task === shownTask) return;
     shownTask = bench.task;
     if (!row) return;
+    reached = "";
     write("task-title", phrase(row.title));
     write("task-does", phrase(row.does));
     const answers = Object.entries(row.answers);
@@ -163,7 +204,6 @@ export function openPractice(about, command, run, isOwn, allowed) {
       button.addEventListener("click", () => send("answer", {value}));
       return button;
     }));
-    by("task").scrollIntoView({block: "nearest"});
   }
 
   /** Say what the chosen experiment finds out, and how long it takes at the present speed of the bench. */
@@ -176,17 +216,9 @@ export function openPractice(about, command, run, isOwn, allowed) {
   for (const id of ["experiment", "speed"]) by(id).addEventListener("change", sayWhatItAsks);
   sayWhatItAsks();
 
-  /** Change a field by a step, within its limits; what is no number stays, and is refused. */
-  function stepBy(id, step) {
-    const field = by(id), value = numberIn(field.value) + step;
-    const {min, max} = field.dataset;
-    if (Number.isFinite(value)) field.value = fixed(Math.min(Math.max(value, Number(min)), Number(max)), 2);
-    field.dispatchEvent(new Event("change"));
-  }
-
   /** Tune by a step, as with the keys. */
   function step(hz) {
-    if (!by("controls").disabled) stepBy("frequency", hz);
+    if (!by("controls").disabled) fields.frequency.stepBy(hz);
   }
 
   function press(id, on, text) {
@@ -204,7 +236,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
       now.elsewhere = elsewhere;
     }
     now.bench = elsewhere ? now.bench || bench : bench;
-    guide(now.bench, about_run, readings);
+    const steps = guide(now.bench, about_run, readings);
     if (elsewhere) return;
     const {drive} = bench;
     Object.assign(now, {drive: Boolean(drive?.output), busy: bench.busy, paused: bench.paused});
@@ -215,29 +247,23 @@ export function openPractice(about, command, run, isOwn, allowed) {
     for (const id of ["drive", "match", "back", "frequency", "frequency-slider", "amplitude", "amplitude-slider", "experiment", "group", "seed"]) {
       put(by(id), {disabled: now.busy});
     }
-    if (bench.seed !== now.seed) put(by("seed"), {value: String(now.seed = bench.seed)});  // else a person may be typing
+    if (bench.seed !== now.seed) seed.set(String(now.seed = bench.seed));  // else a person may be typing
     names.forEach((name, k) => knobs[k].show(bench.what_if[name]));
-    showTask(bench);
-    for (const part of ["what-if", "tasks"]) put(by(part), {inert: now.busy});
+    showTask(bench, Boolean(steps));
+    need(now.busy ? "" : tasks[bench.task]?.needs ?? (down && steps && steps !== "analyze" ? "back" : steps), Boolean(bench.task));
+    for (const part of ["what-if", "tasks", "offer"]) put(by(part), {inert: now.busy || !allowed});
     put(by("analyze"), {disabled: now.busy || !readings || about_run?.status === "running"});
-    if (drive && !timer && document.activeElement !== by("frequency") && document.activeElement !== by("frequency-slider")) {
-      follow("frequency", drive.frequency_hz, 2);
+    if (drive) {
+      fields.frequency.follow(drive.frequency_hz);
+      fields.amplitude.follow(drive.amplitude_vpp);
     }
-    if (drive && !timer && !/^amplitude/.test(document.activeElement?.id)) follow("amplitude", drive.amplitude_vpp, 2);
     if (bench.speed && bench.speed !== now.speed) {
       choose(by("speed"), now.speed = bench.speed);
       sayWhatItAsks();
     }  // else it may just be chosen
   }
 
-  function follow(id, value, decimals) {
-    if (!(value > 0) || by(id).getAttribute("aria-invalid") === "true") return;  // what is wrong stays beside its message
-    const text = String(Number(value.toFixed(decimals)));
-    if (by(id).value === local(text)) return;
-    put(by(id), {value: local(text)});
-    by(`${id}-slider`).value = text;
-  }
-
+  /** Tick the steps that are done.  Returns the control that the next one needs; "" where all are done. */
   function guide(bench, run_now, readings) {
     const name = run(), recorded = Boolean(run_now) && run_now.status !== "running" && readings > 0 && isOwn(name);  // by this bench
     const done = {
@@ -248,6 +274,10 @@ export function openPractice(about, command, run, isOwn, allowed) {
       put(item, {className: k <= last ? "done" : k === last + 1 ? "now" : ""});
       put(item, {ariaCurrent: item.className === "now" ? "step" : null});
     });
+    const off = Math.abs(bench.drive?.frequency_hz - bench.last.spin_frequency_hz);
+    const needs = {drive: now.matched && off < CATCHES_HZ ? "drive" : "match", tune: "frequency", record: "record", analyze: "analyze", report: "analyze"};
+    now.learned ||= last === items.length - 1;  // the next run brings the steps not back
+    return now.learned ? "" : needs[items[last + 1].dataset.step];
   }
 
   async function openResult(name) {

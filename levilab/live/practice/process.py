@@ -373,6 +373,8 @@ class PracticeProcess:
         if hid:
             self._usual_scene = self._scene_of_seed(self._options.scene)
             self._change(dict(USUAL))
+            if not self._floats():
+                self._put_back()
 
     def _scene_of_seed(self, name: str) -> Scene:
         """Return a scene with what the seed makes of it."""

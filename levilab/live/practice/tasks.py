@@ -46,6 +46,7 @@ class Task:
     Attributes:
         title, does: the goal, and what to do.
         teaches: said once it is reached.
+        needs: the control of the page that it begins with.
         holds: whether the goal is there at a moment.
         for_s: how long it has to be there without a break [s].
         hidden: what the bench changes, and does not say: keys of a scene by a random number from 0 to 1.
@@ -55,6 +56,7 @@ class Task:
     title: str
     does: str
     teaches: str
+    needs: str
     holds: Callable[[Look], bool]
     for_s: float = 0.0
     hidden: Callable[[float], dict[str, Any]] = lambda _: {}
@@ -84,28 +86,28 @@ TASKS: dict[str, Task] = {
     "catch": Task(
         "Catch it", "Let the drive take hold of the top: match the spin, then drive on.",
         "a drive holds a top only near its own spin, since the torque must not change its sense in every turn",
-        lambda look: look.is_held,
+        "match", lambda look: look.is_held,
     ),
     "hold": Task(
         "Hold it for three minutes", "A free top is down after 90 s. Keep this one up, with a drive that holds it.",
         "the drive gives back what the air takes: the tape lags behind it until the two are equal",
-        lambda look: look.is_held, for_s=180.0,
+        "drive", lambda look: look.is_held, for_s=180.0,
     ),
     "mass": Task(
         "Find the mass that floats", "This top is too heavy by some tenths of a gram. Take washers off (What if), and "
         "put it back, until it floats for 20 s.",
         "of 25 g only some tenths are free: field and weight balance at a height at which the field also holds the top",
-        lambda look: look.floats, for_s=20.0, hidden=_mass,
+        "washers_g", lambda look: look.floats, for_s=20.0, hidden=_mass,
     ),
     "fast": Task(
         "Reach 57 Hz", "Take the top up with the drive. At 0.1 Hz/s it is lost near 57 Hz: more slowly it goes on.",
         "the air takes the more the faster the top spins, and a ramp takes its part of the drive's torque, too",
-        lambda look: look.is_held and (look.spin_hz or 0.0) >= 57.0,
+        "frequency", lambda look: look.is_held and (look.spin_hz or 0.0) >= 57.0,
     ),
     "guess": Task(
         "Guess n", "The drag goes as ω to the n. Watch the top slow down in air of another kind, and say n.",
         "with n = 1 the spin halves in equal times; the higher n, the more the curve flattens; a fit tells best",
-        lambda look: look.answer is not None, hidden=_law,
+        "answers", lambda look: look.answer is not None, hidden=_law,
         answers={"n = 1": 1.0, "n = 3/2": 1.5, "n = 2": 2.0},
     ),
 }  # fmt: skip

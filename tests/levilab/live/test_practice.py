@@ -53,6 +53,8 @@ QUICK = ("spin.drive_frequency_hz=31", "spin.drive_waveform=SQU", "spin.ramp_hz_
 #: A top that another program's bench publishes.
 POSE = Poses(7.0, 1 / 400, np.full((1, 3), 0.1), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ones(1, dtype=bool))
 #: The steps of the guide that are ticked.
+#: The control that the page marks as the next one to use.
+NEEDED = "document.querySelector('.needed')?.id"
 DONE = "[...document.querySelectorAll('#guide .done')].map((one) => one.dataset.step).join()"
 
 
@@ -121,11 +123,19 @@ def record_some_readings(page: Page) -> None:
 
 def type_into_the_fields(page: Page) -> None:
     """Numbers with a comma and with a point are taken; what is no number, or none that is allowed, is refused."""
-    for typed, said in (("333", "from 1 to 100, not 333"), ("3o,5", "a number from 1 to 100, not 3o,5")):
-        page.fill("#frequency", typed)
+    for field, typed, said in (
+        ("frequency", "333", "from 1 to 100, not 333"),
+        ("frequency", "3o,5", "a number from 1 to 100, not 3o,5"),
+        ("seed", "1.5", "a whole number from 0 to 999999999, not 1.5"),
+    ):
+        page.fill(f"#{field}", typed)
         page.keyboard.press("Enter")
-        until(page, f"document.getElementById('frequency-wrong').textContent === '{said}'")
-        assert page.get_attribute("#frequency", "aria-invalid") == "true"
+        until(page, f"document.getElementById('{field}-wrong').textContent === '{said}'")
+        page.evaluate("document.activeElement.blur()")
+        frames = page.evaluate("levilab.frames")
+        until(page, f"levilab.frames > {frames} + 2")
+        assert page.get_attribute(f"#{field}", "aria-invalid") == "true"
+        assert page.input_value(f"#{field}") == typed  # and not what the bench has
     for typed, vpp in (("9,5", 9.5), ("9.75", 9.75)):
         page.fill("#amplitude", typed)
         page.keyboard.press("Enter")
@@ -136,18 +146,24 @@ def type_into_the_fields(page: Page) -> None:
 
 
 def change_what_if(page: Page) -> None:
-    """A slider has its effect at once; the task under way stands in the place of the guide."""
+    """A slider has its effect at once; the task under way takes the guide's place, and opens what it needs."""
     slider = "document.querySelector('#quantities input')"
     assert page.locator("#quantities input").count() == len(WHAT_IF)
     page.evaluate(f"{slider}.value = 0.02, {slider}.dispatchEvent(new Event('input'))")
     until(page, "levilab.data.bench.what_if.washers_g === 0.02")
     page.evaluate("document.getElementById('usual').click()")
     until(page, f"levilab.data.bench.what_if.washers_g === 0 && {slider}.value === '0'")
-    page.click("#tasks summary")
+    page.get_by_role("tab", name="Measure").press("ArrowLeft")  # the last one
     page.get_by_role("button", name="Hold it for three minutes").click()
     until(page, "document.getElementById('guide').hidden && document.getElementById('task-share').value > 0")
+    assert page.evaluate(NEEDED) == "drive"
+    page.get_by_role("button", name="Find the mass that floats").click()
+    until(page, f"{NEEDED} === 'washers_g' && document.activeElement.offsetParent === null")  # its tab is open
+    assert page.locator("#washers_g").is_visible()
     page.click("#leave-task")
     until(page, "!document.getElementById('guide').hidden && document.getElementById('task').hidden")
+    until(page, "levilab.data.up && levilab.data.bench.last.spin_frequency_hz > 25")  # the usual one floats again
+    page.get_by_role("tab", name="Measure").click()
 
 
 #: Another top is drawn while the motion stands still and its poses, a tenth of a millimetre apart, have begun anew.
@@ -270,6 +286,43 @@ def test_nothing_can_be_pressed_before_the_bench_is_there(starting: Hall, watche
     assert counter < practice
     starting.watches[""].clock = lambda: time.monotonic() + 2 * SILENT_AFTER_S
     until(page, "document.body.dataset.state === 'slow'")  # and not silent: it has not ended
+
+
+#: Whether the panel of each tab is seen whole, without a scroll of the page or of its part.
+SEEN_WHOLE = """() => [...document.querySelectorAll('[role=tab]')].map((tab) => {
+  tab.click();
+  const panel = document.getElementById(tab.getAttribute('aria-controls')).getBoundingClientRect();
+  const part = document.getElementById('practice');
+  return panel.height > 60 && panel.bottom <= innerHeight && panel.right <= innerWidth
+    && part.scrollHeight <= part.clientHeight;
+})"""
+#: Whether the counter's number and the picture of the top are in view, once the last control is.
+STAYS_IN_VIEW = """() => {
+  document.getElementById('task-list').lastElementChild.scrollIntoView({block: 'end'});
+  return ['spin-value', 'space'].map((id) => {
+    const {top, bottom, left, right} = document.getElementById(id).getBoundingClientRect();
+    const over = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
+    return top >= 0 && bottom <= innerHeight && over.closest('#counter, #top') !== null;
+  });
+}"""
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "whole"), [(1280, 800, True), (1024, 768, True), (390, 844, True), (640, 400, False)]
+)
+def test_controls_and_top_are_seen_together(
+    starting: Hall, watched: Callable[..., Page], width: int, height: int, whole: bool
+) -> None:
+    """640 × 400 is a window of 1280 × 800 at a zoom of 200 %: there the controls scroll beside the top."""
+    page = watched(viewport={"width": width, "height": height})
+    page.goto(address(starting, token=True))
+    until(page, "levilab.frames > 0")
+    up = Poses(2.0, 1 / 400, np.full((1, 3), 0.07), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ones(1, dtype=bool))
+    publish(starting.watches[""], State(2.0, last={"spin_frequency_hz": 30.0}, drive=Drive("SQU", 30.0, 10.0)), up)
+    until(page, "!document.getElementById('controls').disabled && levilab.space?.state")
+    assert page.evaluate(SEEN_WHOLE) == 3 * [whole]
+    assert page.evaluate(STAYS_IN_VIEW) == [True, True]
+    assert page.evaluate("document.documentElement.scrollWidth") == width
 
 
 def test_an_axis_has_two_numbers_at_least(starting: Hall, page: Page) -> None:
