@@ -33,6 +33,8 @@ if exist wheelhouse set "FROM=--no-index --find-links wheelhouse"
 rem Python is signed, the levilab.exe that pip makes is not: some computers run the first alone.
 >"%LAUNCHER%" echo @"%%LOCALAPPDATA%%\levilab\Scripts\python.exe" -m levilab %%*
 call "%LAUNCHER%" --version || goto failed
+echo Compiling the simulator for this processor: half a minute.
+"%HOME_OF_IT%\Scripts\python.exe" -m levilab.world || goto failed
 echo Done. Open a new terminal and type:  levilab live --mock
 popd
 exit /b 0

@@ -144,7 +144,11 @@ RULES: tuple[Rule, ...] = (
     ),
     Rule(
         "drive.ramp_hz_per_s",
-        lambda s: s.drive.ramp_hz_per_s == 0 or (s.drive.waveform == "sine" and s.drive.off_s is not None),
+        lambda s: (
+            s.drive.ramp_hz_per_s == 0
+            or s.drive.waveform == "off"
+            or (s.drive.waveform == "sine" and s.drive.off_s is not None)
+        ),
         "a drive with waveform = sine and an end, off_s, is expected with it: steps are made for the frequency there",
     ),
     Rule(
@@ -228,7 +232,7 @@ SWITCHES: tuple[Switch, ...] = (
     Switch(
         "drive",
         lambda s: s.drive.waveform == "off",
-        ("amplitude_t", "frequency_hz", "phase_rad", "direction", "off_s"),
+        ("amplitude_t", "frequency_hz", "phase_rad", "direction", "off_s", "ramp_hz_per_s"),
         "drive.waveform = off; sine, triangle, square, unipolar or triggered switches the drive on",
     ),
     Switch(

@@ -127,7 +127,8 @@ class Flight:
         if scene.observed != "motion":
             raise SceneError(f"observed = {scene.observed}: a scene for the bench is expected to have motion")
         # the tape's place needs the full attitude
-        self._scene = with_attitude(scene.changed({"drive.waveform": "off", "drive.off_s": None}))
+        without_drive = {"drive.waveform": "off", "drive.off_s": None, "drive.ramp_hz_per_s": 0.0}
+        self._scene = with_attitude(scene.changed(without_drive))
         self._put_back_after_s, self._stem_height = put_back_after_s, stem_height_m
         self._pieces: Timeline[_Flying | _Absent] = Timeline(-math.inf, _Absent(-math.inf))
         self._step: float | None = None

@@ -434,6 +434,7 @@ def test_a_drive_without_amplitude_and_a_constant_without_a_law_are_remarked_upo
         ("driven", ["drive.waveform=off", "drive.frequency_hz=29", "drive.off_s=3"], ["frequency_hz = 29.0 and drive"]),
         ("driven", ["drive.frequency_hz=29"], []),
         ("driven", ["drive.waveform=off"], []),
+        ("ramp", ["drive.waveform=off"], ["drive.ramp_hz_per_s = 0.05 do nothing: drive.waveform = off;"]),
         ("undriven", ["drag.coefficient=0.003"], ["drag.coefficient = 0.003 does nothing: drag.law = none;"]),
         ("friction", ["drag.law=none"], []),
         ("undriven", ["washers.drag_share=0.5"], ["washers.drag_share = 0.5 does nothing: washers.inertia_kg_m2 = 0;"]),

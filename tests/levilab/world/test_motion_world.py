@@ -15,11 +15,14 @@ from instruments.virtual.generator.voltage import fundamental
 from levilab.acquisition.triggering import response
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator import SceneError, preset, simulate
+from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.field import flux_density
 from levilab.simulator.kernels.motion import L, N, R
 from levilab.simulator.model import base_field
 from levilab.simulator.parts import Top
+from levilab.simulator.scene import presets
 from levilab.simulator.start import start_of
+from levilab.world.__main__ import compile_kernels
 from levilab.world.base import Base
 from levilab.world.bursts import TriggerWire, mean_pull
 from levilab.world.flight import RATE, SAMPLED, Flight, _cubic
@@ -55,6 +58,16 @@ def expected_turns(motion):
     along = x * to_spot[:, 0] + y * to_spot[:, 1]
     across = to_spot[:, 0] * y - to_spot[:, 1] * x
     return np.angle(along + 1j * across) / TURN
+
+
+def test_an_installer_compiles_the_kernels_that_the_bench_and_simulations_need():
+    compile_kernels()  # each shipped scene, also one whose drive has a ramp, which the bench's generator replaces
+    compiled = []
+    with announce_compilation(compiled.append):
+        for scene in map(preset, presets()):
+            simulate(scene, 0.05)
+            MotionWorld(scene, VirtualClock()).light(0.0, 1e-3, 10)
+    assert compiled == []
 
 
 # --- the flight ---
