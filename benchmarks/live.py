@@ -2,7 +2,7 @@
 
 A bench for practice at its own speed, and a page of 1280 × 800 in a headless browser without a graphics card; then a
 page that shows a million readings that go on growing.  CPU time is that of the server, of the browser's renderer and of
-its GPU process, which draws in software here.  `--write` puts the table into docs/live.md.
+its GPU process, which draws in software here.  `--write` keeps the table in results/live.md.
 """
 
 from __future__ import annotations
@@ -22,8 +22,6 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT)]
 
 from support.browser import DESK, FLAGS, executable  # noqa: E402
 from support.live_pages import GrowingRun, address, serving, until  # noqa: E402
-
-BEGIN, END = "<!-- measured -->", "<!-- end -->"
 
 
 def processes(root: int) -> dict[str, float]:
@@ -64,7 +62,7 @@ def measure(page, seconds: float, server) -> dict[str, float]:
 def main() -> None:
     options = argparse.ArgumentParser(description=__doc__)
     options.add_argument("--seconds", type=float, default=20.0)
-    options.add_argument("--write", action="store_true", help="into docs/live.md")
+    options.add_argument("--write", action="store_true", help="into results/live.md")
     chosen = options.parse_args()
     from playwright.sync_api import sync_playwright
 
@@ -81,9 +79,7 @@ def main() -> None:
     table = "\n".join([*lines, "", f"{os.cpu_count()} cores, load {load} at the end."])
     print(table)
     if chosen.write:
-        page = ROOT / "docs" / "live.md"
-        before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)
-        page.write_text(f"{before}{BEGIN}\n{table}\n{END}{rest.partition(END)[2]}", encoding="utf-8")
+        (ROOT / "benchmarks/results/live.md").write_text(f"{table}\n", encoding="utf-8")
 
 
 def practice(browser, out: Path, seconds: float) -> dict[str, float]:

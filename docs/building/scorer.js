@@ -8,6 +8,7 @@ var Scorer = {
     microphone: "sound-card", "sound card": "sound-card", jupyter: "notebook", python: "notebook", grading: "class",
     students: "class", windows: "install", oscilloscope: "instruments/oscilloscope", washers: "experiments/washers",
     pdf: "report", tutorial: "tutorial", wav: "open-my-file", mp3: "open-my-file", film: "video", animation: "animation",
+    lock: "glossary", locked: "glossary",
   },
   score: ([page, title, anchor, description, score, file]) => {
     const typed = (new URLSearchParams(location.search).get("q") || "").trim().toLowerCase();
@@ -15,7 +16,7 @@ var Scorer = {
     if (typed && !anchor && title.toLowerCase().includes(typed)) score += 100;
     if (/^(decisions\/|reference\/|speed$|mutants$|fuzzing$|contributing$|changes$)/.test(page)) return 0.2 * score;
     if (/^(reproduce$)/.test(page)) return 0.4 * score;
-    if (/^(data|install|bench|experiments\/|report|notebook)/.test(page)) return 1.5 * score;
+    if (/^(data|install|bench|experiments\/|messages|report|notebook)/.test(page)) return 1.5 * score;
     return score;
   },
   objNameMatch: 11,

@@ -7,7 +7,7 @@ import pytest
 
 from support.paths import DOCS, ROOT
 
-QUOTED = re.findall(r"^\| \*(.+?)\* \|", (DOCS / "messages.md").read_text(encoding="utf-8"), re.MULTILINE)
+QUOTED = re.findall(r"^### (.+)$", (DOCS / "messages.md").read_text(encoding="utf-8"), re.MULTILINE)
 
 
 def as_printed(node):

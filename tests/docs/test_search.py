@@ -1,14 +1,17 @@
 """What people type into the search of the site, and the page that comes first; `make site` runs it on the new site."""
 
+import re
 import threading
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from urllib.parse import quote
 
 import pytest
 
-from support.paths import ROOT
+from support.paths import DOCS, ROOT
 
 SITE = ROOT / "build/site"
+MESSAGES = re.findall(r"^### (.+)$", (DOCS / "messages.md").read_text(encoding="utf-8"), re.MULTILINE)
 #: What is typed → one of these pages is the first.
 QUERIES = {
     "phyphox": ("phone",),
@@ -33,6 +36,15 @@ QUERIES = {
     "jupyter": ("notebook",),
     "animation": ("animation",),
     "first experiment": ("tutorial",),
+    "lock": ("glossary",),
+    "Präzession": ("tutorial-de", "glossary"),
+}
+#: The same, and one of these pages is among the first two.
+AMONG_TWO = {
+    "precession phone": ("video", "phone"),
+    **dict.fromkeys(MESSAGES, ("messages",)),
+    "no answer to counter within 2 s": ("messages",),
+    "the top did not follow the drive to 40 Hz": ("messages",),
 }
 
 
@@ -62,10 +74,21 @@ def site():
         server.shutdown()
 
 
-@pytest.mark.parametrize("words", QUERIES)
-def test_the_search_finds_what_people_type(site, page, words):
-    page.goto(f"{site}/search.html?q={words.replace(' ', '+')}")
+def found(site, page, words):
+    """The pages that the search finds, each once, in their order."""
+    page.goto(f"{site}/search.html?q={quote(words)}")
     page.wait_for_selector("#search-results .search-summary:has-text('found')")
     page.wait_for_selector("#search-results ul.search li a")
-    first = page.locator("#search-results ul.search li a").first.get_attribute("href") or ""
-    assert first.partition(".html")[0] in QUERIES[words]
+    links = page.locator("#search-results ul.search li a")
+    addresses = links.evaluate_all("links => links.map(link => link.getAttribute('href'))")
+    return list(dict.fromkeys(address.partition(".html")[0] for address in addresses))
+
+
+@pytest.mark.parametrize("words", QUERIES)
+def test_the_search_finds_what_people_type(site, page, words):
+    assert found(site, page, words)[0] in QUERIES[words]
+
+
+@pytest.mark.parametrize("words", AMONG_TWO)
+def test_the_search_finds_messages_and_words_together(site, page, words):
+    assert set(found(site, page, words)[:2]) & set(AMONG_TWO[words])
