@@ -5,18 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from levilab.acquisition.loop import acquire
-from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.errors import LevilabError
-from levilab.present.progress import Display
 
 if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
     from analysis.uncertainty import Estimate
-    from levilab.acquisition.loop import AcquisitionRequest
-    from levilab.runs.run import Run
 
 
 class TrialFailed(LevilabError):
@@ -73,30 +68,6 @@ class Subject:
     trial: Callable[[int, Path], list[Pull]]
     trials: int = 40
     freedom: int | None = None
-
-
-def acquire_mock(
-    experiment: str,
-    seed: int,
-    folder: Path,
-    change: Callable[[AcquisitionRequest], AcquisitionRequest],
-    *,
-    counter: str | None = None,
-    scope: str | None = None,
-) -> Run:
-    """Return a finished run of a mock experiment.
-
-    change: puts it into a world of known numbers; counter, scope: in place of the bench's.
-
-    Raises TrialFailed; KeyboardInterrupt where Ctrl-C ended the run: it is meant for the whole cross-check.
-    """
-    options = AcquisitionOptions(mock=True, counter=counter, scope=scope, out=folder, seed=seed)
-    run = acquire(change(request_for(experiment, options)), Display())
-    if run.status == "interrupted":
-        raise KeyboardInterrupt
-    if run.status != "finished":
-        raise TrialFailed(f"{run.folder.name}: the run is {run.status}")
-    return run
 
 
 def pull_of(quantity: str, found: Estimate | None, truth: float) -> Pull:

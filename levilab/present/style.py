@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 #: Widths of figures [inches]: one column of a journal, and two.
 NARROW, WIDE = 3.4, 7.0
+#: Height of a wide figure beyond which it does not fit with its caption on a page, and is made smaller [inches].
+TALLEST = 8.4
 
 
 def _sheet() -> dict[str, Any]:

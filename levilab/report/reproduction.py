@@ -58,14 +58,14 @@ class Asked:
 
 def reproduction(
     results: Sequence[tuple[Analysis[Any], Any]], asked: Asked | None = None, *, short: bool = False
-) -> Section:
-    """Return the section at the end of a report of measurements.  short: whether it names the commands alone."""
+) -> Block:
+    """Return the section at the end of a report of measurements; of a short one the command that made it."""
     asked = asked or Asked()
     sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
+    if short:
+        return Note(f"Made by: {asked.command(sources)}")
     many = len(sources) > _MOST_NAMED
     data = (_data(sources), *_recording(sources))
-    data = () if short else data
-    inputs: tuple[Block, ...] = (Details("The data", data, more=f"{len(sources)} inputs"),) if many and data else data
     return Section(
         "How to reproduce this",
         (
@@ -75,7 +75,7 @@ def reproduction(
             ),
             Code("\n".join([*_commands(results, asked.paths), asked.command(sources)])),
             *_others(results),
-            *inputs,
+            *((Details("The data", data, more=f"{len(sources)} inputs"),) if many else data),
             Facts((Fact("Versions here", (_versions(software_versions()),)),)),
         ),
         anchor="reproduce",

@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquire_mock, pull_of
+from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.formats.device import Device
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import FieldOptions

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.acquisition.table import settings_of
-from levilab.crosscheck.subject import Pull, Subject, acquire_mock, pull_of
+from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.subject import Pull, Subject, pull_of
 from levilab.crosscheck.subjects.spindown import draw_scene, in_world
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.simulator.spin import DECAYS

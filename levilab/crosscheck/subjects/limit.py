@@ -10,7 +10,8 @@ import numpy as np
 
 from analysis.locked import Cause
 from levilab.acquisition.table import settings_of, with_settings
-from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquire_mock, pull_of
+from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.crosscheck.subjects.spindown import draw_scene, in_world
 from levilab.pipelines.catalogue import ANALYSES
 

@@ -11,7 +11,8 @@ import numpy as np
 from analysis.spindown.tilt import DRIVEN
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
-from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquire_mock, pull_of
+from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.crosscheck.subjects.spindown import spindown_of
 from levilab.simulator.kernels.motion import R
 from levilab.simulator.scene import Scene, preset

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from levilab.crosscheck.subject import Pull, Subject, acquire_mock, pull_of
+from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.subject import Pull, Subject, pull_of
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.precession.words import intercept_of, slope_of
 

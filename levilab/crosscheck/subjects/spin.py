@@ -10,7 +10,8 @@ import numpy as np
 
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
-from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquire_mock, pull_of
+from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.runs.waveforms import run_waveforms
 from levilab.simulator.laws import LAWS

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from instruments.clock import VirtualClock
-from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquire_mock, pull_of
+from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.simulator.laws import LAWS
 from levilab.simulator.scene import Scene

@@ -13,7 +13,7 @@ from levilab.pipelines.limit.analysis import LOWER_EDGE, RESONANCE, UPPER_EDGE
 from levilab.present.drawing import SMALL, headline, panel, synthetic_mark
 from levilab.present.looks import BLACK, GREEN, GREY, LOOKS, MARKERS, ORANGE, PURPLE, SKY, VERMILION, YELLOW
 from levilab.present.numbers import with_uncertainty
-from levilab.present.style import STYLE, WIDE, label_of_run
+from levilab.present.style import STYLE, TALLEST, WIDE, label_of_run
 from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
@@ -33,6 +33,8 @@ _THEORY = {LOWER_EDGE: (VERMILION, "--"), UPPER_EDGE: (VERMILION, "--"), RESONAN
 _NEAR = 2.5
 #: Above a panel, a panel, below it for the axis, and for a line of the legend there; what stands above all [inch].
 _ABOVE, _PANEL, _BELOW, _LINE, _HEAD = 0.5, 2.2, 0.5, 0.155, 0.42
+#: Of many conditions the panels are lower, so that the figure is as wide as a page, but no lower than this [inch].
+_LOWEST = 1.1
 #: Left edges and widths of the limits and of their distribution [inch].
 _LEFT, _WIDTH, _BESIDE, _NARROW = 0.7, 4.7, 5.55, 1.35
 #: Bins of the distribution, a scatter from the mean on either side, and fewer limits than this have none.
@@ -43,16 +45,17 @@ def limit_figure(analysis: LimitAnalysis) -> Figure:
     """Draw for each of the conditions the limits top by top with mean, scatter and theory, and their distribution."""
     with mpl.rc_context(STYLE):
         legends = [_legend_lines(group) for group in analysis.groups]
-        height = _HEAD + sum(_ABOVE + _PANEL + _BELOW + _LINE * lines for lines in legends)
-        figure = Figure(figsize=(WIDE, height))
+        around = _HEAD + sum(_ABOVE + _BELOW + _LINE * lines for lines in legends)
+        high = min(max((TALLEST - around) / len(legends), _LOWEST), _PANEL)
+        figure = Figure(figsize=(WIDE, around + high * len(legends)))
         headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
         top = _HEAD
         for k, (group, lines) in enumerate(zip(analysis.groups, legends, strict=True)):
-            left = panel(figure, _LEFT, top + _ABOVE, _WIDTH, _PANEL, label=f"limits {k}")
-            right = panel(figure, _BESIDE, top + _ABOVE, _NARROW, _PANEL, label=f"distribution {k}", sharey=left)
-            _draw_limits(left, analysis, group)
+            left = panel(figure, _LEFT, top + _ABOVE, _WIDTH, high, label=f"limits {k}")
+            right = panel(figure, _BESIDE, top + _ABOVE, _NARROW, high, label=f"distribution {k}", sharey=left)
+            _draw_limits(left, high, analysis, group)
             _draw_distribution(right, analysis, group)
-            top += _ABOVE + _PANEL + _BELOW + _LINE * lines
+            top += _ABOVE + high + _BELOW + _LINE * lines
     return figure
 
 
@@ -75,8 +78,8 @@ def _legend_lines(group: Limits) -> int:
     return (entries + 1) // 2
 
 
-def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
-    """Draw the limits of a group top by top."""
+def _draw_limits(axes: Axes, height: float, analysis: LimitAnalysis, group: Limits) -> None:
+    """Draw the limits of a group top by top, in a panel of some height [inch]."""
     found, mean = group.statistics, group.statistics.mean.value or 0.0
     every = _limits(analysis, group)
     start = 1
@@ -117,7 +120,12 @@ def _draw_limits(axes: Axes, analysis: LimitAnalysis, group: Limits) -> None:
     title += "  (SYNTHETIC)" if len(made_up) > 1 and own and not group.told_apart else ""
     axes.set_title(title + "\n" + group.conditions_text, loc="left", fontsize=8)
     axes.legend(
-        loc="upper left", bbox_to_anchor=(-0.09, -0.2), ncols=2, fontsize=SMALL, borderaxespad=0, columnspacing=1.2
+        loc="upper left",
+        bbox_to_anchor=(-0.09, -0.44 / height),
+        ncols=2,
+        fontsize=SMALL,
+        borderaxespad=0,
+        columnspacing=1.2,
     )
 
 

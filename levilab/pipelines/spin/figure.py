@@ -15,7 +15,7 @@ from levilab.pipelines.spin.analysis import MOST_DRAWN
 from levilab.present.drawing import SMALL, band, headline, panel, synthetic_mark, write
 from levilab.present.looks import LOOKS
 from levilab.present.numbers import short_name, with_uncertainty
-from levilab.present.style import STYLE, WIDE
+from levilab.present.style import STYLE, TALLEST, WIDE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -37,8 +37,9 @@ MOST_POINTS = 4000
 #: Turns of the trace that are shown, and the longest part of it that is folded [s].
 TURNS_SHOWN, LONGEST_FOLDED_S = 6, 12.0
 READINGS, PULSES, FIT = LOOKS["readings"].colour, LOOKS["pulses"].colour, LOOKS["fit"].colour
-#: Height of the sentence above all, and of the four panels of an input [inch].
-_HEAD, _EACH = 0.42, 4.35
+#: Height of the sentence above all, of a panel, and of the lowest one, where several inputs share a page; of what is
+#: around a panel, and of the name of an input [inch].
+_HEAD, _PANEL, _LOWEST, _AROUND, _NAME = 0.42, 1.35, 0.72, 0.7, 0.25
 #: Bins of the folded pulse, and of the field of a magnetometer.
 BINS, FOLDED_BINS = 240, 24
 #: Colours of the axes of a magnetometer, which differ in darkness, too.
@@ -61,13 +62,16 @@ def spin_figure(analysis: SpinAnalysis) -> Figure:
     """Draw for each input its trace with the turns, all turns over each other, residuals, and frequency."""
     shown = list(zip(analysis.sources, analysis.runs, strict=True))[:MOST_DRAWN]
     with mpl.rc_context(STYLE):
-        head = _HEAD if len(analysis.runs) > 1 else _HEAD - 0.2
-        figure = Figure(figsize=(WIDE, head + _EACH * len(shown)))
+        several = len(analysis.runs) > 1
+        head = _HEAD if several else _HEAD - 0.2
+        high = min(max(((TALLEST - head) / len(shown) - _NAME) / 2 - _AROUND, _LOWEST), _PANEL)
+        each = 2 * (high + _AROUND) + _NAME
+        figure = Figure(figsize=(WIDE, head + each * len(shown)))
         headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
         for k, (source, run) in enumerate(shown):
-            top = head + _EACH * k
-            panels = [panel(figure, x, top + y, 2.62, 1.35) for y in (0.5, 2.55) for x in (0.72, 4.25)]
-            if len(analysis.runs) > 1:
+            top = head + each * k
+            panels = [panel(figure, x, top + 0.5 + y, 2.62, high) for y in (0.0, high + _AROUND) for x in (0.72, 4.25)]
+            if several:
                 write(figure, 0.1, top, _title(source, run), fontsize=9)
             _draw(panels, source, run, k)
         more = len(analysis.runs) - len(shown)

@@ -92,7 +92,7 @@ def _values(of: Class, quantity: Compared) -> Tabular:
     if of.knows_truth:
         note += f" Red: more than {_FAR:.0f} u from its truth."
     name = f"{of.analysis.name}-{quantity.name.replace('_', '-')}"
-    return Tabular(name, table("", heads, rows, numbers=heads[1:]), note, first_column_wraps=True)
+    return Tabular(name, table("", heads, rows, numbers=heads[1:]), note, first_column_wraps=True, narrow="turn")
 
 
 def truth_text(truth: Estimate | None, estimate: Estimate | None) -> str:

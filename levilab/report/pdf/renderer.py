@@ -49,12 +49,12 @@ LONGEST_WORD = 24
 SHORT_TITLE = 90
 #: Entries up to which an outline has those of the second depth.
 MOST_ENTRIES = 20
-#: The file with the names of the figures that move.
-MOVED = "moved.json"
+#: The file with the size of the letters, and the names of the figures that move.
+SETTING = "setting.json"
+#: Sizes of the letters [pt]: as a rule, and where a last page that ends above its middle is saved by them.
+LARGEST, SMALLER, NEARLY_EMPTY = 10.0, 9.4, 0.5
 #: Height over width from which a figure may leave its place in the text for the top of a page.
 TALL = 0.4
-#: Height over the width of the text beyond which a figure with its caption does not fit on a page.
-TALLEST = 1.2
 #: Of alike warnings so many are printed like the first.
 FEW_ALIKE = 3
 #: What no PDF may contain: code points that are no characters, and those for private use, which no font has.
@@ -93,31 +93,42 @@ def as_pdf(document: Document) -> bytes:
             "pip install --force-reinstall typst, or name the report report.html"
         ) from error
 
-    files: Any = with_places(files_of(document))  # a dictionary of files is missing in the types that typst declares
+    files: Any = settle(files_of(document))  # a dictionary of files is missing in the types that typst declares
     return typst.compile(files, format="pdf", font_paths=fonts(), ignore_system_fonts=True)
 
 
-def with_places(files: dict[str, bytes]) -> dict[str, bytes]:
-    """Return the files, with the figures that do not fit where they are called at the top of the next page.
+def settle(files: dict[str, bytes]) -> dict[str, bytes]:
+    """Return the files with the places of the figures, and in smaller letters where these save a last page."""
+    settled, pages, end = _place_figures(files, LARGEST)
+    if pages > 1 and end < NEARLY_EMPTY:
+        smaller, fewer, _ = _place_figures(files, SMALLER)
+        return smaller if fewer < pages else settled
+    return settled
 
-    The document is set anew after each of them, since one that moves makes room for the text behind it.  Where the
+
+def _place_figures(files: dict[str, bytes], size: float) -> tuple[dict[str, bytes], int, float]:
+    """Return the files, figures that do not fit where they are called at the top of the next page, and the last page.
+
+    The document is set again after each of them, since one that moves makes room for the text behind it.  Where the
     template queries each figure's own place, typst's five attempts do not suffice for several figures.
+
+    Args:
+        files: of the document.
+        size: of its letters [pt].
+
+    Returns:
+        The files, the number of pages, and where the last one ends [parts of its height].
     """
     import typst
 
     moved: list[str] = []
     while True:
-        files = files | {MOVED: json.dumps(moved).encode()}
-        if b'"floats": true' not in files["document.json"]:
-            return files
-        given: Any = files
-        found = typst.query(
-            given, "<places-of-figures>", field="value", one=True, font_paths=fonts(), ignore_system_fonts=True
-        )
-        places: list[tuple[str, int, int]] = json.loads(found)
-        away = [file for file, called, stands in places if stands > called and file not in moved]
+        given: Any = files | {SETTING: json.dumps({"size": size, "moved": moved}).encode()}
+        found = typst.query(given, "<setting>", field="value", one=True, font_paths=fonts(), ignore_system_fonts=True)
+        said = json.loads(found)
+        away = [file for file, called, stands in said["figures"] if stands > called and file not in moved]
         if not away:
-            return files
+            return given, said["pages"], said["end"]
         moved.append(away[0])
 
 
@@ -134,7 +145,7 @@ def files_of(document: Document) -> dict[str, bytes]:
     content = _content(document, drawing)
     template = (resources.files("levilab.report.pdf") / TEMPLATE).read_bytes()
     data = json.dumps(content, allow_nan=False, ensure_ascii=True, sort_keys=True).encode()
-    return {"main.typ": template, "document.json": data, MOVED: b"[]", **drawing.files}
+    return {"main.typ": template, "document.json": data, **drawing.files}
 
 
 @dataclass(frozen=True)
@@ -151,15 +162,10 @@ class _Drawing:
         """Return blocks as data, without those that are not printed."""
         return [drawn for block in blocks if (drawn := _BLOCKS[type(block)](block, self)) is not None]
 
-    def figure(self, picture: Picture, *, floats: bool = True) -> Drawn:
-        """Draw a figure: the name of its file, its format, its width, and whether it may leave its place.
-
-        Args:
-            picture: the block.
-            floats: whether there is text that can stand in its place.
-        """
-        from levilab.present.style import as_pdf as figure_as_pdf  # with matplotlib
-        from levilab.present.style import as_png
+    def figure(self, picture: Picture) -> Drawn:
+        """Draw a figure: the name of its file, its format, its width, and whether it may leave its place."""
+        from levilab.present.style import TALLEST, WIDE, as_png  # with matplotlib
+        from levilab.present.style import as_pdf as figure_as_pdf
 
         drawn = picture.draw()
         kind, data = ("png", as_png(drawn, dpi=200)) if picture.raster else ("pdf", figure_as_pdf(drawn))
@@ -170,8 +176,8 @@ class _Drawing:
         return {
             "file": name,
             "format": kind,
-            "floats": floats and shape > TALL,
-            "width": min(100.0, 100 * TALLEST / shape),
+            "floats": shape > TALL,
+            "width": min(100.0, 100 * TALLEST / WIDE / shape),
         }
 
 
@@ -296,22 +302,18 @@ def _monospace(text: str) -> Text:
 
 
 def _section(block: Section, drawing: _Drawing) -> Drawn:
+    """Return a section; a figure alone stands without a heading, so that text can fill the page before it."""
+    match block.blocks:
+        case (Picture() as picture,):
+            return _picture(picture, drawing)
     return {
         "kind": "section",
         "title": _text(block.title),
         "lead": _text(block.lead),
         "page": block.new_page,
-        "blocks": _inside(block, drawing),
+        "figures": any(isinstance(one, Picture) for one in _all_in(block)),
+        "blocks": drawing.blocks(block.blocks),
     }
-
-
-def _inside(section: Section, drawing: _Drawing) -> list[Drawn]:
-    """Return what stands below a heading, which does not stay behind alone when its only figure leaves."""
-    match section.blocks:
-        case (Picture() as picture,):
-            return [_picture(picture, drawing, floats=False)]
-        case _:
-            return drawing.blocks(section.blocks)
 
 
 def _details(block: Details, drawing: _Drawing) -> Drawn | None:
@@ -373,8 +375,8 @@ def _row(row: Row) -> Drawn:
     return {"kind": row.kind, "cells": [_lines(cell) for cell in row.cells]}
 
 
-def _picture(block: Picture, drawing: _Drawing, *, floats: bool = True) -> Drawn:
-    return drawing.figure(block, floats=floats) | {
+def _picture(block: Picture, drawing: _Drawing) -> Drawn:
+    return drawing.figure(block) | {
         "kind": "picture",
         "title": _text(block.title),
         "stop": "" if block.title.endswith((".", "?", "!")) else ".",

@@ -11,8 +11,9 @@ import pytest
 from analysis.uncertainty import Estimate
 from levilab.crosscheck.catalogue import SUBJECTS
 from levilab.crosscheck.figure import crosscheck_figure
+from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.study import study_world
-from levilab.crosscheck.subject import Pull, Subject, TrialFailed, acquire_mock, pull_of
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.crosscheck.subjects.motion import nutation
 from levilab.crosscheck.table import crosscheck_table, failures_as_text
 from levilab.crosscheck.truth import truth_of

@@ -23,10 +23,11 @@ def test_a_short_one_has_no_more_and_names_the_command_that_makes_it(tmp_path):
     heading = Heading("It's <7>", "Physics lab 2", "A. Kim", "28 November")
     text = write_report(RUNS, tmp_path / "report.html", short=True, heading=heading).read_text(encoding="utf-8")
     page = Page(text)
-    assert page.of_level(2) == ["Result", "Figure", "Notes", "How to reproduce this"]
+    assert page.of_level(2) == ["Result", "Figure", "Notes"]
     assert page.of_level(1) == ["It's <7>"]
     assert "Physics lab 2 · A. Kim · 28 November" in text
     assert "Spin-down of a levitated top: 2 runs" in text
+    assert "Made by: levilab report" in text
     assert "--short --title" in text
     assert "readings.csv" not in text
 

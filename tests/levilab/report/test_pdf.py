@@ -21,7 +21,7 @@ from levilab.present.document.blocks import (
 from levilab.present.style import as_pdf as as_pdf_page
 from levilab.present.tables import table
 from levilab.report.page import write_report
-from levilab.report.pdf.renderer import NoTypst, as_pdf, files_of, fonts, with_places
+from levilab.report.pdf.renderer import NoTypst, as_pdf, files_of, fonts, settle
 from support.commands import command
 from support.documents import drawn, of_all_blocks
 from support.paths import ROOT
@@ -40,14 +40,14 @@ def said_of(document, label):
     """What the typeset document says of itself for tests."""
     import typst
 
-    files = with_places(files_of(document))
+    files = settle(files_of(document))
     return json.loads(
         typst.query(files, f"<{label}>", field="value", one=True, font_paths=fonts(), ignore_system_fonts=True)
     )
 
 
 def pages_of(document):
-    return int(said_of(document, "pages"))
+    return said_of(document, "setting")["pages"]
 
 
 def data_of(document):
@@ -156,18 +156,31 @@ def test_what_is_synthetic_is_marked_on_every_page():
     assert data_of(Document("t", "", ()))["mark"] == ""
 
 
-def test_a_figure_that_stands_alone_below_its_heading_stays_there():
+def test_a_tall_figure_without_words_of_its_own_has_no_heading_and_text_fills_the_page_before_it():
     def tall():
         figure = drawn()
         figure.set_size_inches(7, 12)
         return figure
 
     picture = Picture("p", "", "c", "a", tall)
-    alone, beside = Section("alone", (picture,)), Section("beside", (picture, Note("n")))
-    first, second = data_of(Document("t", "", (alone, beside)))["blocks"]
-    assert first["blocks"][0]["floats"] is False
-    assert second["blocks"][0]["floats"] is True
-    assert first["blocks"][0]["width"] < 100, "it fits on a page with its caption"
+    above, below = Section("Result", (Paragraph("x"),) * 9), Section("Notes", (Note("n"),))
+    document = Document("t", "", (above, Section("Figure", (picture,)), below))
+    _, found, _ = data_of(document)["blocks"]
+    assert (found["kind"], found["floats"]) == ("picture", True)
+    assert found["width"] < 100, "it fits on a page with its caption"
+    (_, notes), (figure,) = said_of(document, "spots")
+    assert (notes[0], figure[0]) == (1, 2)
+
+
+def test_letters_are_smaller_where_that_saves_a_last_page():
+    def said(lines):
+        return said_of(Document("t", "", (Paragraph("x"),) * lines), "setting")
+
+    pages = [said(lines) for lines in range(36, 64, 2)]  # the second page begins, and fills beyond its middle
+    assert {one["pages"] for one in pages} == {1, 2}
+    full = max(k for k, one in enumerate(pages) if one["pages"] == 1)
+    assert pages[full]["end"] > 0.85
+    assert min(one["end"] for one in pages[full + 1 :]) > 0.07
 
 
 def test_without_the_extra_the_message_says_how_to_install_it(tmp_path, monkeypatch):
