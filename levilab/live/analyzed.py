@@ -45,12 +45,12 @@ class Analyses:
     An input is a run folder, or a data file with the words that say on the command line how it is read.
 
     Attributes:
-        running: inputs that are being analyzed.
+        running: inputs that are being analyzed → the command under way, "analyze" or "report".
         failed: input → what the analysis said when it failed.
     """
 
     def __init__(self) -> None:
-        self.running: set[Path] = set()
+        self.running: dict[Path, str] = {}
         self.failed: dict[Path, str] = {}
         self._before: dict[Path, tuple[int, int, int] | None] = {}
         self._processes: set[subprocess.Popen[str]] = set()
@@ -62,7 +62,7 @@ class Analyses:
         """Analyze an input and write its report, if that is not under way; earlier ones stay until then."""
         if path in self.running:
             return
-        self.running.add(path)
+        self.running[path] = "analyze"
         self.failed.pop(path, None)
         place = beside(path)
         files = (place.file(RESULT), place.file(REPORT), *(place.file(name) for name in _figures(place)))
@@ -78,6 +78,7 @@ class Analyses:
                 ["analyze", str(path), *options],
                 ["report", str(path), *options, "--output", str(beside(path).file(REPORT))],
             ):
+                self.running[path] = words[0]
                 status, err = self._run(words)
                 if status:
                     self.failed[path] = err.strip()[-600:] or f"levilab {words[0]} failed"
@@ -90,7 +91,7 @@ class Analyses:
         except (OSError, subprocess.SubprocessError) as error:
             self.failed[path] = str(error)
         finally:
-            self.running.discard(path)
+            self.running.pop(path, None)
 
     def _run(self, words: Sequence[str]) -> tuple[int, str]:
         """Run a command of this program.  Returns its exit status and its messages about failures."""
@@ -132,7 +133,7 @@ class Analyses:
         """
         place = beside(path)
         return {
-            "running": path in self.running,
+            "step": self.running.get(path, ""),
             "failed": self.failed.get(path, ""),
             "figures": [name for name in _figures(place) if self._is_new(place.file(name))],
             "report": REPORT if self._is_new(place.file(REPORT)) else "",

@@ -2,9 +2,10 @@
 
 import {ask, takeToken} from "./connection.js";
 import {takeDrops, takeFiles} from "./drop.js";
+import {numberField} from "./field.js";
 import {drawReadings, sheet} from "./plot.js";
 import {showResult} from "./result.js";
-import {by, local, make, numberIn, option, phrase, turnLanguage, write} from "./words.js";
+import {by, make, option, phrase, turnLanguage, write} from "./words.js";
 
 /** Least height of a small plot [px]. */
 const PLOT_PX = 240;
@@ -75,7 +76,7 @@ function show() {
   by("channel").replaceChildren(...look.channels.map((name) => option(name)));
   by("channel").closest("label").hidden = look.channels.length < 2;
   by("channel").selectedIndex = Math.max(0, look.runs[0]?.columns.findIndex(({quantity}) => quantity === "signal") ?? 0);
-  by("rate").value = look.rate === null ? "" : local(String(Number(look.rate.toPrecision(9))));
+  rate.set(look.rate === null ? "" : String(Number(look.rate.toPrecision(9))));
   const notes = [...new Set(look.runs.flatMap(({warnings}) => warnings))];
   by("notes").replaceChildren(...notes.map((text) => make("li", inWords(text))));
   const asks = look.runs.some(({problem, doubts}) => problem && doubts.length);
@@ -197,11 +198,7 @@ function change(column, run, {quantity, unit}) {
 }
 
 by("channel").addEventListener("change", () => correct({...optionsNow(), channel: by("channel").value}));
-by("rate").addEventListener("change", () => {
-  const rate = numberIn(by("rate").value);
-  if (rate > 0) correct({...optionsNow(), rate});
-  else write("problem", phrase("samples a second: a number above 0, not {seen}", {seen: by("rate").value}));
-});
+const rate = numberField("rate", (value) => correct({...optionsNow(), rate: value}));
 by("again").addEventListener("click", () => correct({}));
 by("keep").addEventListener("click", async () => {
   const {kept, error} = await ask({do: "keep", file: look.file}, token);
@@ -222,6 +219,10 @@ by("files").addEventListener("change", () => open(by("files").value));
 by("chosen").addEventListener("change", async () => {
   await takeFiles(by("chosen").files, token, open, (text) => write("said", text));
   by("chosen").value = "";
+});
+
+by("samples").addEventListener("click", async ({target: {value: name}}) => {
+  if (name) await takeFiles([new File([await (await fetch(`page/${name}`)).blob()], name)], token, open, (text) => write("said", text));
 });
 
 // --- the small plot ---

@@ -1,10 +1,14 @@
-// What an analysis says, as it comes: verdict, notes, figures and the link to the report.
+// What an analysis says, always in one order: its sentences, figures, notes, and the link to the report.
 
 import {GONE, read} from "./connection.js";
-import {LANGUAGE, by, make, phrase, write} from "./words.js";
+import {LANGUAGE, by, make, phrase, put, write} from "./words.js";
+
+/** What is under way, by the step that the server names; "" once all is there. */
+const STEPS = {analyze: phrase("Analyzing…"), report: phrase("The report is being written…"), "": ""};
 
 /**
- * Ask for an analysis, and show its answer in the elements "verdict", "figures", "report" and "writing".
+ * Ask for an analysis, and show its answer in the elements "verdict", "figures", "notes" and "report".  Nothing is shown
+ * before it is whole: sentences, figures and notes once the analysis is over, the link once the report is written.
  *
  * @param {() => Promise<string>} begin asks for it; what is wrong, or "".
  * @param {string} at address of the input on the server.
@@ -12,35 +16,38 @@ import {LANGUAGE, by, make, phrase, write} from "./words.js";
  * @param {() => void} analyzed is called once there is an answer.
  */
 export async function showResult(begin, at, wanted, analyzed) {
-  by("verdict").replaceChildren(make("p", phrase("Analyzing…")));
-  by("figures").replaceChildren();
-  by("report").hidden = true;
-  write("writing", "");
+  const clear = (texts, step) => {
+    by("verdict").replaceChildren(...texts.map((text) => make("p", text)));
+    for (const id of ["figures", "results-notes"]) by(id).replaceChildren();
+    put(by("report"), {hidden: true});
+    say(step);
+  };
+  clear([], "analyze");
   const wrong = await begin();
-  if (wrong) return say(wrong);
-  for (;;) {
+  if (wrong) return clear([wrong], "");
+  for (let isShown = false; ;) {
     await new Promise((go) => { setTimeout(go, 400); });
     const found = await read(`${at}/analysis?language=${LANGUAGE}`);
     if (!wanted()) return;
-    if (!found) return say(GONE);
-    if (found.running && !found.verdict?.length) continue;
-    if (found.failed) return say(found.failed);
-    analyzed();
-    by("verdict").replaceChildren(
-      ...(found.verdict || []).map((text) => make("p", text)), ...(found.warnings || []).map((text) => make("p", phrase("Note: {text}", {text}), "note")));
-    if (!by("figures").children.length) by("figures").replaceChildren(...found.figures.map((figure) => {
-      const image = make("img");
-      image.src = `${at}/${figure}?${Date.now()}`;
-      image.alt = phrase("figure of the {analysis} analysis", {analysis: found.analysis});
-      return image;
-    }));
-    if (found.report) {
-      by("report").href = `${at}/${found.report}`;
-      by("report").hidden = false;
+    if (!found || found.failed) return clear([found?.failed || GONE], "");
+    if (found.step !== "analyze" && !isShown) {
+      isShown = true;
+      analyzed();
+      clear(found.verdict || [], found.step);
+      by("figures").append(...found.figures.map((figure) => Object.assign(make("img"), {
+        src: `${at}/${figure}?${Date.now()}`, alt: phrase("figure of the {analysis} analysis", {analysis: found.analysis}),
+      })));
+      by("results-notes").append(...(found.warnings || []).map((text) => make("li", text)));
     }
-    write("writing", found.running && !found.report ? phrase("The report is being written; its link appears here.") : "");
-    if (!found.running) return;
+    say(found.step);
+    if (found.step) continue;
+    put(by("report"), {href: `${at}/${found.report}`, hidden: !found.report});
+    return;
   }
 }
 
-const say = (wrong) => by("verdict").replaceChildren(make("p", wrong));
+/** Say what is under way. */
+function say(step) {
+  put(by("progress"), {hidden: !step});
+  write("writing", STEPS[step]);
+}

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
+from pathlib import Path
+from threading import Event
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,11 +15,10 @@ import pytest
 from levilab.live.opened import LONGEST_NAME, MOST_FILES, Opened, OpenedFile, plain_name
 from levilab.pipelines.correction import read_correction
 from support.browser import PHONE
-from support.live_pages import address, request, serving, until, wait_for
+from support.live_pages import PATIENCE_S, address, request, serving, until, wait_for
 
 if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Iterator
-    from pathlib import Path
 
     from playwright.sync_api import Page
 
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 TIME = 10.0 * np.arange(19)
 #: A spin-down by the disc law, from 38 Hz.
 SPIN = 38 * (1 + 2.34e-4 * np.sqrt(2 * np.pi * 38) * TIME / 2) ** -2
+FIGURE = Path(__file__).parents[3] / "docs" / "pictures" / "spindown.png"
+SAMPLES = Path(__file__).parents[3] / "sample_data"
 #: Angular velocities under a title that says nothing.
 OMEGA = "Zeit;Wert\n" + "".join(
     f"{t:g};{2 * math.pi * f:.3f}\n".replace(".", ",") for t, f in zip(TIME, SPIN, strict=True)
@@ -74,6 +78,66 @@ def test_a_file_is_dropped_corrected_kept_and_analyzed(hall: Hall, watched: Call
     assert "spin-down" in opened.value.inner_text("body").lower()
     found = json.loads((file.parent / f"{file.name}.result.json").read_text("utf-8"))
     assert found["settings"]["columns"] == {"t": "1", "f": "2 [rad/s]"}
+
+
+@pytest.mark.parametrize(
+    ("name", "file", "same"),
+    [
+        ("a phone's spin-down", "phone.csv", "student-files/phyphox-semicolon-point.csv"),
+        ("a spreadsheet", "spreadsheet.xlsx", "student-files/excel.xlsx"),
+        ("a sound", "sound.wav", "scope-files/recording.wav"),
+    ],
+)
+def test_who_has_no_file_tries_one(hall: Hall, watched: Callable[..., Page], name: str, file: str, same: str) -> None:
+    page = watched()
+    page.goto(f"{address(hall)}open#{hall.doors.token}")
+    until(page, "document.getElementById('kept-in').textContent")
+    page.get_by_role("button", name=name).click()
+    until(page, f"levilab.look?.name === '{file}' && !document.getElementById('analyze').disabled")
+    assert Path(page.evaluate("levilab.look.path")).read_bytes() == (SAMPLES / same).read_bytes()
+
+
+#: What an answer shows: sentences, figures, notes, whether there is a link, and whether they stand in this order.
+ANSWER = """(() => {
+  const parts = ['verdict', 'figures', 'results-notes', 'report'].map((id) => document.getElementById(id));
+  const inOrder = parts.slice(1).every((part, k) => parts[k].compareDocumentPosition(part) & 4);
+  return [...parts.slice(0, 3).map((part) => part.children.length), !parts[3].hidden, inOrder];
+})()"""
+
+
+def test_an_answer_is_shown_in_one_order_and_nothing_before_it_is_whole(
+    hall: Hall, watched: Callable[..., Page], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    page, file, go_on = watched(), hall.root.parent / "steps.csv", {"analyze": Event(), "report": Event()}
+    file.write_text("t [s],f [Hz]\n" + "".join(f"{t},{f}\n" for t, f in zip(TIME, SPIN, strict=True)))
+
+    def carry_out(words: list[str]) -> tuple[int, str]:
+        """Write first, and end later: what is there is not all yet."""
+        if words[0] == "analyze":
+            answer = {"text": "The disc law fits.", "warnings": ["one run"]}
+            file.with_name("steps.csv.result.json").write_text(json.dumps(answer))
+            shutil.copy(FIGURE, file.with_name("steps.csv.spindown.png"))
+        else:
+            file.with_name("steps.csv.report.html").write_text("report")
+        return (0, "") if go_on[words[0]].wait(PATIENCE_S) else (1, "")
+
+    monkeypatch.setattr(hall.analyses, "_run", carry_out)
+    page.goto(f"{address(hall)}open?file={hall.opened.add(file)}#{hall.doors.token}")
+    until(page, "window.levilab?.look")
+    page.click("#analyze")
+    wait_for(file.with_name("steps.csv.spindown.png").exists)
+    until(page, "document.getElementById('writing').textContent === 'Analyzing…'")
+    with page.expect_response("**/analysis?*"), page.expect_response("**/analysis?*"):
+        pass
+    assert page.evaluate(ANSWER) == [0, 0, 0, False, True]
+    go_on["analyze"].set()
+    until(page, "document.getElementById('writing').textContent.startsWith('The report is being')")
+    assert page.evaluate(ANSWER) == [1, 1, 1, False, True]
+    assert page.locator("#progress").is_visible()
+    go_on["report"].set()
+    until(page, "!document.getElementById('report').hidden")
+    assert page.evaluate(ANSWER) == [1, 1, 1, True, True]
+    assert not page.locator("#progress").is_visible()
 
 
 def test_a_choice_in_the_table_changes_how_it_is_read(hall: Hall, watched: Callable[..., Page]) -> None:
