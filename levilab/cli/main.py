@@ -13,7 +13,6 @@ from levilab.cli import exit_codes
 from levilab.cli.importing import importing
 from levilab.cli.later import Later
 from levilab.cli.output import message, silence
-from levilab.cli.quantities import in_options
 
 
 class Commands(typer.core.TyperGroup):
@@ -270,6 +269,8 @@ def main() -> None:
 
 def _exit_with(error: Exception) -> NoReturn:
     try:
+        from levilab.cli.quantities import in_options  # with the texts, which a help does without
+
         status, text = exit_codes.exit_status(error), in_options(error, app)
         if isinstance(error, PermissionError) and error.filename:
             text = f"{error.filename}: may not be opened by you; change its permissions or choose another place"

@@ -11,7 +11,6 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.present.characters import printable
-from levilab.texts.text import in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -32,6 +31,8 @@ def result(text: str) -> None:
 
 def message(text: str) -> None:
     """Print a line on standard error in the person's language; a closed one, as with its terminal, ends nothing."""
+    from levilab.texts.text import in_language  # not for a help
+
     try:
         typer.echo(printable(in_language(text)), err=True)
     except OSError:
