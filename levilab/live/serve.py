@@ -31,6 +31,9 @@ if TYPE_CHECKING:
 HOST = "127.0.0.1"
 #: Time that open pages have to close, and a connection for its first request [s].
 _GOODBYE_S, _FIRST_REQUEST_S = 1, 10.0
+#: Connections that wait to be taken in, and are then taken in at once: those who connect without end are worked on
+#: before a page's next frame, with uvicorn's 2048 for 19 s.
+_WAITING = 64
 #: Connections of guests at a time: 60 phones that look, and 15 that load the page; macOS allows a process 256 files.
 _MOST_OF_GUESTS = 150
 
@@ -172,6 +175,7 @@ def configuration(hall: Hall) -> uvicorn.Config:
         http=Connection,
         ws="websockets-sansio",
         ws_max_size=1 << 16,
+        backlog=_WAITING,
         server_header=False,
         timeout_graceful_shutdown=_GOODBYE_S,
     )

@@ -18,7 +18,7 @@ import socket
 from collections import deque
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from instruments.ieee488 import INFINITY
 from instruments.virtual.bench.session import LinkLost
@@ -461,8 +461,29 @@ async def first_of(*jobs: Coroutine[None, None, object]) -> None:
 Conversation = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
 
+class _Ear(asyncio.StreamReader):
+    """The bytes of a client.  silent: whether none has come yet."""
+
+    silent = True
+
+    def feed_data(self, data: Any) -> None:
+        """See the base."""
+        self.silent = False
+        super().feed_data(data)
+
+
+async def _open_streams(connection: socket.socket) -> tuple[_Ear, asyncio.StreamWriter]:
+    """Return the streams of a connection that was accepted, as asyncio.open_connection does.  Raises OSError."""
+    loop, reader = asyncio.get_running_loop(), _Ear()
+    protocol = asyncio.StreamReaderProtocol(reader)
+    transport, _ = await loop.connect_accepted_socket(lambda: protocol, connection)
+    return reader, asyncio.StreamWriter(transport, protocol, reader, loop)
+
+
 class Listener:
     """A listening TCP socket that begins a conversation with every client that connects, up to a number of them.
+
+    Where all places are taken, a client that has not said anything yet makes way.
 
     Attributes:
         port: where it listens; 0 until it is open.
@@ -472,7 +493,7 @@ class Listener:
         self._instrument, self._talk, self._most = instrument, talk, most
         self._listening: socket.socket | None = None
         self._accepting: asyncio.Task[None] | None = None
-        self._talks: dict[asyncio.Task[None], asyncio.StreamWriter] = {}
+        self._talks: dict[asyncio.Task[None], tuple[_Ear, asyncio.StreamWriter]] = {}
         self.port = 0
 
     async def open(self, host: str, port: int) -> None:
@@ -488,11 +509,16 @@ class Listener:
         while True:
             try:
                 connection, _ = await loop.sock_accept(listening)
-                self._begin(*await asyncio.open_connection(sock=connection))
+                self._begin(*await _open_streams(connection))
             except OSError:  # the client has left already, or this process has too many files open
                 await asyncio.sleep(_LOOK_AGAIN)
 
-    def _begin(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    def _begin(self, reader: _Ear, writer: asyncio.StreamWriter) -> None:
+        if len(self._talks) >= self._most:
+            silent = next((task for task, (other, _) in self._talks.items() if other.silent), None)
+            if silent:
+                silent.cancel()
+                self._talks.pop(silent)
         try:
             welcome = len(self._talks) < self._most and self._instrument.bench.reachable(self._instrument.device)
         except Exception:
@@ -502,8 +528,8 @@ class Listener:
             writer.transport.abort()
             return
         task = asyncio.ensure_future(self._conversation(reader, writer))
-        self._talks[task] = writer
-        task.add_done_callback(self._talks.pop)
+        self._talks[task] = reader, writer
+        task.add_done_callback(lambda task: self._talks.pop(task, None))
 
     async def _conversation(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
@@ -526,7 +552,7 @@ class Listener:
         await asyncio.wait([self._accepting])
         self._listening.close()
         talks = dict(self._talks)
-        for task, writer in talks.items():
+        for task, (_, writer) in talks.items():
             task.cancel()
             writer.transport.abort()
-        await asyncio.gather(*talks, *(writer.wait_closed() for writer in talks.values()), return_exceptions=True)
+        await asyncio.gather(*talks, *(writer.wait_closed() for _, writer in talks.values()), return_exceptions=True)
