@@ -18,7 +18,7 @@ import numpy as np
 from scipy.io import wavfile
 
 from levilab.pipelines.options import SpinOptions
-from levilab.pipelines.spin.analysis import METHOD
+from levilab.pipelines.spin.document import SPIN
 from levilab.pipelines.spin.readings import read_spin_file, track_of_record
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
@@ -47,7 +47,7 @@ def main() -> None:
             return track_of_record(record, None, 2.0, "auto")
 
         tasks = {
-            "as called": lambda: METHOD.analyze([path], SpinOptions()),
+            "as called": lambda: SPIN.analyze([path], SpinOptions()),
             "read and analyzed": read_and_track,
             "wavfile.read and one FFT": lambda: np.abs(np.fft.rfft(wavfile.read(path)[1])),
         }

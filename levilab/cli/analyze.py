@@ -17,7 +17,7 @@ from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError
 from levilab.pipelines.options import KINDS, OPTIONS, Option, options_of, read_options, typed_name
 
 if TYPE_CHECKING:
-    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.document import Analysis
     from levilab.pipelines.many.table import Tally
 
 

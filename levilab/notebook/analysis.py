@@ -25,8 +25,8 @@ from levilab.notebook.frame import (
     write_frame,
 )
 from levilab.notebook.result import AnalysisResult
-from levilab.pipelines.analyzed import refuse_columns_of_runs
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.document import refuse_columns_of_runs
 from levilab.pipelines.options import read_options
 from levilab.pipelines.suits import suiting
 from levilab.present.numbers import list_in_words
@@ -36,7 +36,7 @@ from levilab.runs.run import Run
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.document import Analysis
     from levilab.pipelines.sources import Source
     from levilab.pipelines.suits import Suiting
 
@@ -68,7 +68,7 @@ def analyze_data(data: Any, kind: str | None, given: Mapping[str, Any]) -> Analy
     items: list[Any] = [data] if _is_one(data) else list(data)
     items = [path for item in items for path in _expand(item)]
     if kind and all(isinstance(item, Run) for item in items):  # as of a folder
-        items = [run for run in items if ANALYSES[kind].needs.take(run)] or items
+        items = [run for run in items if ANALYSES[kind].take(run)] or items
     if not items:
         raise UsageError("data", "a run, a path or a DataFrame is expected", value="nothing")
     frames = [item for item in items if is_frame(item)]
@@ -112,7 +112,7 @@ def _analyze_paths(
             _refuse_foreign(analysis, options)
             chosen = analysis.options_from(options)
             refuse_columns_of_runs(one.found, chosen)
-            found = analysis.result.method.analyze_found(one.paths, one.found, chosen)
+            found = analysis.analyze_found(one.paths, one.found, chosen)
     copies = tuple(path for path in paths if path.parent == folder)
     found = replace(found, sources=tuple(_renamed(one, called) if one.path in copies else one for one in found.sources))
     return AnalysisResult(analysis, _translate_warnings(found, in_words), copies)
@@ -171,13 +171,13 @@ def _name_type(item: object) -> str:
 def _refuse_foreign(analysis: Analysis[Any], options: Mapping[str, Any]) -> None:
     """Raise UsageError for an option of another analysis that was set."""
     for name, value in options.items():
-        default = {one.name: one.default for one in fields(analysis.result.method.options)}
+        default = {one.name: one.default for one in fields(analysis.options)}
         if name in default:
             continue
         others = [
             one.name
             for one in ANALYSES.values()
-            if any(field.name == name and field.default != value for field in fields(one.result.method.options))
+            if any(field.name == name and field.default != value for field in fields(one.options))
         ]
         if others:
             raise UsageError(name, f"is no option of {analysis.name}, but of {' and '.join(others)}: leave it out")

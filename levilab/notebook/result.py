@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from levilab.notebook.figure import Axes
-    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.document import Analysis
     from levilab.pipelines.result import Result, Value
     from levilab.present.style import Figure
 
@@ -146,7 +146,7 @@ class AnalysisResult(Helpful):
 
     @cached_property
     def _written(self) -> Result:
-        return self.analysis.result.of(self.found, Place(Path()))  # type: ignore[no-any-return]
+        return self.analysis.result_of(self.found, Place(Path()))
 
     @cached_property
     def models(self) -> Named[FittedModel]:

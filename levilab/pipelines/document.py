@@ -1,43 +1,52 @@
-"""What an analysis found ↔ result.json: what every analysis writes and reads back alike."""
+"""An analysis: one row says how its inputs are read and analyzed, its result.json, and what people are shown."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeVar, get_type_hints
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from importlib import import_module
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeAlias, get_type_hints
 
 from pydantic import BeforeValidator, Field, PlainSerializer, create_model
 
-from levilab.errors import DataError, unquote
+from levilab.errors import DataError, UsageError, unquote
 from levilab.files import finite
 from levilab.formats.device import Device
-from levilab.pipelines.analyzed import FOR_THIS_PAGE, A, Method, Opt, Origin, R, S
+from levilab.pipelines.analyzed import FOR_THIS_PAGE, NOW, A, Origin
+from levilab.pipelines.budget import budgets_of_result
 from levilab.pipelines.correction import read_correction
 from levilab.pipelines.dump import Dump
-from levilab.pipelines.options import options_of
-from levilab.pipelines.result import AGAIN, SCHEMA, Archive, Earlier, Part, Result, RunPart, relative
-from levilab.pipelines.sources import collect
+from levilab.pipelines.options import OF_FILES, options_of
+from levilab.pipelines.result import AGAIN, SCHEMA, Archive, Earlier, Part, Place, Result, RunPart, place_of, relative
+from levilab.pipelines.sources import Needs, Skipped, collect
 from levilab.present.units import name_with_unit, split
 from levilab.runs.find import find_run
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
+
+    import numpy as np
 
     from analysis.budget import Budget
     from analysis.uncertainty import Estimate
     from levilab.pipelines.options import InputOptions
-    from levilab.pipelines.result import Place
+    from levilab.pipelines.part import ReportPart
+    from levilab.pipelines.row import Column
     from levilab.pipelines.sources import Found, Source
+    from levilab.present.document.blocks import Block
+    from levilab.present.style import Figure
+    from levilab.present.tables import Table
+
+    #: An input, what is found of it, where that comes from.
+    Done: TypeAlias = tuple[Source[Any], Any, Origin[Any]]
 
 #: The data file's own names of columns: an empty table where none were given.
 Columns = Annotated[
     dict[str, str] | None, BeforeValidator(lambda names: names or None), PlainSerializer(lambda names: names or {})
 ]
-
-
-D = TypeVar("D", bound=Result)
 
 
 def settings_model(options: type[InputOptions]) -> type[Part]:
@@ -50,59 +59,207 @@ def settings_model(options: type[InputOptions]) -> type[Part]:
     return create_model("Settings", __base__=Part, **given)
 
 
-def result_model(
-    method: Method[Any, Any, Any, Any], run: Any, combined: Any = None, base: type[Result] = Result
-) -> type[Result]:
-    """Return the model of an analysis's result.json.
-
-    Args:
-        method: of the analysis.
-        run: type of the finding of one input, a frozen dataclass.
-        combined: likewise of all inputs together; None: as the base has it.
-        base: model with the entries that no other analysis has.
-    """
-    name = method.needs.analysis
-    part = create_model("RunPart", __base__=RunPart, result=(Annotated[run, Dump()], ...))
-    more: dict[str, Any] = {"combined": (Annotated[combined, Dump()], ...)} if combined else {}
-    return create_model(
-        f"{name}Result",
-        __base__=base,
-        analysis=(Literal[name], name),  # type: ignore[arg-type]
-        settings=(settings_model(method.options), ...),
-        runs=(tuple[part, ...], ...),  # type: ignore[valid-type]
-        **more,
-    )
+def refuse_columns_of_runs(found: Found[Any], options: InputOptions) -> None:
+    """Raise UsageError where names of columns are given, and all inputs are runs, whose columns are known."""
+    runs = [source.run for source in found.sources if source.run]
+    if options.columns and len(runs) == len(found.sources):
+        names = ", ".join(str(channel["name"]) for channel in runs[0].record.channels if "name" in channel)
+        known = f"{runs[0].folder} is a run, whose columns are known{f' ({names})' * bool(names)}"
+        raise UsageError("columns", f"goes with a data file, and {known}: leave it out")
 
 
-@dataclass(frozen=True)
-class Document(Generic[S, R, Opt, A, D]):
-    """result.json of an analysis.
+@dataclass(frozen=True, kw_only=True)
+class Analysis(Needs[Any], Generic[A]):
+    """One analysis: what it needs of its inputs, how it is carried out, its result.json, and what people are shown.
 
     Attributes:
-        method: of the analysis.
-        result: all that is in it, with the parts of which it is made.
-        entries: its own entries at the top, for people: `values`, `models`.
+        kind: what was found, an Analyzed.
+        options: of the analysis.
+        fit: one input; raises DataError, which names the file.
+        combine: all inputs together.
+        mixed: what is wrong with numbers over real and synthetic inputs; empty where there are none.
+        of_files: names of options that say nothing about runs, whose columns are known.
+        skips: whether of several inputs one that cannot be used is skipped with a warning.
+        budget_of_run: what the uncertainties of one input's numbers are made of.
+        budget_of_all: those of all inputs together, from what was found of each; of one input they are its own.
+        set_beside: puts a path that goes beside the inputs into the options.
+        finding, combination: types of what is found of one input and of all together, frozen dataclasses; None: as the
+            base has it.
+        base: of the model of result.json, with the entries that no other analysis has.
+        entries: its own entries at the top of result.json, for people: `values`, `models`.
         run_entries: likewise those of one input.
         check: raises ValueError for what was read of one input and cannot have been found.
         outdated: why this version cannot use what was read of one input, so that it is analyzed again; empty: it can.
         renumber: what was found of all together, for inputs in another order: the number of each in the result.
+        tables: for the terminal.
+        part: of a report.
+        columns: the readings of each input as columns of a table, with residuals.
+        row: the columns that an input has as one row of a table of many.
+        symbols: of its quantities, for people.
+        files: tables for other analyses that are saved with the result, by their names.
+        compared: quantities that groups of a class compare; empty: the constants of the law, or where there is none
+            the first quantities.
+        curve: the fitted curve of an input, by its number and the model's name, as a function of arrays in SI; None:
+            there is none.
+        curve_u: its standard uncertainty, likewise.
     """
 
-    method: Method[S, R, Opt, A]
-    result: type[D]
+    kind: type[A]
+    options: type[InputOptions]
+    fit: Callable[[Source[Any], Any], Any]
+    combine: Callable[[Sequence[Source[Any]], Sequence[Any], Any], Any] = lambda *_: None
+    mixed: str = ""
+    of_files: frozenset[str] = frozenset(OF_FILES)
+    skips: bool = False
+    budget_of_run: Callable[[Source[Any], Any, Any], tuple[Budget, ...]] = lambda *_: ()
+    budget_of_all: Callable[[A], tuple[Budget, ...]] = lambda _: ()
+    set_beside: Callable[[Sequence[Path], Any], tuple[Sequence[Path], Any]] = lambda paths, options: (paths, options)
+    finding: Any
+    combination: Any = None
+    base: type[Result] = Result
     entries: Callable[[A], dict[str, Any]]
-    run_entries: Callable[[R], dict[str, Any]]
-    check: Callable[[R], None] = lambda _: None
-    outdated: Callable[[R], str] = lambda _: ""
+    run_entries: Callable[[Any], dict[str, Any]]
+    check: Callable[[Any], None] = lambda _: None
+    outdated: Callable[[Any], str] = lambda _: ""
     renumber: Callable[[Any, Sequence[int]], Any] = lambda combined, _: combined
+    tables: Callable[[A], tuple[Table, ...]]
+    part: Callable[[A], ReportPart]
+    columns: Callable[[A], Iterable[Mapping[str, np.ndarray]]]
+    row: tuple[Column, ...] = ()
+    symbols: Mapping[str, str] = field(default_factory=dict)
+    files: Callable[[A], Mapping[str, str]] = lambda _: {}
+    compared: tuple[str, ...] = ()
+    curve: Callable[[A, int, str], Callable[[np.ndarray], np.ndarray]] | None = None
+    curve_u: Callable[[A, int, str], Callable[[np.ndarray], np.ndarray]] | None = None
 
-    # --- writing ---
+    def options_from(self, given: Mapping[str, Any]) -> InputOptions:
+        """Choose its options out of those that were given, some of which belong to other analyses."""
+        own = {one.name for one in fields(self.options)}
+        return self.options(**{name: value for name, value in given.items() if name in own})
 
-    def of(self, found: A, place: Place) -> D:
+    # --- analyzing ---
+
+    def analyze(self, paths: Sequence[Path], options: Any) -> A:
+        """Analyze the inputs at the paths.
+
+        Raises:
+            DataError: one of them cannot be used; it names the file.
+            UsageError: names of columns are given, and all inputs are runs.
+        """
+        paths, options = self.set_beside([find_run(path) for path in paths], options)
+        found = collect(paths, self, lambda _: options)
+        refuse_columns_of_runs(found, options)
+        return self.analyze_found(paths, found, options)
+
+    def analyze_found(self, paths: Sequence[Path], found: Found[Any], options: Any) -> A:
+        """Do the same for inputs that were found already."""
+
+        def one(source: Source[Any]) -> Done:
+            own = replace(options, **source.kept)
+            return source, self.fit(source, own), Origin(own, NOW)
+
+        return self.gather(paths, found, options, one)
+
+    def gather(
+        self,
+        paths: Sequence[Path],
+        found: Found[Any],
+        options: Any,
+        one: Callable[[Source[Any]], Done],
+        recall: Callable[[Sequence[Any]], Any] | None = None,
+        *,
+        budget: tuple[Budget, ...] = (),
+    ) -> A:
+        """Return what is found of all inputs, each by itself and together.  Raises DataError.
+
+        Args:
+            paths: run folders, data files, folders that were searched.
+            found: what lies there.
+            options: as they were given.
+            one: from one input to what is found of it.
+            recall: from what is found of each to what was found of all together; None where it is not known.
+            budget: that of all together, which goes with `recall`.
+        """
+        done, warnings = self._each(found.sources, one)
+        sources, runs, origins = (list(column) for column in zip(*done, strict=True))
+        used = origins[0].options if all(origin.options == origins[0].options for origin in origins) else options
+        for k, (source, run, origin) in enumerate(zip(sources, runs, origins, strict=True)):
+            if origin.budget is None:
+                origins[k] = replace(origin, budget=self.budget_of_run(source, run, origin.options))
+        found_of_all = self.kind(
+            sources=tuple(sources),
+            runs=tuple(runs),
+            combined=recall(runs) if recall else self.combine(sources, runs, used),
+            options=used,
+            place=place_of(paths, sources),
+            warnings=(*found.warnings, *warnings, *self.about_inputs(sources, used)),
+            remarks=found.remarks,
+            origins=tuple(origins),
+            budget=budget,
+        )
+        if recall is not None:
+            return found_of_all
+        of_all = (origins[0].budget or ()) if len(origins) == 1 else self.budget_of_all(found_of_all)
+        return replace(found_of_all, budget=of_all)
+
+    def _each(self, sources: Sequence[Source[Any]], one: Callable[[Source[Any]], Done]) -> tuple[list[Done], list[str]]:
+        """Return what is found of each input, and warnings about those that are skipped."""
+        if not self.skips or len(sources) == 1:
+            return [one(source) for source in sources], []
+        done: list[Done] = []
+        errors: list[DataError] = []
+        for source in sources:
+            try:
+                done.append(one(source))
+            except DataError as error:
+                errors.append(error)
+        if not done:
+            raise errors[-1]
+        return done, [str(Skipped(str(error))) for error in errors]
+
+    def about_inputs(self, sources: Sequence[Source[Any]], options: Any) -> Iterable[str]:
+        """Return what to know of the inputs before using the numbers."""
+        synthetic = sum(source.synthetic for source in sources)
+        if self.mixed and 0 < synthetic < len(sources):
+            yield f"{synthetic} of {len(sources)} inputs are SYNTHETIC, the others are not known to be: {self.mixed}"
+        reading_u = getattr(options, "reading_u", None)
+        given = [source.name for source in sources if getattr(source.readings, "u", None) is not None]
+        if reading_u is not None and given:
+            names = ", ".join(given)
+            yield f"the given u of a reading, {reading_u:g} Hz, takes the place of the uncertainties in {names}"
+        if options.columns and all(source.run for source in sources):
+            yield "names of columns were given, but none of the inputs is a data file"
+
+    # --- result.json ---
+
+    @cached_property
+    def model(self) -> type[Result]:
+        """The model of its result.json."""
+        part = create_model("RunPart", __base__=RunPart, result=(Annotated[self.finding, Dump()], ...))  # type: ignore[arg-type]
+        combined = self.combination
+        more: dict[str, Any] = {"combined": (Annotated[combined, Dump()], ...)} if combined else {}
+        return create_model(
+            f"{self.name}Result",
+            __base__=self.base,
+            analysis=(Literal[self.name], self.name),  # type: ignore[arg-type]
+            settings=(settings_model(self.options), ...),
+            runs=(tuple[part, ...], ...),  # type: ignore[valid-type]
+            **more,
+        )
+
+    def document(self, found: A, folder: Path) -> dict[str, Any]:
+        """Return the content of result.json for a folder."""
+        return self.result_of(found, Place(folder)).as_dict()
+
+    def settings_of(self, found: A) -> dict[str, Any]:
+        """Return the options of an analysis as result.json has them."""
+        return self.settings(found.options).model_dump(mode="json", by_alias=True)
+
+    def result_of(self, found: A, place: Place) -> Result:
         """Return the result for a place: paths in it are relative to the place."""
         document = {
             "schema": SCHEMA,
-            "analysis": self.method.needs.analysis,
+            "analysis": self.name,
             "inputs": [{"path": relative(one.data, place.folder), "sha256": one.sha256} for one in found.sources],
             "synthetic": any(source.synthetic for source in found.sources),
             "software": software_versions(),
@@ -125,30 +282,30 @@ class Document(Generic[S, R, Opt, A, D]):
             "warnings": [unquote(text) for text in found.all_warnings],
             "combined": found.combined,
         }
-        return self.result.model_validate(finite(document | _budget(found.budget) | self.entries(found)))
+        return self.model.model_validate(finite(document | _budget(found.budget) | self.entries(found)))
 
-    def settings(self, options: Opt) -> Part:
+    def settings(self, options: Any) -> Part:
         """Return the options as they stand in the file."""
-        kind: type[Part] = self.result.model_fields["settings"].annotation  # type: ignore[assignment]
+        kind: type[Part] = self.model.model_fields["settings"].annotation  # type: ignore[assignment]
         return kind.model_validate({name: getattr(options, name) for name in kind.model_fields})
 
     # --- reading ---
 
-    def archive(self, paths: Sequence[Path], results: Sequence[Path] = ()) -> Archive[D]:
+    def archive(self, paths: Sequence[Path], results: Sequence[Path] = ()) -> Archive[Any]:
         """Return the results that were written before of inputs at the paths; results: files that lie elsewhere."""
-        return Archive(paths, self.result, results)
+        return Archive(paths, self.model, results)
 
-    def reading(self, archive: Archive[D], options: Opt) -> Callable[[Path], Opt]:
+    def reading(self, archive: Archive[Any], options: Any) -> Callable[[Path], Any]:
         """Return how an input is read: with the given options, those kept beside it, those of its earlier result."""
         given = _given_options(options)
 
-        def reading(path: Path) -> Opt:
+        def reading(path: Path) -> Any:
             earlier = archive.earlier(path, path)
             return replace(self._options(earlier), **{**read_correction(path), **given}) if earlier else options
 
         return reading
 
-    def recall(self, paths: Sequence[Path], options: Opt) -> A:
+    def recall(self, paths: Sequence[Path], options: Any) -> A:
         """Read what `analyze` found from result.json; inputs without a result that holds are analyzed.
 
         A result holds as long as the readings are the same bytes, and it was made with the given options.  Those at
@@ -158,16 +315,16 @@ class Document(Generic[S, R, Opt, A, D]):
         """
         paths = [find_run(path) for path in paths]
         archive = self.archive(paths)
-        found = collect(paths, self.method.needs, self.reading(archive, options))
+        found = collect(paths, self, self.reading(archive, options))
         return self.recall_found(paths, found, archive, options)
 
-    def recall_found(self, paths: Sequence[Path], found: Found[S], archive: Archive[D], options: Opt) -> A:
+    def recall_found(self, paths: Sequence[Path], found: Found[Any], archive: Archive[Any], options: Any) -> A:
         """Do the same for inputs that were found already."""
         given = _given_options(options)
         whole = archive.whole(found.sources)
         if whole and not any(self._problem(whole.of(source), given, source) for source in found.sources):
             numbers = [whole.of(source).number for source in found.sources]
-            return self.method.gather(
+            return self.gather(
                 paths,
                 found,
                 options,
@@ -175,12 +332,12 @@ class Document(Generic[S, R, Opt, A, D]):
                 lambda _: self.renumber(whole.result.combined, numbers),
                 budget=whole.result.budget,
             )
-        return self.method.gather(paths, found, options, lambda source: self._recall_one(source, archive, given))
+        return self.gather(paths, found, options, lambda source: self._recall_one(source, archive, given))
 
-    def _options(self, earlier: Earlier[D]) -> Opt:
-        return self.method.options(**dict(earlier.result.settings))
+    def _options(self, earlier: Earlier[Any]) -> Any:
+        return self.options(**dict(earlier.result.settings))
 
-    def _problem(self, earlier: Earlier[D], given: Mapping[str, Any], source: Source[S]) -> str:
+    def _problem(self, earlier: Earlier[Any], given: Mapping[str, Any], source: Source[Any]) -> str:
         """Return why an input has to be analyzed again; empty where its result holds."""
         if earlier.sha256 != source.sha256:
             return f"the readings are others than in {earlier.file}"
@@ -189,26 +346,24 @@ class Document(Generic[S, R, Opt, A, D]):
             return f"other options than those of {earlier.file}"
         return self.outdated(earlier.part.result)
 
-    def _own_values(self, given: Mapping[str, Any], source: Source[S]) -> dict[str, Any]:
+    def _own_values(self, given: Mapping[str, Any], source: Source[Any]) -> dict[str, Any]:
         """Return those of the given and kept options that matter to an input."""
-        left_out = self.method.of_files if source.run else frozenset[str]()
+        left_out = self.of_files if source.run else frozenset[str]()
         return {**source.kept, **{name: value for name, value in given.items() if name not in left_out}}
 
-    def _recall_one(
-        self, source: Source[S], archive: Archive[D], given: Mapping[str, Any]
-    ) -> tuple[Source[S], R, Origin[Opt]]:
+    def _recall_one(self, source: Source[Any], archive: Archive[Any], given: Mapping[str, Any]) -> Done:
         """Read the result of one input, or analyze it."""
         earlier, own = archive.earlier(source.path, source.data, source.sha256), self._own_values(given, source)
         if earlier is None:
-            options, why = self.method.options(**own), "there was no result yet"
+            options, why = self.options(**own), "there was no result yet"
         elif why := self._problem(earlier, given, source):
             options = replace(self._options(earlier), **own)
         else:
             return self._read_one(source, earlier)
         origin = Origin(options, f"{FOR_THIS_PAGE}: {why}", lacks_result=earlier is None)
-        return source, self.method.fit(source, options), origin
+        return source, self.fit(source, options), origin
 
-    def _read_one(self, source: Source[S], earlier: Earlier[D]) -> tuple[Source[S], R, Origin[Opt]]:
+    def _read_one(self, source: Source[Any], earlier: Earlier[Any]) -> Done:
         """Read the result of one input.  Raises DataError."""
         part = earlier.part
         try:
@@ -216,6 +371,24 @@ class Document(Generic[S, R, Opt, A, D]):
         except ValueError as error:
             raise DataError(f"{earlier.file}: {error}: {AGAIN}") from error
         return source, part.result, Origin(self._options(earlier), earlier.text, part.budget)
+
+    # --- for people ---
+
+    def budgets(self, found: A) -> tuple[Block, ...]:
+        """Return the budgets of its uncertainties, as blocks of a document."""
+        return budgets_of_result(found, self.symbols)
+
+    def figure(self, found: A) -> Figure:
+        """Draw the figure, by the function NAME_figure of levilab.pipelines.NAME.figure."""
+        drawing = import_module(f"levilab.pipelines.{self.name}.figure")  # with matplotlib
+        drawn: Figure = getattr(drawing, f"{self.name}_figure")(found)
+        return drawn
+
+    def png(self, found: A) -> bytes:
+        """Draw the figure, as PNG."""
+        from levilab.present.style import as_png  # with matplotlib
+
+        return as_png(self.figure(found))
 
 
 def _given_options(options: Any) -> dict[str, Any]:

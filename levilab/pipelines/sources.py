@@ -80,12 +80,12 @@ class Readings:
 R = TypeVar("R", bound=Readings)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Needs(Generic[R]):
     """What an analysis needs of its inputs.
 
     Attributes:
-        analysis: its name.
+        name: of the analysis.
         experiments: those whose runs suit it.
         read_file, read_run: to readings, which raise DoesNotSuit for what is of another kind and DataError for what
             cannot be used.
@@ -95,10 +95,10 @@ class Needs(Generic[R]):
         wanted: such runs in words, where the experiment says too little.
     """
 
-    analysis: str
+    name: str
     experiments: frozenset[str]
-    read_file: Callable[[Path, InputOptions], R]
-    read_run: Callable[[Run, InputOptions], R]
+    read_file: Callable[[Path, Any], R]
+    read_run: Callable[[Run, Any], R]
     data: str = READINGS
     also: Callable[[Run], bool] | None = None
     particular: bool = False
@@ -427,7 +427,7 @@ def _of_file(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
 def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
     if not needs.take(run):
         kind = run.record.experiment
-        raise DoesNotSuit(f"{run.folder}: holds a {kind} run, {needs.analysis} needs a {needs.runs}")
+        raise DoesNotSuit(f"{run.folder}: holds a {kind} run, {needs.name} needs a {needs.runs}")
     data = run.folder / needs.data
     if not data.exists():  # as after a kill before the first record
         raise DataError(f"{run.folder}: holds no {data.name}, so nothing was recorded; analyze another run")

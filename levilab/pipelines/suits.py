@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from levilab.pipelines.analyzed import A
-    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.document import Analysis
     from levilab.pipelines.options import InputOptions
     from levilab.pipelines.result import Archive, Written
     from levilab.pipelines.sources import Remark, Source
@@ -73,7 +73,7 @@ def analyze_suiting(
 ) -> list[tuple[Analysis[Any], Any]]:
     """Analyze the inputs at the paths by each analysis that suits; see `suiting`."""
     return [
-        (one.analysis, one.analysis.result.method.analyze_found(one.paths, one.found, one.analysis.options_from(given)))
+        (one.analysis, one.analysis.analyze_found(one.paths, one.found, one.analysis.options_from(given)))
         for one in suiting(paths, given, tell)
     ]
 
@@ -99,9 +99,9 @@ def recall_suiting(
     def options(analysis: Analysis[Any]) -> Callable[[Path], InputOptions]:
         of_results = own[analysis.name]
         inputs = [*places, *(path for one in of_results for path in one.inputs)]
-        archive = analysis.result.archive(inputs, [one.file for one in of_results])
+        archive = analysis.archive(inputs, [one.file for one in of_results])
         archives[analysis.name] = archive
-        return analysis.result.reading(archive, analysis.options_from(given))
+        return analysis.reading(archive, analysis.options_from(given))
 
     def has_result(name: str, source: Source[Any]) -> bool:
         return archives[name].earlier(source.path, source.data, source.sha256) is not None
@@ -112,8 +112,8 @@ def recall_suiting(
     results = {name: [path for one in of for path in one.inputs] for name, of in own.items()}
     done = []
     for one in _suiting(places, options, choose, tell, results):
-        result, chosen = one.analysis.result, one.analysis.options_from(given)
-        recalled = result.recall_found(one.paths, one.found, archives[one.analysis.name], chosen)
+        chosen = one.analysis.options_from(given)
+        recalled = one.analysis.recall_found(one.paths, one.found, archives[one.analysis.name], chosen)
         done.append((one.analysis, recalled))
     return done
 
@@ -142,11 +142,11 @@ def _made_for(source: Source[Any], takers: Collection[str]) -> Collection[str]:
     if source.run:
         own = _of_experiment(source.run)
         return [name for name in takers if name in own] if own else takers
-    return [name for name in takers if rows[name].needs.particular] or takers
+    return [name for name in takers if rows[name].particular] or takers
 
 
 def _of_experiment(run: Run) -> list[str]:
-    return [row.name for row in catalogue.ANALYSES.values() if run.record.experiment in row.needs.experiments]
+    return [row.name for row in catalogue.ANALYSES.values() if run.record.experiment in row.experiments]
 
 
 def _suiting(
@@ -178,7 +178,7 @@ def _suiting(
         for name, one in chosen.items():
             taken[name].append((path, one))
     for name, inputs in (more or {}).items():
-        taken[name] += [(path, find(path, rows[name].needs, readers[name])) for path in inputs]
+        taken[name] += [(path, find(path, rows[name], readers[name])) for path in inputs]
     done = [
         Suiting(rows[name], tuple(path for path, _ in those), join([one for _, one in those]))
         for name, those in taken.items()
@@ -199,7 +199,7 @@ def _look(
     errors: dict[str, DataError] = {}
     for name, row in catalogue.ANALYSES.items():
         try:
-            found[name] = find(path, row.needs, readers[name])
+            found[name] = find(path, row, readers[name])
         except ResultError:
             raise
         except DataError as error:
@@ -295,9 +295,9 @@ def save(analysis: Analysis[A], found: A, folder: Path | None = None, *, with_fi
     Every other analysis has its name in its result's, and into a given folder also one that would replace another's.
     """
     run = found.sources[0].run if len(found.sources) == 1 else None
-    names = [row.name for row in catalogue.ANALYSES.values() if run is None or row.needs.take(run)]
+    names = [row.name for row in catalogue.ANALYSES.values() if run is None or row.take(run)]
     first = (run and _of_experiment(run)) or names
     place = replace(found.place, folder=folder or found.output_folder)
     is_first = first[0] == analysis.name and not (folder and is_of_another(place.result(), analysis.name))
     picture = analysis.png(found) if with_figure else None
-    return save_files(analysis.result.of(found, place), place, picture, analysis.files(found), first=is_first)
+    return save_files(analysis.result_of(found, place), place, picture, analysis.files(found), first=is_first)

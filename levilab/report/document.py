@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from levilab.pipelines.analyzed import A, Analyzed
-    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.document import Analysis
     from levilab.pipelines.part import ReportPart
     from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from levilab.pipelines.analyzed import A
-    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.document import Analysis
     from levilab.present.document.blocks import Document
     from levilab.report.document import Results
     from levilab.report.kinds import Kind
@@ -85,7 +85,7 @@ def write_report(
         paths: run folders, data files, folders to search, results, simulated motions, sweeps.
         output: the file to write; its ending chooses the format.
         given: options by their names; those at their defaults count as not given, see
-            `levilab.pipelines.document.Document.look`.
+            `levilab.pipelines.document.Analysis.recall_found`.
         tell: called with what lies there and is not in the report, and with what has no result.
         tables: whether tables of the results are written, too, into the folder that `folder_of` names.
         short: whether result, figure and notes are all of it.

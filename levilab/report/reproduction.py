@@ -18,7 +18,7 @@ from levilab.software import software_versions
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
 
-    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.document import Analysis
     from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block
 

@@ -13,7 +13,7 @@ from levilab.report.reproduction import paths_in_commands
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.document import Analysis
     from levilab.present.document.blocks import Block
 
     Supplement = Callable[[Analysis[Any], Any], tuple[Block, ...]]

@@ -11,27 +11,16 @@ from analysis.field.fit import FieldScan, fit_scan
 from analysis.field.floating import Floating, KnownTop, follow
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
-from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.field.device import known_of, known_top, usual
-from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
+from levilab.pipelines.field.readings import FieldReadings
 from levilab.pipelines.field.words import remark, scan_as_text, scans_as_text
 from levilab.pipelines.options import FieldOptions
-from levilab.pipelines.sources import Needs
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping, Sequence
 
     from levilab.pipelines.sources import Source
-
-FIELD = "field"
-#: The runs that suit, and what is needed of a data file.
-NEEDS = Needs(
-    analysis=FIELD,
-    experiments=frozenset({"field"}),
-    read_file=read_scan_file,
-    read_run=read_scan_run,
-    particular=True,
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,15 +106,6 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
     if readings.height_u is None:
         warnings.append("no uncertainty of the heights is given: they are taken as exact")
     return FieldRun(scan, top, floating, scan_as_text(scan, floating), tuple(warnings))
-
-
-METHOD = Method(
-    needs=NEEDS,
-    kind=FieldAnalysis,
-    options=FieldOptions,
-    fit=analyze_source,
-    mixed="a mean over both says nothing about a real base",
-)
 
 
 def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:

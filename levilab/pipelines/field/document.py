@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -11,9 +10,13 @@ import numpy as np
 from analysis.budget import Budget, Component
 from analysis.field.fit import UNITS, parts_of
 from levilab.pipelines.budget import setting_of
-from levilab.pipelines.document import Document, result_model, statistics_of, value_of, values_of
-from levilab.pipelines.field.analysis import METHOD, FieldAnalysis, FieldRun, Mean
-from levilab.pipelines.field.words import remark
+from levilab.pipelines.document import Analysis, statistics_of, value_of, values_of
+from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun, Mean, analyze_source
+from levilab.pipelines.field.readings import read_scan_file, read_scan_run
+from levilab.pipelines.field.report import field_columns, field_curve, field_curve_u, field_part, field_tables
+from levilab.pipelines.field.words import FIELD_ROW, QUANTITIES, remark
+from levilab.pipelines.options import FieldOptions
+from levilab.pipelines.row import symbols_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,7 +24,6 @@ if TYPE_CHECKING:
     from analysis.field.fit import FieldScan, UPart
     from analysis.uncertainty import Estimate
     from levilab.pipelines.field.readings import FieldReadings
-    from levilab.pipelines.options import FieldOptions
     from levilab.pipelines.sources import Source
 
 
@@ -165,9 +167,27 @@ def _model(run: FieldRun) -> dict[str, Any]:
     }
 
 
-DOCUMENT = Document(
-    method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
-    result=result_model(METHOD, FieldRun),
+FIELD = Analysis(
+    name="field",
+    experiments=frozenset({"field"}),
+    read_file=read_scan_file,
+    read_run=read_scan_run,
+    particular=True,
+    kind=FieldAnalysis,
+    options=FieldOptions,
+    fit=analyze_source,
+    mixed="a mean over both says nothing about a real base",
+    budget_of_run=budget_of_run,
+    budget_of_all=budget_of_all,
+    finding=FieldRun,
     entries=_entries,
     run_entries=_run_entries,
+    tables=field_tables,
+    part=field_part,
+    columns=field_columns,
+    row=FIELD_ROW,
+    symbols=symbols_of(QUANTITIES.values()),
+    curve=field_curve,
+    curve_u=field_curve_u,
+    compared=("strength", "origin", "thickness"),
 )

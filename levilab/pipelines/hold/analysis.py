@@ -10,12 +10,11 @@ import numpy as np
 from analysis.held import HeldLaw, Hold, fit_held, hold_of
 from analysis.spindown.tilt import slowing_by_tilt
 from analysis.uncertainty import Estimate  # noqa: TC001 - pydantic reads it
-from levilab.pipelines.analyzed import Analyzed, Method
-from levilab.pipelines.hold.readings import HoldReadings, read_hold_file, read_hold_run
+from levilab.pipelines.analyzed import Analyzed
+from levilab.pipelines.hold.readings import HoldReadings
 from levilab.pipelines.options import HoldOptions, SpinDownOptions
 from levilab.pipelines.row import Quantity, columns_of
-from levilab.pipelines.sources import Needs
-from levilab.pipelines.spindown.document import DOCUMENT as SPINDOWN
+from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.words import SYMBOLS
 from levilab.present.numbers import list_in_words, plain, with_uncertainty
 from levilab.runs.run import read_record
@@ -40,8 +39,6 @@ QUANTITIES = (
 HOLD_ROW = tuple(columns_of(QUANTITIES))
 
 
-HOLD = "hold"
-NEEDS = Needs(analysis=HOLD, experiments=frozenset({HOLD}), read_file=read_hold_file, read_run=read_hold_run)
 #: A constant that is more standard uncertainties from the spin-down's disagrees.
 _ENOUGH = 3.0
 
@@ -155,15 +152,3 @@ def set_spindown_beside(paths: Sequence[Path], options: HoldOptions) -> tuple[Se
     if options.spindown or len(spindowns) != 1 or len(paths) == 1:
         return paths, options
     return [path for path in paths if path != spindowns[0]], replace(options, spindown=spindowns[0])
-
-
-METHOD = Method(
-    needs=NEEDS,
-    kind=HoldAnalysis,
-    options=HoldOptions,
-    fit=fit_source,
-    combine=combine,
-    mixed="a drag law through both says nothing about a real top",
-    skips=True,
-    set_beside=set_spindown_beside,
-)

@@ -8,16 +8,26 @@ from typing import TYPE_CHECKING, Any
 from analysis.budget import Budget
 from analysis.held import Hold
 from levilab.pipelines.budget import direct_row
-from levilab.pipelines.document import Document, number, result_model, statistics_of, values_of
-from levilab.pipelines.hold.analysis import METHOD, QUANTITIES, HeldTogether, text_of
-from levilab.pipelines.row import find_all
+from levilab.pipelines.document import Analysis, number, statistics_of, values_of
+from levilab.pipelines.hold.analysis import (
+    HOLD_ROW,
+    QUANTITIES,
+    HeldTogether,
+    HoldAnalysis,
+    combine,
+    fit_source,
+    set_spindown_beside,
+    text_of,
+)
+from levilab.pipelines.hold.readings import read_hold_file, read_hold_run
+from levilab.pipelines.hold.report import hold_columns, hold_part, hold_tables
+from levilab.pipelines.options import HoldOptions
+from levilab.pipelines.row import find_all, symbols_of
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from levilab.pipelines.hold.analysis import HoldAnalysis
     from levilab.pipelines.hold.readings import HoldReadings
-    from levilab.pipelines.options import HoldOptions
     from levilab.pipelines.sources import Source
 
 
@@ -68,10 +78,27 @@ def _renumber(found: HeldTogether, order: Sequence[int]) -> HeldTogether:
     return replace(found, factors=tuple(found.factors[k] for k in order))
 
 
-DOCUMENT = Document(
-    method=replace(METHOD, budget_of_run=budget_of_run),
-    result=result_model(METHOD, Hold, HeldTogether),
+HOLD = Analysis(
+    name="hold",
+    experiments=frozenset({"hold"}),
+    read_file=read_hold_file,
+    read_run=read_hold_run,
+    kind=HoldAnalysis,
+    options=HoldOptions,
+    fit=fit_source,
+    combine=combine,
+    mixed="a drag law through both says nothing about a real top",
+    skips=True,
+    set_beside=set_spindown_beside,
+    budget_of_run=budget_of_run,
+    finding=Hold,
+    combination=HeldTogether,
     entries=_entries,
     run_entries=_run_entries,
     renumber=_renumber,
+    tables=hold_tables,
+    part=hold_part,
+    columns=hold_columns,
+    row=HOLD_ROW,
+    symbols=symbols_of(QUANTITIES),
 )

@@ -15,11 +15,10 @@ from analysis.errors import AnalysisError
 from analysis.limits import Comparison, Sample, Statistics, combine, compare, nearest_edge, spins_of_window, summarize
 from analysis.numbers import digits
 from levilab.errors import DataError
-from levilab.pipelines.analyzed import Analyzed, Method
-from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, read_limit_run
+from levilab.pipelines.analyzed import Analyzed
+from levilab.pipelines.limit.readings import LimitReadings
 from levilab.pipelines.options import LimitOptions
 from levilab.pipelines.row import Quantity, columns_of, entry
-from levilab.pipelines.sources import Needs
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.events import RunEvent
 from levilab.simulator.keys import SceneError
@@ -62,14 +61,8 @@ LIMIT_ROW = (
 
 Which = Literal["lower", "upper"]
 
-LIMIT = "limit"
-#: The runs that suit, and what is needed of a data file.
-NEEDS = Needs(
-    analysis=LIMIT,
-    experiments=frozenset({"limit"}),
-    read_file=read_limit_file,
-    read_run=read_limit_run,
-)
+#: The experiment whose runs it takes, and whose settings count.
+EXPERIMENT = "limit"
 #: Kinds of events that say how a top was lost, in words.
 ENDS: Mapping[str, str] = {
     RunEvent.FELL: "fell freely",
@@ -356,7 +349,7 @@ def _sample(source: Source[LimitReadings], which: Which, options: LimitOptions) 
 
 def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> Conditions:
     """Return the conditions by the run's configuration and its record."""
-    said = source.settings(LIMIT)
+    said = source.settings(EXPERIMENT)
     if which == "lower" or not said:
         return Conditions(which, device.name, synthetic=synthetic_source(source))
     triggered = _is_triggered(source)
@@ -376,7 +369,7 @@ def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> 
 
 
 def _is_triggered(source: Source[LimitReadings]) -> bool:
-    return (source.settings(LIMIT) or {}).get("drive") == "triggered"
+    return (source.settings(EXPERIMENT) or {}).get("drive") == "triggered"
 
 
 def _number(value: object) -> float | None:
@@ -391,7 +384,7 @@ def _comparisons(statistics: Statistics, device: Device, conditions: Conditions)
 
 def _which(source: Source[LimitReadings], device: Device) -> Which:
     """Return the limit that the run names; else the limit whose edge is nearer."""
-    said = source.settings(LIMIT).get("which")
+    said = source.settings(EXPERIMENT).get("which")
     if said in {"lower", "upper"}:
         return "upper" if said == "upper" else "lower"
     mean = float(source.readings.limit.mean())
@@ -445,15 +438,6 @@ def warnings_of(statistics: Statistics) -> list[str]:
             "(limit.creep_hz_per_s, limit.interval_s)"
         )
     return texts
-
-
-METHOD = Method(
-    needs=NEEDS,
-    kind=LimitAnalysis,
-    options=LimitOptions,
-    fit=limits_of,
-    combine=together,
-)
 
 
 # --- in words ---

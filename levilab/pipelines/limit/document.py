@@ -11,18 +11,20 @@ from pydantic import Field, model_validator
 from analysis.budget import Budget, Component, printed_step, rest, u_of_step
 from analysis.numbers import digits
 from levilab.pipelines.budget import time_base
-from levilab.pipelines.document import Document, result_model, values_of
+from levilab.pipelines.document import Analysis, values_of
 from levilab.pipelines.dump import Dump
-from levilab.pipelines.limit.analysis import METHOD, QUANTITIES, LimitAnalysis, Limits
+from levilab.pipelines.limit.analysis import LIMIT_ROW, QUANTITIES, LimitAnalysis, Limits, limits_of, together
+from levilab.pipelines.limit.readings import read_limit_file, read_limit_run
+from levilab.pipelines.limit.report import limit_columns, limit_part, limit_tables
+from levilab.pipelines.options import LimitOptions
 from levilab.pipelines.result import Result
-from levilab.pipelines.row import find_all
+from levilab.pipelines.row import find_all, symbols_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
 
     from analysis.limits import Statistics
     from levilab.pipelines.limit.readings import LimitReadings
-    from levilab.pipelines.options import LimitOptions
     from levilab.pipelines.sources import Source
 
 
@@ -140,10 +142,26 @@ def _renumber(groups: tuple[Limits, ...], order: Sequence[int]) -> tuple[Limits,
     return tuple(replace(group, runs=tuple(order.index(k) for k in group.runs)) for group in groups)
 
 
-DOCUMENT = Document(
-    method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
-    result=result_model(METHOD, Limits, base=LimitResult),
+LIMIT = Analysis(
+    name="limit",
+    experiments=frozenset({"limit"}),
+    read_file=read_limit_file,
+    read_run=read_limit_run,
+    kind=LimitAnalysis,
+    options=LimitOptions,
+    fit=limits_of,
+    combine=together,
+    budget_of_run=budget_of_run,
+    budget_of_all=budget_of_all,
+    finding=Limits,
+    base=LimitResult,
     entries=_entries,
     run_entries=_run_entries,
     renumber=_renumber,
+    tables=limit_tables,
+    part=limit_part,
+    columns=limit_columns,
+    row=LIMIT_ROW,
+    symbols=symbols_of(QUANTITIES),
+    compared=("mean",),
 )

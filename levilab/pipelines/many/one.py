@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import DataError, DoesNotSuit, unquote
 from levilab.files import CannotWrite
 from levilab.formats.waveforms.header import NoRate
-from levilab.pipelines.catalogue import ANALYSES, Analysis
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.result import relative
 from levilab.pipelines.row import Cell, Column, entry, plain
 from levilab.pipelines.suits import save
@@ -17,6 +17,7 @@ from levilab.runs.run import Run
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from levilab.pipelines.document import Analysis
     from levilab.pipelines.options import InputOptions
 
 
@@ -153,7 +154,7 @@ def _read_record(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> 
         return None
     if run.continued_in:
         return PassedOver("a run that was broken off and goes on in another folder")
-    return None if analysis.needs.take(run) else PassedOver(f"a {run.record.experiment} run")
+    return None if analysis.take(run) else PassedOver(f"a {run.record.experiment} run")
 
 
 def _analyze(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> dict[str, Any]:

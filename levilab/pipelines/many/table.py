@@ -22,7 +22,7 @@ from levilab.workers import processes, results_of, this_process
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.document import Analysis
     from levilab.workers import Done
 
 #: Failures that are kept for messages; all stand in the table.
@@ -114,7 +114,7 @@ def write_table(
         raise NoneUsable(f"{paths[0]}: holds no run and no data file; name run folders, or a folder with some of them")
     made_with = {
         "analysis": analysis.name,
-        "settings": analysis.result.settings(options).model_dump(mode="json", by_alias=True),
+        "settings": analysis.settings(options).model_dump(mode="json", by_alias=True),
         "software": software_versions(),
     }
     tally = Tally(len(found))
@@ -122,7 +122,7 @@ def write_table(
         for name, (path, is_run, _) in found.items():
             if name not in file:
                 continue
-            if _hash(Path(path, analysis.needs.data) if is_run else Path(path)) == file.sha256(name):
+            if _hash(Path(path, analysis.data) if is_run else Path(path)) == file.sha256(name):
                 tally.kept += 1
                 tally.done += 1
             else:  # its readings are others now

@@ -13,12 +13,11 @@ from analysis.precession.coherence import Coherence, coherence, pulse_times
 from analysis.precession.sweep import Sweep, SweepFit, fit_sweep
 from analysis.remarks import Remark
 from levilab.errors import DataError
-from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.options import PrecessionOptions
-from levilab.pipelines.precession.readings import SweepReadings, read_sweep_file, read_sweep_run
+from levilab.pipelines.precession.readings import SweepReadings
 from levilab.pipelines.precession.words import remarks_of, verdict
-from levilab.pipelines.sources import Needs
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -28,15 +27,8 @@ if TYPE_CHECKING:
 
     Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
-PRECESSION = "precession"
-#: The runs that suit, and what is needed of a data file.
-NEEDS = Needs(
-    analysis=PRECESSION,
-    experiments=frozenset({"precession"}),
-    read_file=read_sweep_file,
-    read_run=read_sweep_run,
-    particular=True,
-)
+#: The experiment whose runs it takes, and whose settings count.
+EXPERIMENT = "precession"
 
 
 #: A record that is kept at the moment of a reading is that reading's [s].
@@ -99,7 +91,7 @@ def fit_source(source: Source[SweepReadings], options: PrecessionOptions) -> Pre
         u_drive=readings.u_drive,
         spin=readings.spin,
         u_spin=readings.u_spin,
-        gate_s=gate_of(source, PRECESSION),
+        gate_s=gate_of(source, EXPERIMENT),
         gates=readings.laser,
     )
     try:
@@ -142,16 +134,6 @@ def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[Remark]:
     p = float(chdtrc(len(slope) - 1, float(np.sum(((slope - mean) / u) ** 2))))
     if p < DIFFERENT_P:
         yield Remark("slopes differ", values=(len(slope), p))
-
-
-METHOD = Method(
-    needs=NEEDS,
-    kind=PrecessionAnalysis,
-    options=PrecessionOptions,
-    fit=fit_source,
-    combine=lambda _, runs, options: combine(runs, options),
-    mixed="a line through both says nothing about a real top",
-)
 
 
 # --- phase lock ----------------------------------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -11,23 +10,30 @@ from analysis.budget import Budget, Component, printed_step, rest, u_of_step
 from analysis.numbers import digits
 from analysis.precession.sweep import SweepFit
 from levilab.pipelines.budget import gate_of, setting_of, time_base
-from levilab.pipelines.document import Document, number, result_model, values_of
-from levilab.pipelines.precession.analysis import METHOD, PrecessionAnalysis, PrecessionRun
-from levilab.pipelines.precession.words import QUANTITIES, intercept_of, slope_of, verdict
-from levilab.pipelines.row import find_all
+from levilab.pipelines.document import Analysis, number, values_of
+from levilab.pipelines.options import PrecessionOptions
+from levilab.pipelines.precession.analysis import EXPERIMENT, PrecessionAnalysis, PrecessionRun, combine, fit_source
+from levilab.pipelines.precession.readings import read_sweep_file, read_sweep_run
+from levilab.pipelines.precession.report import (
+    precession_columns,
+    precession_curve,
+    precession_curve_u,
+    precession_part,
+    precession_tables,
+)
+from levilab.pipelines.precession.words import PRECESSION_ROW, QUANTITIES, intercept_of, slope_of, verdict
+from levilab.pipelines.row import find_all, symbols_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from analysis.precession.line import Line
-    from levilab.pipelines.options import PrecessionOptions
     from levilab.pipelines.precession.readings import SweepReadings
     from levilab.pipelines.sources import Source
 
     Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
 
-EXPERIMENT = "precession"
 #: Relative uncertainties of the drive's frequency that differ by less than this are those of one clock.
 _ONE_CLOCK = 1e-3
 #: Four times as many points of the same range halve u.
@@ -225,9 +231,29 @@ def _covariance(u: float | None, v: float | None, correlation: float | None) -> 
     return [[u * u, correlation * u * v], [correlation * u * v, v * v]]
 
 
-DOCUMENT = Document(
-    method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
-    result=result_model(METHOD, PrecessionRun, SweepFit),
+PRECESSION = Analysis(
+    name="precession",
+    experiments=frozenset({"precession"}),
+    read_file=read_sweep_file,
+    read_run=read_sweep_run,
+    particular=True,
+    kind=PrecessionAnalysis,
+    options=PrecessionOptions,
+    fit=fit_source,
+    combine=lambda _, runs, options: combine(runs, options),
+    mixed="a line through both says nothing about a real top",
+    budget_of_run=budget_of_run,
+    budget_of_all=budget_of_all,
+    finding=PrecessionRun,
+    combination=SweepFit,
     entries=_entries,
     run_entries=_run_entries,
+    tables=precession_tables,
+    part=precession_part,
+    columns=precession_columns,
+    row=PRECESSION_ROW,
+    symbols=symbols_of(QUANTITIES),
+    curve=precession_curve,
+    curve_u=precession_curve_u,
+    compared=("slope", "intercept"),
 )

@@ -26,16 +26,13 @@ from analysis.pulses.errors import OnlyHum
 from analysis.rotation import FieldSpin, spin_of_field, track_of_field, transverse_moment
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
-from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.options import SpinOptions
 from levilab.pipelines.row import Column, Quantity, columns_of, entry
-from levilab.pipelines.sources import Needs
 from levilab.pipelines.spin.magnetometer import findings_of, spin_of_line, track_middle
-from levilab.pipelines.spin.readings import Records, read_spin_file, read_spin_run, track_of_record
+from levilab.pipelines.spin.readings import Records, track_of_record
 from levilab.pipelines.spin.words import finding_text
 from levilab.present.numbers import with_uncertainty
-from levilab.runs.traces import INDEX
-from levilab.runs.waveforms import has_traces
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -113,17 +110,6 @@ SPIN_ROW = (
 
 Array = NDArray[np.float64]
 
-SPIN = "spin"
-#: The runs and files that suit.
-NEEDS = Needs(
-    analysis=SPIN,
-    experiments=frozenset({"trace"}),
-    read_file=read_spin_file,
-    read_run=read_spin_run,
-    data=INDEX,
-    also=has_traces,
-    wanted="run with traces",
-)
 #: A longer record is cut into windows [s]: a top that coasts loses 3 % of its spin meanwhile, and a parabola of the
 #: phase still holds.
 LONGEST_WHOLE_S = 12.0
@@ -303,16 +289,6 @@ def _spin_of(source: Source[Records], options: SpinOptions) -> SpinRun:
         return _of_several(records, options)
     except AnalysisError as error:
         raise DataError(f"{source.path}: {error}") from error
-
-
-METHOD = Method(
-    needs=NEEDS,
-    kind=SpinAnalysis,
-    options=SpinOptions,
-    fit=spin_of_source,
-    of_files=frozenset({"columns", "rate"}),  # a run may have records of several channels
-    skips=True,
-)
 
 
 def _of_times(times: Array) -> SpinRun:

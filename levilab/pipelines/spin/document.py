@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from analysis.budget import Budget, Component, rest
 from analysis.numbers import digits
 from levilab.pipelines.budget import direct_row, time_base
-from levilab.pipelines.document import Document, result_model, values_of
-from levilab.pipelines.row import find_all
-from levilab.pipelines.spin.analysis import METHOD, OF_A_RUN, QUANTITIES, SpinAnalysis, SpinRun
+from levilab.pipelines.document import Analysis, values_of
+from levilab.pipelines.options import SpinOptions
+from levilab.pipelines.row import find_all, symbols_of
+from levilab.pipelines.spin.analysis import OF_A_RUN, QUANTITIES, SPIN_ROW, SpinAnalysis, SpinRun, spin_of_source
+from levilab.pipelines.spin.readings import read_spin_file, read_spin_run
+from levilab.pipelines.spin.report import spin_columns, spin_part, spin_tables
+from levilab.runs.traces import INDEX
+from levilab.runs.waveforms import has_traces
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from analysis.pulses import SpinFrequency
     from analysis.uncertainty import Estimate
-    from levilab.pipelines.options import SpinOptions
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spin.analysis import UParts
     from levilab.pipelines.spin.readings import Records
@@ -115,9 +118,27 @@ def _run_entries(run: SpinRun) -> dict[str, Any]:
     return {"values": values_of(found), "method": run.spin.method}
 
 
-DOCUMENT = Document(
-    method=replace(METHOD, budget_of_run=budget_of_run),
-    result=result_model(METHOD, SpinRun),
+SPIN = Analysis(
+    name="spin",
+    experiments=frozenset({"trace"}),
+    read_file=read_spin_file,
+    read_run=read_spin_run,
+    data=INDEX,
+    also=has_traces,
+    wanted="run with traces",
+    kind=SpinAnalysis,
+    options=SpinOptions,
+    fit=spin_of_source,
+    of_files=frozenset({"columns", "rate"}),  # a run may have records of several channels
+    skips=True,
+    budget_of_run=budget_of_run,
+    finding=SpinRun,
     entries=_entries,
     run_entries=_run_entries,
+    tables=spin_tables,
+    part=spin_part,
+    columns=spin_columns,
+    row=SPIN_ROW,
+    symbols=symbols_of(QUANTITIES),
+    compared=("frequency",),
 )

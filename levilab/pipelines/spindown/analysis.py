@@ -11,12 +11,11 @@ from analysis.spindown.combine import Combined, combine
 from analysis.spindown.fit import SpinDown, fit_spin_down
 from analysis.spindown.tilt import THESIS_TOP, Top
 from levilab.errors import DataError
-from levilab.pipelines.analyzed import Analyzed, Method
+from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.field.device import THESIS, inertias
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.sources import Needs
-from levilab.pipelines.spindown.readings import SpinReadings, read_run_readings, read_spin_file
+from levilab.pipelines.spindown.readings import SpinReadings
 from levilab.pipelines.spindown.words import remark, verdict_of_all
 
 if TYPE_CHECKING:
@@ -27,16 +26,8 @@ if TYPE_CHECKING:
     from levilab.formats.device import Device
     from levilab.pipelines.sources import Source
 
-SPINDOWN = "spindown"
 #: The experiment whose runs it takes, and whose settings say how the readings were counted.
 EXPERIMENT = "spin"
-#: The runs and files that suit.
-NEEDS = Needs(
-    analysis=SPINDOWN,
-    experiments=frozenset({EXPERIMENT}),
-    read_file=read_spin_file,
-    read_run=read_run_readings,
-)
 
 
 class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOptions]):
@@ -107,16 +98,7 @@ def top_of_device(device: Device | None) -> Top:
     )
 
 
-def _without_doubtful(sources: Sequence[Source[SpinReadings]], runs: Sequence[SpinDown]) -> Sequence[SpinDown]:
-    """Return the runs whose unit is not in doubt; all of them where every unit is."""
-    return [run for source, run in zip(sources, runs, strict=True) if not source.readings.doubtful] or runs
-
-
-METHOD = Method(
-    needs=NEEDS,
-    kind=SpinDownAnalysis,
-    options=SpinDownOptions,
-    fit=fit_source,
-    combine=lambda sources, runs, _: combine(_without_doubtful(sources, runs)),
-    mixed="a mean over both says nothing about a real top",
-)
+def combine_sound(sources: Sequence[Source[SpinReadings]], runs: Sequence[SpinDown], _: SpinDownOptions) -> Combined:
+    """Return all runs together, without those whose unit is in doubt unless every unit is."""
+    sound = [run for source, run in zip(sources, runs, strict=True) if not source.readings.doubtful]
+    return combine(sound or runs)

@@ -14,11 +14,20 @@ from analysis.spindown.combine import Combined
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown
 from levilab.pipelines.budget import bench_clock, direct_row, gate_of, setting_of, time_base
-from levilab.pipelines.document import Document, number, result_model, statistics_of, value_of, values_of
+from levilab.pipelines.document import Analysis, number, statistics_of, value_of, values_of
+from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.row import find_all
-from levilab.pipelines.spindown.analysis import EXPERIMENT, METHOD, SpinDownAnalysis
-from levilab.pipelines.spindown.report import answer
-from levilab.pipelines.spindown.words import CORRELATION, QUANTITIES, remark, verdict_of_run
+from levilab.pipelines.spindown.analysis import EXPERIMENT, SpinDownAnalysis, combine_sound, fit_source
+from levilab.pipelines.spindown.readings import read_run_readings, read_spin_file
+from levilab.pipelines.spindown.report import (
+    answer,
+    spindown_columns,
+    spindown_curve,
+    spindown_curve_u,
+    spindown_part,
+    spindown_tables,
+)
+from levilab.pipelines.spindown.words import CORRELATION, QUANTITIES, SPINDOWN_ROW, SYMBOLS, remark, verdict_of_run
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -27,7 +36,6 @@ if TYPE_CHECKING:
     from analysis.spindown.lawfit import LawFit, Parts
     from analysis.spindown.verdict import Verdict
     from analysis.uncertainty import Estimate
-    from levilab.pipelines.options import SpinDownOptions
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spindown.readings import SpinReadings
 
@@ -330,11 +338,29 @@ def _check_models(run: SpinDown) -> str:
     return f"its result has a drag law that this version lacks, {unknown[0]}" if unknown else ""
 
 
-DOCUMENT = Document(
-    method=replace(METHOD, budget_of_run=budget_of_run, budget_of_all=budget_of_all),
-    result=result_model(METHOD, SpinDown, Combined),
+SPINDOWN = Analysis(
+    name="spindown",
+    experiments=frozenset({EXPERIMENT}),
+    read_file=read_spin_file,
+    read_run=read_run_readings,
+    kind=SpinDownAnalysis,
+    options=SpinDownOptions,
+    fit=fit_source,
+    combine=combine_sound,
+    mixed="a mean over both says nothing about a real top",
+    budget_of_run=budget_of_run,
+    budget_of_all=budget_of_all,
+    finding=SpinDown,
+    combination=Combined,
     entries=_entries,
     run_entries=_run_entries,
     check=_check,
     outdated=_check_models,
+    tables=spindown_tables,
+    part=spindown_part,
+    columns=spindown_columns,
+    row=SPINDOWN_ROW,
+    symbols=SYMBOLS,
+    curve=spindown_curve,
+    curve_u=spindown_curve_u,
 )

@@ -12,14 +12,12 @@ from analysis.errors import AnalysisError
 from analysis.numbers import digits
 from analysis.sway import Geometry, Swings, geometric_magnetism, mirrored, swings_of
 from levilab.errors import DataError
-from levilab.pipelines.analyzed import EachAlone, Method
+from levilab.pipelines.analyzed import EachAlone
 from levilab.pipelines.options import SwayOptions
 from levilab.pipelines.row import Quantity, columns_of, entry, statistic
-from levilab.pipelines.sources import Needs
 from levilab.pipelines.sway.device import known_of
-from levilab.pipelines.sway.readings import SwayReadings, read_motion_run, read_track_file
+from levilab.pipelines.sway.readings import SwayReadings
 from levilab.present.numbers import with_uncertainty
-from levilab.runs.run import STATES
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -54,16 +52,6 @@ SWAY_ROW = (
 )
 
 
-SWAY = "sway"
-NEEDS = Needs(
-    analysis=SWAY,
-    experiments=frozenset({"simulate", "sway"}),
-    read_file=read_track_file,
-    read_run=read_motion_run,
-    data=STATES,
-    particular=True,
-    wanted="track of x and y over time, a sway run, or a simulated motion",
-)
 #: A split of fewer standard uncertainties excludes nothing; a ratio that is more of them from 1 disagrees.
 _ENOUGH = 3.0
 #: A tilt of the precession that adds more to the split is most likely a mark far from the centre of mass.
@@ -120,9 +108,6 @@ def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRu
     return SwayRun(
         tuple(swings), at, geometry, view, _in_words(geometry), (*notes, *_doubts(swings, geometry, view=view))
     )
-
-
-METHOD = Method(needs=NEEDS, kind=SwayAnalysis, options=SwayOptions, fit=analyze_source, skips=True)
 
 
 def _in_words(found: Geometry) -> str:

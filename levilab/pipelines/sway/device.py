@@ -15,8 +15,8 @@ from analysis.top import top_of
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.formats.device import Device
-from levilab.pipelines.field.analysis import METHOD as FIELD
 from levilab.pipelines.field.device import inertias, parts_of
+from levilab.pipelines.field.document import FIELD
 from levilab.pipelines.options import FieldOptions
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import scene_of

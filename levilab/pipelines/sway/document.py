@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from analysis.budget import Budget
 from levilab.pipelines.budget import direct_row
-from levilab.pipelines.document import Document, result_model, values_of
-from levilab.pipelines.row import find_all
-from levilab.pipelines.sway.analysis import METHOD, QUANTITIES, SwayRun
+from levilab.pipelines.document import Analysis, values_of
+from levilab.pipelines.options import SwayOptions
+from levilab.pipelines.row import find_all, symbols_of
+from levilab.pipelines.sway.analysis import QUANTITIES, SWAY_ROW, SwayAnalysis, SwayRun, analyze_source
+from levilab.pipelines.sway.readings import read_motion_run, read_track_file
+from levilab.pipelines.sway.report import sway_columns, sway_part, sway_tables
+from levilab.runs.run import STATES
 
 if TYPE_CHECKING:
-    from levilab.pipelines.options import SwayOptions
     from levilab.pipelines.sources import Source
-    from levilab.pipelines.sway.analysis import SwayAnalysis
     from levilab.pipelines.sway.readings import SwayReadings
 
 
@@ -74,9 +75,25 @@ def _run_entries(run: SwayRun) -> dict[str, Any]:
     return {"values": values, "models": [model]}
 
 
-DOCUMENT = Document(
-    method=replace(METHOD, budget_of_run=budget_of_run),
-    result=result_model(METHOD, SwayRun),
+SWAY = Analysis(
+    name="sway",
+    experiments=frozenset({"simulate", "sway"}),
+    read_file=read_track_file,
+    read_run=read_motion_run,
+    data=STATES,
+    particular=True,
+    wanted="track of x and y over time, a sway run, or a simulated motion",
+    kind=SwayAnalysis,
+    options=SwayOptions,
+    fit=analyze_source,
+    skips=True,
+    budget_of_run=budget_of_run,
+    finding=SwayRun,
     entries=_entries,
     run_entries=_run_entries,
+    tables=sway_tables,
+    part=sway_part,
+    columns=sway_columns,
+    row=SWAY_ROW,
+    symbols=symbols_of(QUANTITIES),
 )

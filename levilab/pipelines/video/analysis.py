@@ -20,10 +20,10 @@ from levilab.errors import DataError, DoesNotSuit, UsageError
 from levilab.formats.film import Film, open_film
 from levilab.formats.kinds import AUDIO, kind_of_bytes
 from levilab.formats.table import file_errors
-from levilab.pipelines.analyzed import EachAlone, Method
+from levilab.pipelines.analyzed import EachAlone
 from levilab.pipelines.options import VideoOptions
 from levilab.pipelines.row import Quantity, columns_of
-from levilab.pipelines.sources import Needs, Readings
+from levilab.pipelines.sources import Readings
 from levilab.pipelines.video.leaning import Leaning, Rising, leaning_of, rising_of
 from levilab.pipelines.video.tracking import Followed, follow
 from levilab.present.numbers import with_uncertainty
@@ -225,17 +225,9 @@ def analyze_source(source: Source[FilmReadings], options: VideoOptions) -> Video
         bar.close()
 
 
-def _no_run(run: Run, _: InputOptions) -> FilmReadings:
+def no_run(run: Run, _: InputOptions) -> FilmReadings:
+    """Raise DoesNotSuit: a run holds no film."""
     raise DoesNotSuit(f"{run.folder}: is a run, a film is expected")
-
-
-METHOD = Method(
-    needs=Needs("video", frozenset(), read_film, _no_run, particular=True, wanted="film"),  # type: ignore[arg-type]
-    kind=VideoAnalysis,
-    options=VideoOptions,
-    fit=analyze_source,
-    skips=True,
-)
 
 
 def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from analysis.budget import Budget
 from levilab.pipelines.budget import direct_row
-from levilab.pipelines.document import Document, result_model, values_of
-from levilab.pipelines.row import find_all
-from levilab.pipelines.video.analysis import METHOD, QUANTITIES, Video
+from levilab.pipelines.document import Analysis, values_of
+from levilab.pipelines.options import VideoOptions
+from levilab.pipelines.row import find_all, symbols_of
+from levilab.pipelines.video.analysis import (
+    QUANTITIES,
+    VIDEO_ROW,
+    Video,
+    VideoAnalysis,
+    analyze_source,
+    no_run,
+    read_film,
+)
+from levilab.pipelines.video.report import video_columns, video_files, video_part, video_tables
 
 if TYPE_CHECKING:
-    from levilab.pipelines.options import VideoOptions
     from levilab.pipelines.sources import Source
-    from levilab.pipelines.video.analysis import FilmReadings, VideoAnalysis
+    from levilab.pipelines.video.analysis import FilmReadings
 
 #: Quantity, and the only part of its u: name, source, kind, note, remedy.
 _ROWS: tuple[tuple[str, str, str, Literal["A", "B"], str, str], ...] = (
@@ -42,9 +50,25 @@ def _run_entries(run: Video) -> dict[str, Any]:
     return {"values": values_of(find_all(QUANTITIES, run)), "choices_hz": [abs(f) for f in run.choices]}
 
 
-DOCUMENT = Document(
-    method=replace(METHOD, budget_of_run=budget_of_run),
-    result=result_model(METHOD, Video),
+VIDEO = Analysis(
+    name="video",
+    experiments=frozenset(),
+    read_file=read_film,
+    read_run=no_run,
+    particular=True,
+    wanted="film",
+    kind=VideoAnalysis,
+    options=VideoOptions,
+    fit=analyze_source,
+    skips=True,
+    budget_of_run=budget_of_run,
+    finding=Video,
     entries=_entries,
     run_entries=_run_entries,
+    tables=video_tables,
+    part=video_part,
+    columns=video_columns,
+    row=VIDEO_ROW,
+    symbols=symbols_of(QUANTITIES),
+    files=video_files,
 )

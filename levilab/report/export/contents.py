@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from levilab.formats.waveforms.waveform import Waveform
-    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.document import Analysis
     from levilab.pipelines.result import Result
     from levilab.sweeps.store import Store
 
@@ -160,7 +160,7 @@ def contents_of_results(path: Path, run: Run | None, results: Results) -> Conten
         path, run = next((path, source.run) for path, source in inputs.items())
     waveforms = run_waveforms(run) if run else _waveforms_of(results)
     tables = [*_readings(run), *map(_of_analysis, results), *map(_of_waveform, enumerate(waveforms, 1))]
-    written = [analysis.result.of(found, Place(Path())) for analysis, found in results]
+    written = [analysis.result_of(found, Place(Path())) for analysis, found in results]
     files = {
         f"result{f'.{one.analysis}' * (k > 0)}.json": f"{as_json(one.as_dict())}\n".encode(errors="replace")
         for k, one in enumerate(written)

@@ -18,7 +18,7 @@ from levilab.present.units import unit
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.document import Analysis
     from levilab.pipelines.sources import Source
 
 #: Quantities that are compared where an analysis names none and has no model.

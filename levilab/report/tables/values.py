@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from levilab.pipelines.catalogue import Analysis
+    from levilab.pipelines.document import Analysis
     from levilab.pipelines.row import Cell
     from levilab.pipelines.sources import Source
 

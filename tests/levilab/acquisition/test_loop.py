@@ -547,7 +547,7 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path):
 
 def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion):
     from levilab.pipelines.options import SpinDownOptions
-    from levilab.pipelines.spindown.analysis import METHOD
+    from levilab.pipelines.spindown.document import SPINDOWN
     from levilab.simulator import preset
 
     run = in_full_motion
@@ -557,7 +557,7 @@ def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion):
     assert 22.5 < spins.iloc[-1] < 26
     assert run.record.configuration["scene"] == preset("spindown").as_table()
     assert "full motion" in str(run.record.synthetic_how)
-    disc = METHOD.analyze([run.folder], SpinDownOptions()).runs[0].fit("disc").parameters["c32"]
+    disc = SPINDOWN.analyze([run.folder], SpinDownOptions()).runs[0].fit("disc").parameters["c32"]
     # 0.3 % of its own uncertainty, and what nutation from the drive leaves (docs/decisions/0011)
     assert disc.value == pytest.approx(2.34e-4, rel=0.009)
 

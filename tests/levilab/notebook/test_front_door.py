@@ -350,7 +350,7 @@ def test_numbers_are_taken_with_their_units_as_on_the_command_line() -> None:
 
 def test_every_option_is_a_keyword_with_its_default() -> None:
     given = inspect.signature(levilab.analyze).parameters
-    options = {one.name: one.default for row in ANALYSES.values() for one in fields(row.result.method.options)}
+    options = {one.name: one.default for row in ANALYSES.values() for one in fields(row.options)}
     options.pop("guess")  # whether titles are guessed is for those who name a single file
     data = {"data", "kind", "time", "frequency", "light"}
     assert {name: one.default for name, one in given.items() if name not in data} == options

@@ -2,34 +2,27 @@
 
 import json
 import shutil
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from analysis.spindown.combine import Combined
-from analysis.spindown.fit import SpinDown
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines import catalogue
-from levilab.pipelines.catalogue import ANALYSES, Analysis
-from levilab.pipelines.document import result_model
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.document import Analysis
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Archive
-from levilab.pipelines.spindown.analysis import METHOD
+from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import analyze_suiting, recall_suiting, suiting
 from levilab.pipelines.suits import save as save_found
 from support.spin_downs import spin_down_csv
 
-SPINDOWN = ANALYSES["spindown"]
-
 
 def second_row(*experiments):
     """Another analysis that reads spin-downs."""
-    needs = replace(SPINDOWN.needs, analysis="second", experiments=frozenset(experiments))
-    method = replace(SPINDOWN.result.method, needs=needs)
-    result = replace(SPINDOWN.result, result=result_model(method, SpinDown, Combined), method=method)
-    return replace(SPINDOWN, result=result)
+    return replace(SPINDOWN, name="second", experiments=frozenset(experiments))
 
 
 class Content(Analysis[Any]):
@@ -43,7 +36,7 @@ class Content(Analysis[Any]):
 
 def content_row(*experiments):
     row = second_row(*experiments)
-    return Content(row.result, row.tables, row.part, row.columns)
+    return Content(**{one.name: getattr(row, one.name) for one in fields(row)})
 
 
 def use(monkeypatch, *rows):
@@ -99,23 +92,23 @@ def test_each_analysis_finds_its_own_result_again(tmp_path, runs, name):
     (row, recalled), (second, _) = recall_suiting([path], {})
     assert (row.name, second.name) == ("spindown", "second")
     assert all(origin.text.startswith("as levilab analyze found it") for origin in recalled.origins)
-    archive = Archive([path], second.result.result)
+    archive = Archive([path], second.model)
     whole = archive.whole(recalled.sources)
     assert whole
     assert whole.file.name.endswith("result.second.json")
     source = recalled.sources[-1]
-    earlier = Archive([source.path], second.result.result).earlier(source.path, source.data, source.sha256)
+    earlier = Archive([source.path], second.model).earlier(source.path, source.data, source.sha256)
     assert earlier
     assert earlier.file.name.endswith("result.second.json")
 
 
 def test_result_json_belongs_to_the_first_row_for_the_experiment(monkeypatch, runs):
     use(monkeypatch, ANALYSES["field"], second_row("spin"), SPINDOWN)
-    found = METHOD.analyze([runs / "run-1"], SpinDownOptions())
+    found = SPINDOWN.analyze([runs / "run-1"], SpinDownOptions())
     rows = catalogue.ANALYSES
     assert save_found(rows["second"], found)[0].name == "result.json"
     assert save_found(rows["spindown"], found)[0].name == "result.spindown.json"
-    together = METHOD.analyze([runs], SpinDownOptions())
+    together = SPINDOWN.analyze([runs], SpinDownOptions())
     assert save_found(rows["second"], together)[0].name == "result.second.json"
 
 
@@ -123,7 +116,7 @@ def test_several_inputs_leave_the_result_of_the_present_run_alone(runs, monkeypa
     monkeypatch.chdir(runs / "run-1")
     paths = [Path(), Path("../run-2")]
     monkeypatch.setattr(Analysis, "png", lambda *_: b"")
-    written = save_found(SPINDOWN, METHOD.analyze(paths, SpinDownOptions()))[0]
+    written = save_found(SPINDOWN, SPINDOWN.analyze(paths, SpinDownOptions()))[0]
     assert written.resolve() == runs / "result.json"
     assert SPINDOWN.recall(paths, SpinDownOptions()).origins[1].text.endswith(str(written))
 

@@ -30,7 +30,7 @@ def test_recalling_a_result_gives_what_was_found(tmp_path, sample_data, name, in
     analysis = ANALYSES[name]
     options = analysis.options_from({})
     found = analysis.analyze(places, options)
-    save(analysis.result.of(found, found.place), found.place, picture=None)
+    save(analysis.result_of(found, found.place), found.place, picture=None)
     again = analysis.recall(places, options)
     assert all(origin.text.startswith("as levilab analyze found it") for origin in again.origins)
     assert differences(found.runs, again.runs) == []

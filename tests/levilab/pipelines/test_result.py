@@ -14,14 +14,13 @@ from levilab.files import replace_atomically
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Place, beside, read_result, save
-from levilab.pipelines.spindown.analysis import METHOD
-from levilab.pipelines.spindown.document import DOCUMENT
+from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import save as save_found
 from support.spin_downs import spin_down_csv
 
 
 def saved(*paths):
-    return [file.name for file in save_found(ANALYSES["spindown"], METHOD.analyze(paths, SpinDownOptions()))]
+    return [file.name for file in save_found(ANALYSES["spindown"], SPINDOWN.analyze(paths, SpinDownOptions()))]
 
 
 #: Names that come near one another: with dots, without an ending, like results themselves.
@@ -72,13 +71,13 @@ def test_the_result_of_a_run_folder_is_result_json_in_it(tmp_path, sample_data, 
     assert saved(run) == ["result.json", "spindown.png"]
     assert written == ["spindown.png", "result.json"]  # who sees the new result sees no old figure
     assert (run / "result.json").is_file()
-    assert METHOD.analyze([run / "readings.csv"], SpinDownOptions()).place.result() == run / "result.json"
+    assert SPINDOWN.analyze([run / "readings.csv"], SpinDownOptions()).place.result() == run / "result.json"
 
 
 def write_result(tmp_path):
     """The result of a data file, without its figure."""
-    analysis = METHOD.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())
-    return save(DOCUMENT.of(analysis, analysis.place), analysis.place, picture=b"")[0]
+    analysis = SPINDOWN.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())
+    return save(SPINDOWN.result_of(analysis, analysis.place), analysis.place, picture=b"")[0]
 
 
 def damaged(content, *keys, value=...):
@@ -126,7 +125,7 @@ def test_a_damaged_result_is_refused_with_what_is_wrong(tmp_path, keys, value, s
     file = write_result(tmp_path)
     file.write_text(damaged(json.loads(file.read_text(encoding="utf-8")), *keys, value=value), encoding="utf-8")
     with pytest.raises(DataError) as caught:
-        read_result(file, DOCUMENT.result)
+        read_result(file, SPINDOWN.model)
     text = str(caught.value)
     assert text.startswith(f"{file}: ")
     assert says in text
@@ -139,31 +138,31 @@ def test_what_is_no_result_is_refused_in_one_line(tmp_path, text):
     file = tmp_path / "result.json"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(DataError, match=r"cut off or not JSON|schema is"):
-        read_result(file, DOCUMENT.result)
+        read_result(file, SPINDOWN.model)
 
 
 def test_bytes_that_are_no_text_are_refused_too(tmp_path):
     file = tmp_path / "result.json"
     file.write_bytes(b"\xff\xfe\x00{")
     with pytest.raises(DataError, match="not JSON"):
-        read_result(file, DOCUMENT.result)
+        read_result(file, SPINDOWN.model)
 
 
 def test_a_result_of_another_analysis_is_none_of_this_one(tmp_path):
     file = write_result(tmp_path)
     file.write_text(damaged(json.loads(file.read_text(encoding="utf-8")), "analysis", value="field"), encoding="utf-8")
-    assert read_result(file, DOCUMENT.result) is None
-    assert read_result(tmp_path / "nowhere.json", DOCUMENT.result) is None
+    assert read_result(file, SPINDOWN.model) is None
+    assert read_result(tmp_path / "nowhere.json", SPINDOWN.model) is None
 
 
 def test_keys_of_a_newer_version_are_passed_over(tmp_path):
     file = write_result(tmp_path)
     file.write_text(damaged(json.loads(file.read_text(encoding="utf-8")), "new", value=1), encoding="utf-8")
-    assert read_result(file, DOCUMENT.result)
+    assert read_result(file, SPINDOWN.model)
 
 
 def test_a_result_read_and_written_again_is_the_same_text(tmp_path):
     file = write_result(tmp_path)
-    result = read_result(file, DOCUMENT.result)
+    result = read_result(file, SPINDOWN.model)
     assert result
     assert result.as_dict() == json.loads(file.read_text(encoding="utf-8"))

@@ -14,7 +14,7 @@ import pytest
 from levilab.errors import DataError, LevilabError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.spindown.analysis import METHOD
+from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Tabular
@@ -37,7 +37,7 @@ def render(found):
 
 @pytest.fixture(scope="module")
 def found():
-    return METHOD.analyze([SAMPLE_DATA], SpinDownOptions())
+    return SPINDOWN.analyze([SAMPLE_DATA], SpinDownOptions())
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +101,7 @@ def changed(run, **entries):
 
 def text_of(*paths, options=None):
     with without_figures():
-        return Page(render(METHOD.analyze(paths, options or SpinDownOptions()))).text
+        return Page(render(SPINDOWN.analyze(paths, options or SpinDownOptions()))).text
 
 
 @pytest.fixture
@@ -142,7 +142,7 @@ def test_what_a_user_typed_is_escaped_wherever_it_stands(tmp_path, run):
     event = json.dumps({"time_s": 1.0, "kind": "fell", "text": evil}) + "\n"
     (tmp_path / "run <b>bold" / "events.jsonl").write_text(event, encoding="utf-8")
     file = spin_down_csv(tmp_path / "<i>my.csv")
-    parsed = Page(render(METHOD.analyze([tmp_path / "run <b>bold", file], SpinDownOptions(tilt="none"))))
+    parsed = Page(render(SPINDOWN.analyze([tmp_path / "run <b>bold", file], SpinDownOptions(tilt="none"))))
     assert parsed.text.count(evil) >= 14
     assert "run <b>bold" in parsed.text
     assert "<i>my.csv" in parsed.text
@@ -211,7 +211,7 @@ def test_a_mixture_of_real_and_synthetic_runs_is_no_measurement_and_says_so(tmp_
 @pytest.mark.usefixtures("undrawn_figures")
 @pytest.mark.parametrize("readings", [3, 20])
 def test_a_law_is_marked_best_only_where_the_readings_decide(tmp_path, readings):
-    analysis = METHOD.analyze([spin_down_csv(tmp_path / "a.csv", n=readings)], SpinDownOptions(tilt="none"))
+    analysis = SPINDOWN.analyze([spin_down_csv(tmp_path / "a.csv", n=readings)], SpinDownOptions(tilt="none"))
     parsed = Page(render(analysis))
     marked = [attributes for tag, attributes in parsed.tags if tag == "tr" and attributes.get("class") == "best"]
     assert bool(marked) == analysis.combined.verdict.decided
@@ -226,7 +226,7 @@ def reported(*paths, output, tell=None, **options):
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_the_report_shows_what_analyze_found(run, tmp_path):
-    analysis = METHOD.analyze([run], SpinDownOptions(tilt="none"))
+    analysis = SPINDOWN.analyze([run], SpinDownOptions(tilt="none"))
     save(ANALYSES["spindown"], analysis)
     text = reported(run, output=tmp_path / "report.html")
     assert with_uncertainty(analysis.runs[0].fit("disc").parameters["c32"]).split()[0] in text
@@ -235,7 +235,7 @@ def test_the_report_shows_what_analyze_found(run, tmp_path):
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_the_report_does_not_fit_what_has_a_result(run, tmp_path, monkeypatch):
-    analysis = METHOD.analyze([run], SpinDownOptions(tilt="none"))
+    analysis = SPINDOWN.analyze([run], SpinDownOptions(tilt="none"))
     save(ANALYSES["spindown"], analysis)
     monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", pytest.fail)
     recalled = render(ANALYSES["spindown"].recall([run], SpinDownOptions(tilt="none")))
@@ -249,7 +249,7 @@ def test_the_report_says_what_it_had_to_analyze(run, tmp_path):
     before = sorted(run.rglob("*"))
     assert "analyzed for this page: there was no result yet" in reported(run, output=tmp_path / "report.html")
     assert sorted(run.rglob("*")) == before
-    save(ANALYSES["spindown"], METHOD.analyze([run], SpinDownOptions()))
+    save(ANALYSES["spindown"], SPINDOWN.analyze([run], SpinDownOptions()))
     text = reported(run, output=tmp_path / "report.html", reading_u=0.05)
     assert f"analyzed for this page: other options than those of {run / 'result.json'}" in text
     assert "u of a reading: 0.05 Hz, as given to the analysis" in text
@@ -268,7 +268,7 @@ def test_the_page_needs_nothing_of_the_terminal():
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_a_report_of_a_data_file_knows_no_instrument_and_says_so(tmp_path):
-    parsed = Page(render(METHOD.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))))
+    parsed = Page(render(SPINDOWN.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))))
     assert "my.csv" in parsed.text
     assert "no instruments recorded" in parsed.text
     assert "SYNTHETIC" not in parsed.text
@@ -281,7 +281,7 @@ def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path):
     nu = 40 * (1 + 2.34e-4 * np.sqrt(2 * np.pi * 40) * t / 2) ** -2 + np.random.default_rng(0).normal(0, 0.03, t.size)
     path = tmp_path / "long.csv"
     np.savetxt(path, np.c_[t, nu], delimiter=",", header="time_s,spin_frequency_hz", comments="")
-    html = render(METHOD.analyze([path], SpinDownOptions(reading_u=0.03)))
+    html = render(SPINDOWN.analyze([path], SpinDownOptions(reading_u=0.03)))
     assert "The first 200 of 20000" in Page(html).text
     assert len(html) < 3e6
 
@@ -327,7 +327,7 @@ def test_a_run_that_has_two_results_is_described_once(tmp_path, sample_data):
 def test_a_result_that_lies_elsewhere_is_found_by_its_own_path(tmp_path, run):
     elsewhere = tmp_path / "elsewhere"
     spindown = ANALYSES["spindown"]
-    save(spindown, METHOD.analyze([run], SpinDownOptions(reading_u=0.07)), elsewhere)
+    save(spindown, SPINDOWN.analyze([run], SpinDownOptions(reading_u=0.07)), elsewhere)
     messages = []
     text = reported(run, output=tmp_path / "page.html", tell=messages.append)
     assert "as levilab analyze found it" not in text

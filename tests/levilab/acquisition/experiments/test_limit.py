@@ -21,9 +21,9 @@ from levilab.acquisition.table import Configuration, settings_of, with_settings
 from levilab.acquisition.triggering import CYCLE
 from levilab.bench.config import ConfigError
 from levilab.errors import UsageError
-from levilab.pipelines.limit.analysis import METHOD
+from levilab.pipelines.limit.document import LIMIT
 from levilab.pipelines.options import LimitOptions, SpinDownOptions
-from levilab.pipelines.spindown.analysis import METHOD as SPINDOWN
+from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.simulator.scene import preset
 from levilab.world.bursts import mean_pull
 from levilab.world.motion_world import MotionWorld
@@ -128,7 +128,7 @@ def test_the_mean_of_tops_that_are_all_alike_is_no_better_than_a_step(tmp_path):
     run = acquire(
         in_world(mock(tmp_path, *SLIPS[:-1], "limit.repetitions=4"), Slipping(SpinScene(), VirtualClock())), Silent()
     )
-    (found,) = (one.statistics for one in METHOD.analyze([run.folder], LimitOptions()).runs)
+    (found,) = (one.statistics for one in LIMIT.analyze([run.folder], LimitOptions()).runs)
     assert found.n == 4
     assert found.mean.value is not None
     assert found.mean.u is not None
@@ -241,7 +241,7 @@ def test_the_cause_of_a_loss_in_full_motion_is_the_only_possible_one(tmp_path, d
     settings = ("limit.which=upper", f"limit.drive_frequency_hz={begins}", "limit.creep_hz_per_s=0.1", "limit.hold_s=0")
     request = mock(tmp_path, *settings, "limit.drive_waveform=SQU", "limit.repetitions=1")
     run = acquire(in_world(request, MotionWorld(scene, VirtualClock(), seed=1)), Silent())
-    (group,) = METHOD.analyze([run.folder], LimitOptions()).groups
+    (group,) = LIMIT.analyze([run.folder], LimitOptions()).groups
     assert causes(run) == [cause]
     assert group.causes == {cause: 1}
     assert f"The phase before each loss tells why: {cause} once." in group.text
@@ -408,7 +408,7 @@ def test_a_top_that_levels_off_shows_where_pull_and_drag_are_equal(tmp_path):
     pulls = (frame["spin_frequency_hz"] - balance) / frame["spin_frequency_u_hz"]
     assert abs(pulls).max() < 3
     assert frame["spin_frequency_u_hz"].max() < 0.02 * balance.min()
-    (found,) = METHOD.analyze([run.folder], LimitOptions()).groups
+    (found,) = LIMIT.analyze([run.folder], LimitOptions()).groups
     assert found.conditions.triggered
     assert found.conditions.levels_off
     assert found.statistics.step == 0
@@ -429,7 +429,7 @@ def test_a_top_that_leaves_the_window_has_its_limit_where_it_fell(tmp_path):
     pulls = (lost["spin_frequency_hz"] - 37) / lost["spin_frequency_u_hz"]
     assert abs(pulls).max() < 3
     assert lost["spin_frequency_u_hz"].max() < 0.05
-    analysis = METHOD.analyze([run.folder], LimitOptions())
+    analysis = LIMIT.analyze([run.folder], LimitOptions())
     (found,) = analysis.groups
     assert found.statistics.n == 2
     assert not found.conditions.levels_off

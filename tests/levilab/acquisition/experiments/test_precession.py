@@ -18,7 +18,7 @@ from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration, with_settings
 from levilab.interruption import Interrupted
 from levilab.pipelines.options import PrecessionOptions
-from levilab.pipelines.precession.analysis import METHOD
+from levilab.pipelines.precession.document import PRECESSION
 from levilab.runs.run import Run
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
@@ -78,7 +78,7 @@ def test_a_sweep_in_full_motion_finds_a_locked_top(tmp_path):
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
     assert show.left == sorted(show.left, reverse=True)
     assert show.left[-1] == 0
-    (found,) = METHOD.analyze([run.folder], PrecessionOptions()).runs
+    (found,) = PRECESSION.analyze([run.folder], PrecessionOptions()).runs
     assert [one.point for one in found.coherences] == [0, 1, 2]
     # of this run's gates; their u is the line's, the first estimate of the value stands in the readings
     np.testing.assert_allclose(found.fit.column("precession"), readings.column("precession_frequency_hz"), rtol=1e-9)

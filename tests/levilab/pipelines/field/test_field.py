@@ -11,9 +11,8 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.device import Device, DeviceError, read_device
 from levilab.formats.table import parse_columns
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.field.analysis import METHOD, NEEDS
 from levilab.pipelines.field.device import known_of
-from levilab.pipelines.field.document import DOCUMENT
+from levilab.pipelines.field.document import FIELD
 from levilab.pipelines.field.figure import field_figure
 from levilab.pipelines.field.report import field_part, scans_table
 from levilab.pipelines.options import FieldOptions
@@ -48,7 +47,7 @@ def device(sample_data):
 
 def keep(found):
     """Write the result, but for the figure."""
-    return save(DOCUMENT.of(found, found.place), found.place, b"")[0]
+    return save(FIELD.result_of(found, found.place), found.place, b"")[0]
 
 
 def csv(path, header, *columns):
@@ -62,7 +61,7 @@ def csv(path, header, *columns):
 
 def test_the_sample_scan_gives_its_truth_back(sample_data, device):
     """As make.py prints it; 3 u, where the seed was chosen before this was seen."""
-    found = METHOD.analyze([sample_data / "field-scan"], FieldOptions(device=read_device(device)))
+    found = FIELD.analyze([sample_data / "field-scan"], FieldOptions(device=read_device(device)))
     for name, truth in (("strength", 1.409299e-3), ("origin", 0.811e-3), ("thickness", 14.79e-3)):
         estimate = found.values[name]
         assert estimate.value is not None
@@ -72,7 +71,7 @@ def test_the_sample_scan_gives_its_truth_back(sample_data, device):
 
 def test_a_result_holds_what_was_found(scan, device):
     options = FieldOptions(device=read_device(device), height_m=0.0735)
-    found = METHOD.analyze([scan], options)
+    found = FIELD.analyze([scan], options)
     document = json.loads(keep(found).read_text(encoding="utf-8"))
     assert document["values"]["strength"]["unit"] == "T m"
     assert {"origin", "thickness", "moment", "mass_to_set"} <= set(document["values"])
@@ -90,7 +89,7 @@ def test_a_gain_that_no_gauss_meter_has_is_taken_for_none(scan, said):
     record = json.loads((scan / "run.json").read_text(encoding="utf-8"))
     record["configuration"]["field"]["gain_u"] = said
     (scan / "run.json").write_text(json.dumps(record), encoding="utf-8")
-    (source,) = collect([scan], NEEDS, lambda _: FieldOptions()).sources
+    (source,) = collect([scan], FIELD, lambda _: FieldOptions()).sources
     assert source.readings.has_own_u
     assert known_of(source, None).gain_u == 0
 
@@ -99,7 +98,7 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp
     other = shutil.copytree(scan, tmp_path / "other")
     text = (other / "readings.csv").read_text(encoding="utf-8").replace(",0.035,", ",0.0352,")
     (other / "readings.csv").write_text(text, encoding="utf-8")
-    found = METHOD.analyze([tmp_path], FieldOptions())
+    found = FIELD.analyze([tmp_path], FieldOptions())
     alone = [run.values["strength"] for run in found.runs]
     mean = found.values["strength"]
     assert mean.value == pytest.approx(np.mean([one.value for one in alone]))
@@ -117,7 +116,7 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp
 
 
 def test_the_windows_of_spin_are_drawn_from_the_lightest_top_to_the_heaviest(sample_data):
-    found = METHOD.analyze([sample_data / "field-scan"], FieldOptions())
+    found = FIELD.analyze([sample_data / "field-scan"], FieldOptions())
     slow, fast = field_figure(found).axes[3].get_lines()[:2]
     ends = [1e3 * (found.values[name].value or 0.0) for name in ("lightest_mass", "heaviest_mass")]
     for line in (slow, fast):
@@ -142,7 +141,7 @@ def test_the_windows_of_spin_are_drawn_from_the_lightest_top_to_the_heaviest(sam
 def test_files_of_users_are_read_in_their_units(tmp_path, titles, z, b):
     path = csv(tmp_path / "hall.csv", titles[0], z, b)
     options = FieldOptions(columns=parse_columns(titles[1]), device=CALLIPER)
-    found = METHOD.analyze([path], options)
+    found = FIELD.analyze([path], options)
     strength = found.values["strength"].value
     assert strength == pytest.approx(
         BASE.strength_t_m, rel=1e-3
@@ -165,7 +164,7 @@ def test_files_of_users_are_read_in_their_units(tmp_path, titles, z, b):
 def test_bad_scans_are_refused_in_one_line(tmp_path, z, b, says):
     path = csv(tmp_path / "hall.csv", "z [mm],B [mT]", z, b)
     with pytest.raises(DataError) as caught:
-        METHOD.analyze([path], FieldOptions(device=CALLIPER))
+        FIELD.analyze([path], FieldOptions(device=CALLIPER))
     assert says in str(caught.value)
     assert str(path) in str(caught.value)
 
@@ -173,20 +172,20 @@ def test_bad_scans_are_refused_in_one_line(tmp_path, z, b, says):
 def test_a_file_without_its_base_says_what_is_missing(tmp_path):
     path = csv(tmp_path / "hall.csv", "z [mm],B [mT]", HEIGHTS_MM, FIELD_MT)
     with pytest.raises(DataError, match=r"the radii of the base are not known.*`device`"):
-        METHOD.analyze([path], FieldOptions())
+        FIELD.analyze([path], FieldOptions())
 
 
 def test_a_file_of_something_else_does_not_suit(tmp_path, sample_data):
     with pytest.raises(DoesNotSuit, match="needs a field run"):
-        METHOD.analyze([sample_data / "spin-down-1"], FieldOptions())
+        FIELD.analyze([sample_data / "spin-down-1"], FieldOptions())
     path = csv(tmp_path / "spin.csv", "t,f", HEIGHTS_MM, FIELD_MT)
     with pytest.raises(DoesNotSuit, match=r"no title is known \(height_m, flux_density_t.*z=NAME,b=NAME"):
-        METHOD.analyze([path], FieldOptions())
+        FIELD.analyze([path], FieldOptions())
 
 
 def test_a_moment_needs_the_mass(scan):
     with pytest.raises(DataError, match=r"`height_m` tells the moment of a top only if its mass is known"):
-        METHOD.analyze([scan], FieldOptions(height_m=0.073))
+        FIELD.analyze([scan], FieldOptions(height_m=0.073))
 
 
 # --- the device file ---

@@ -12,7 +12,6 @@ from levilab.formats.columns import TableError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.limit.analysis import (
     LOWER_EDGE,
-    METHOD,
     RESONANCE,
     SIMON,
     THESIS_HIGHEST,
@@ -20,6 +19,7 @@ from levilab.pipelines.limit.analysis import (
     UPPER_EDGE,
     LimitOptions,
 )
+from levilab.pipelines.limit.document import LIMIT
 from levilab.pipelines.limit.report import limit_part, limit_tables
 from levilab.pipelines.sources import SkippedRuns, mark_of
 from levilab.pipelines.suits import analyze_suiting, save
@@ -30,7 +30,7 @@ from support.spin_downs import spin_down_csv
 
 
 def test_the_published_limits_give_the_published_statistics(sample_data):
-    analysis = METHOD.analyze([sample_data / "lower-limits"], LimitOptions())
+    analysis = LIMIT.analyze([sample_data / "lower-limits"], LimitOptions())
     values = ANALYSES["limit"].document(analysis, sample_data)["values"]
     assert round(values["mean"]["value"], 2) == 21.86
     assert round(values["scatter"]["value"], 2) == 0.25
@@ -42,7 +42,7 @@ def test_theory_beside_them_is_that_of_the_thesis_top(sample_data, tmp_path):
     """PHYSICS: window 21.65 to 80.6 Hz at z = 7.30 cm, computed there from the quartic; resonance 22.1 Hz."""
     file = tmp_path / "upper.csv"  # with no scene of its own
     file.write_text("61.2\n60.9\n61.0\n", encoding="utf-8")
-    (lower, upper) = METHOD.analyze([sample_data / "lower-limits", file], LimitOptions()).groups
+    (lower, upper) = LIMIT.analyze([sample_data / "lower-limits", file], LimitOptions()).groups
     expected = {one.name: one.expected for group in (lower, upper) for one in group.comparisons}
     share = 2779 * 2 * np.pi / 60 / 326  # of Simon's top 3: measured, and the edge of its quartic
     reached = {THESIS_HIGHEST: 61, THESIS_LOOSE: 66, SIMON: share * 80.6}
@@ -165,7 +165,7 @@ def test_what_is_made_up_is_said_of_each_run_and_group(sample_data, tmp_path, mo
 @pytest.mark.usefixtures("undrawn_figures")
 def test_what_was_written_is_what_a_report_shows(sample_data, tmp_path):
     folder = shutil.copytree(sample_data / "loose-washers", tmp_path / "run")
-    analysis = METHOD.analyze([folder], LimitOptions())
+    analysis = LIMIT.analyze([folder], LimitOptions())
     assert [file.name for file in save(ANALYSES["limit"], analysis)] == ["result.json", "limit.png"]
     page = write_report([folder], tmp_path / "page.html").read_text(encoding="utf-8")
     assert "LOOSE WASHERS" in page
@@ -177,7 +177,7 @@ def test_what_was_written_is_what_a_report_shows(sample_data, tmp_path):
 def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path):
     file = tmp_path / "my.csv"
     file.write_text("top,f [Hz]\n1,80.1\n2,80.3\n3,79.9\n", encoding="utf-8")
-    (group,) = METHOD.analyze([file], LimitOptions()).groups
+    (group,) = LIMIT.analyze([file], LimitOptions()).groups
     assert (group.which, group.statistics.n) == ("upper", 3)  # by the nearer edge of the window
 
 
@@ -194,7 +194,7 @@ def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path):
 def test_a_column_of_limits_alone_is_enough(tmp_path, text, request):
     file = tmp_path / "my.csv"
     file.write_text(("rpm\n" if request.node.callspec.id == "rpm" else "") + text, encoding="utf-8")
-    (group,) = METHOD.analyze([file], LimitOptions()).groups
+    (group,) = LIMIT.analyze([file], LimitOptions()).groups
     assert group.statistics.mean.value == pytest.approx(65.0 / 3)
     assert (group.which, group.statistics.n) == ("lower", 3)
 
@@ -204,7 +204,7 @@ def test_another_column_is_no_limit(tmp_path, text):
     file = tmp_path / "my.csv"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(TableError):
-        METHOD.analyze([file], LimitOptions())
+        LIMIT.analyze([file], LimitOptions())
 
 
 def test_runs_of_other_conditions_stand_apart(sample_data, tmp_path):
@@ -217,7 +217,7 @@ def test_runs_of_other_conditions_stand_apart(sample_data, tmp_path):
         off = 4.0 * k + np.tile([-0.1, 0.1], 4)
         rows = ["spin_frequency_hz,spin_frequency_u_hz", *(f"{67 + one},0.05" for one in off)]
         (folder / "readings.csv").write_text("\n".join([*rows, ""]), encoding="utf-8")
-    analysis = METHOD.analyze([tmp_path / name for name in names], LimitOptions())
+    analysis = LIMIT.analyze([tmp_path / name for name in names], LimitOptions())
     assert sorted(group.runs for group in analysis.groups) == [(0, 1), (2,), (3,)]
     both = next(group for group in analysis.groups if group.runs == (0, 1))
     assert both.statistics.between
@@ -235,7 +235,7 @@ def test_a_repetition_far_off_is_numbered_among_all_and_the_page_shows_200(tmp_p
         limits = 21.9 + 0.1 * np.sin(1.0 + np.arange(n))
         limits[3] += 2.0 * (name == "two")
         (tmp_path / f"{name}.csv").write_text("\n".join(f"{one:.3f}" for one in limits), encoding="utf-8")
-    analysis = METHOD.analyze([tmp_path / "one.csv", tmp_path / "two.csv"], LimitOptions())
+    analysis = LIMIT.analyze([tmp_path / "one.csv", tmp_path / "two.csv"], LimitOptions())
     of_all, of_second = (text for text in analysis.all_warnings if "not belong to the others" in text)
     assert of_all.startswith("repetition 14 does not")
     assert of_second.startswith("two.csv: repetition 4 does not")
@@ -251,7 +251,7 @@ def test_upper_limits_that_do_not_scatter_are_no_better_than_a_step(sample_data,
     header, *rows = (folder / "readings.csv").read_text(encoding="utf-8").splitlines()
     alike = [",".join([row.split(",")[0], *rows[0].split(",")[1:]]) for row in rows]
     (folder / "readings.csv").write_text("\n".join([header, *alike, ""]), encoding="utf-8")
-    analysis = METHOD.analyze([folder], LimitOptions())
+    analysis = LIMIT.analyze([folder], LimitOptions())
     (run,) = analysis.runs
     assert run.statistics.mean.u == pytest.approx(float(rows[0].split(",")[2]))
     assert any("however often it is repeated: creep slower" in text for text in analysis.all_warnings)
@@ -264,7 +264,7 @@ def test_a_mean_within_a_step_of_the_drive_is_not_called_better(sample_data, tmp
     cells = [[row.split(",")[0], *rows[0].split(",")[1:]] for row in rows]
     cells[0][at] = str(float(cells[0][at]) + 0.01)
     (folder / "readings.csv").write_text("\n".join([header, *map(",".join, cells), ""]), encoding="utf-8")
-    text = str(limit_part(METHOD.analyze([folder], LimitOptions())).result[0])
+    text = str(limit_part(LIMIT.analyze([folder], LimitOptions())).result[0])
     assert "times as good" not in text
     assert "do not become less by more tops" in text
 
@@ -276,7 +276,7 @@ def test_causes_of_losses_are_counted_over_runs_and_explained(sample_data, tmp_p
             file.write('{"time_s": 5000.0, "kind": "note", "text": "", "cause": "left behind by the drive"}\n')
     readings = folders[1] / "readings.csv"
     readings.write_text(readings.read_text(encoding="utf-8").replace("69.", "68."), encoding="utf-8")
-    analysis = METHOD.analyze(folders, LimitOptions())
+    analysis = LIMIT.analyze(folders, LimitOptions())
     (group,) = analysis.groups
     assert group.causes == {"left behind by the drive": 18}
     assert "The phase before each loss tells why: left behind by the drive 18 times." in group.text
@@ -291,10 +291,10 @@ def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path, samp
     file = spin_down_csv(tmp_path / "my.csv")
     assert [row.name for row, _ in analyze_suiting([file], {})] == ["spindown"]
     with pytest.raises(DoesNotSuit, match="no limits of one top"):
-        METHOD.analyze([file], LimitOptions())
+        LIMIT.analyze([file], LimitOptions())
     file.write_text("t,f\n0,40\n10,39\n20,37\n30,37.5\n40,36\n50,35\n", encoding="utf-8")  # not far down
     with pytest.raises(DoesNotSuit, match="the spin falls with time"):
-        METHOD.analyze([file], LimitOptions())
+        LIMIT.analyze([file], LimitOptions())
     file.write_text("t,f\n" + "".join(f"{k},21.8\n" for k in range(6)), encoding="utf-8")  # as printed to 0.1 Hz
     assert [row.name for row, _ in analyze_suiting([file], {})] == ["limit"]
     for wrong, says in (
@@ -307,10 +307,10 @@ def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path, samp
     empty = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
     (empty / "readings.csv").write_text("spin_frequency_hz\n", encoding="utf-8")
     with pytest.raises(TableError, match="at least one repetition is needed"):
-        METHOD.analyze([empty], LimitOptions())
+        LIMIT.analyze([empty], LimitOptions())
     (empty / "readings.csv").write_text("spin_frequency_hz\n21.9\n-1\n", encoding="utf-8")
     with pytest.raises(TableError, match="line 3: the limit is -1 Hz"):
-        METHOD.analyze([empty], LimitOptions())
+        LIMIT.analyze([empty], LimitOptions())
 
 
 def test_a_scene_that_was_measured_is_the_one_compared_with(sample_data, tmp_path):
@@ -318,10 +318,10 @@ def test_a_scene_that_was_measured_is_the_one_compared_with(sample_data, tmp_pat
     record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     record["configuration"]["scene"] = {"name": "mine", "top": {"mass_kg": 0.025}}
     (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
-    (run,) = METHOD.analyze([folder], LimitOptions()).runs
+    (run,) = LIMIT.analyze([folder], LimitOptions()).runs
     assert run.device
     assert run.device.name == "the scene mine, 25 g"
     record["configuration"]["scene"]["top"]["mass_kg"] = 0.03  # floats nowhere
     (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
     with pytest.raises(DataError, match=r"configuration\.scene: no spin keeps this top up"):
-        METHOD.analyze([folder], LimitOptions())
+        LIMIT.analyze([folder], LimitOptions())

@@ -9,8 +9,7 @@ from analysis.precession.gates import Gates, rates_at_point
 from instruments.drivers.oscilloscope import Trace
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import PrecessionOptions
-from levilab.pipelines.precession.analysis import METHOD
-from levilab.pipelines.precession.document import DOCUMENT
+from levilab.pipelines.precession.document import PRECESSION
 from levilab.pipelines.precession.figure import precession_figure
 from levilab.pipelines.result import save
 from levilab.pipelines.suits import analyze_suiting
@@ -38,7 +37,7 @@ def sweep_csv(path, *, slope=1.0, u=True, seed=1, half=None):
 
 
 def save_without_picture(found):
-    return save(DOCUMENT.of(found, found.place), found.place, b"", first=False)[0]
+    return save(PRECESSION.result_of(found, found.place), found.place, b"", first=False)[0]
 
 
 def test_a_file_of_ones_own_is_analyzed_without_naming_its_columns(tmp_path):
@@ -63,25 +62,25 @@ def test_a_file_of_ones_own_is_analyzed_without_naming_its_columns(tmp_path):
 
 def test_the_options_reach_the_fit(tmp_path):
     file = sweep_csv(tmp_path / "mine.csv", half=3)
-    kept = METHOD.analyze([file], PrecessionOptions(keep_outliers=True, orthogonal=True, reading_u=0.1)).combined
+    kept = PRECESSION.analyze([file], PrecessionOptions(keep_outliers=True, orthogonal=True, reading_u=0.1)).combined
     assert (kept.line.n, kept.line.orthogonal, kept.points[0].u) == (9, True, 0.1)
 
 
 def test_several_sweeps_share_a_line(tmp_path):
     files = [sweep_csv(tmp_path / f"{k}.csv", seed=k) for k in (1, 2)]
-    found = METHOD.analyze(files, PrecessionOptions())
+    found = PRECESSION.analyze(files, PrecessionOptions())
     assert found.combined.line.n == 18
     both, one = found.combined.line, found.runs[0].fit.line
     assert both.u_slope / both.scale == pytest.approx(one.u_slope / one.scale / 2**0.5)
     other = sweep_csv(tmp_path / "3.csv", slope=1.05, seed=3)
-    together = METHOD.analyze([*files, other], PrecessionOptions())
+    together = PRECESSION.analyze([*files, other], PrecessionOptions())
     assert any("slopes of the 3 runs differ" in text for text in together.all_warnings)
     assert "is excluded" in together.text
 
 
 def test_other_options_than_those_of_the_result_fit_again_with_the_rest_as_before(tmp_path):
     files = [sweep_csv(tmp_path / f"{k}.csv", seed=k, half=k) for k in (1, 2)]
-    found = METHOD.analyze(files[:1], PrecessionOptions(orthogonal=True))
+    found = PRECESSION.analyze(files[:1], PrecessionOptions(orthogonal=True))
     save_without_picture(found)
     other_options = ANALYSES["precession"].recall(files[:1], PrecessionOptions(keep_outliers=True))
     assert other_options.origins[0].text.startswith("analyzed for this page: other options")
@@ -132,12 +131,12 @@ def run_with_records(folder, drift, kept_s=26.0):
 
 
 def test_a_record_says_whether_the_pulses_keep_to_the_drives_phase(tmp_path):
-    found = METHOD.analyze([run_with_records(tmp_path / "locked", 0.0, kept_s=20.0)], PrecessionOptions())
+    found = PRECESSION.analyze([run_with_records(tmp_path / "locked", 0.0, kept_s=20.0)], PrecessionOptions())
     ((point, coherence),) = [(one.point, one.coherence) for one in found.runs[0].coherences]
     assert point == 1
     assert coherence.length > 0.99
     assert coherence.phase_rad == pytest.approx(-np.pi / 2, abs=0.15)  # a cosine's maxima on a sine's phase, ±½ ms
-    drifting = METHOD.analyze([run_with_records(tmp_path / "drifting", 0.6)], PrecessionOptions())
+    drifting = PRECESSION.analyze([run_with_records(tmp_path / "drifting", 0.6)], PrecessionOptions())
     assert drifting.runs[0].coherences[0].coherence.drift_hz == pytest.approx(0.6, abs=0.01)
     assert any("do not keep to the drive's phase at point 2" in text for text in drifting.all_warnings)
 
@@ -179,7 +178,7 @@ def test_a_reading_that_is_not_that_of_its_gates_is_believed_itself(tmp_path):
                 counted = rates_at_point(spin, laser)[1].value + change
                 writer.reading(dict(zip(names, (20.0 * (k + 1), drive, counted, 0.5), strict=True)))
             writer.finish("finished")
-        (run,) = METHOD.analyze([writer.folder], PrecessionOptions()).runs
+        (run,) = PRECESSION.analyze([writer.folder], PrecessionOptions()).runs
         assert (run.fit.points[0].u == 0.5) == bool(change)
         assert (run.fit.points[0].spin is None) == bool(change)
-    assert METHOD.analyze([writer.folder], PrecessionOptions()).all_warnings[0].endswith("the gates are not used")
+    assert PRECESSION.analyze([writer.folder], PrecessionOptions()).all_warnings[0].endswith("the gates are not used")

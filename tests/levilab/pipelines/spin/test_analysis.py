@@ -16,10 +16,11 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions, SpinOptions
 from levilab.pipelines.spin import words
-from levilab.pipelines.spin.analysis import METHOD, Series, drive_offset
+from levilab.pipelines.spin.analysis import Series, drive_offset
+from levilab.pipelines.spin.document import SPIN
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spin.report import meaning, spin_part, spin_tables
-from levilab.pipelines.spindown.analysis import METHOD as SPINDOWN
+from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import analyze_suiting
 from levilab.pipelines.suits import save as save_found
 from levilab.runs.run import Run, RunRecord, utc_now
@@ -45,7 +46,7 @@ def test_the_offset_from_a_drive_is_of_the_held_part_and_its_u_of_the_scatter():
 
 
 def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data):
-    analysis = METHOD.analyze([sample_data / "scope-files"], SpinOptions(rate=None))
+    analysis = SPIN.analyze([sample_data / "scope-files"], SpinOptions(rate=None))
     assert len(analysis.runs) == 21  # the array needs a rate
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
         frequency, chirp = run.spin.frequency, run.spin.chirp
@@ -59,28 +60,28 @@ def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data):
 def test_a_laser_and_a_drive_are_no_spin(sample_data):
     sweep = sample_data / "precession-sweep"
     with pytest.raises(DoesNotSuit, match="records of laser and drive, none of which shows the spin: levilab analyze"):
-        METHOD.analyze([sweep], SpinOptions())
-    named = METHOD.analyze([sweep], SpinOptions(channel="laser"))
+        SPIN.analyze([sweep], SpinOptions())
+    named = SPIN.analyze([sweep], SpinOptions(channel="laser"))
     assert any("the frequency of laser is no spin, but how often" in text for text in named.all_warnings)
 
 
 def test_options_reach_the_file_and_the_method(sample_data):
     array = sample_data / "scope-files" / "samples-4000hz.npy"
-    (run,) = METHOD.analyze([array], SpinOptions(rate=4000.0, method="edges")).runs
+    (run,) = SPIN.analyze([array], SpinOptions(rate=4000.0, method="edges")).runs
     assert run.spin.method == "edges"
     assert run.spin.frequency.value == pytest.approx(true_frequency("samples.npy", run.spin.reference_time), abs=0.01)
     two = sample_data / "scope-files" / "rigol-ds1000z.csv"
-    other = METHOD.analyze([two], SpinOptions(channel="2")).runs[0].spin
+    other = SPIN.analyze([two], SpinOptions(channel="2")).runs[0].spin
     assert other.frequency.value == pytest.approx(50, abs=0.01)  # 40 samples high, 40 low, at 4000 a second
     assert any(
         "CH1 is analyzed, the option `channel` chooses another" in text
-        for text in METHOD.analyze([two], SpinOptions()).all_warnings
+        for text in SPIN.analyze([two], SpinOptions()).all_warnings
     )
 
 
 def test_a_long_record_is_followed_and_feeds_the_drag_laws(tmp_path):
     path = coasting_wav(tmp_path / "long.wav")
-    (run,) = METHOD.analyze([path], SpinOptions()).runs
+    (run,) = SPIN.analyze([path], SpinOptions()).runs
     assert len(run.series) == 15  # windows of 2 s
     omega = ((2 * np.pi * RELEASE_HZ) ** -0.5 + C32 * run.series.time / 2) ** -2
     pulls = (run.series.frequency - omega / (2 * np.pi)) / run.series.u
@@ -109,7 +110,7 @@ def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path):
     path.write_text("pulse time [s]\n" + "".join(f"{x:.7f}\n" for x in times), encoding="utf-8")
     disc = SPINDOWN.analyze([path], SpinDownOptions()).runs[0].fit("disc").parameters["c32"]
     assert disc.value == pytest.approx(C32, rel=1e-3)
-    assert len(METHOD.analyze([path], SpinOptions()).runs[0].series) == 15
+    assert len(SPIN.analyze([path], SpinOptions()).runs[0].series) == 15
 
 
 def test_a_record_that_is_too_short_is_no_spin_down(sample_data):
@@ -141,7 +142,7 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced):
     waveform = run_waveforms(Run.load(traced))[1]
     assert (waveform.start, waveform.step, waveform.count) == (pytest.approx(9.6), 2.5e-4, 1600)
     assert waveform.samples().max() == pytest.approx(1.1, abs=0.1)
-    analysis = METHOD.analyze([traced], SpinOptions())
+    analysis = SPIN.analyze([traced], SpinOptions())
     series = analysis.runs[0].series
     assert series.frequency == pytest.approx([30, 29, 28], abs=0.01)
     assert series.time == pytest.approx([-0.2, 9.8, 19.8], abs=0.05)  # the middles of 0.4 s before they were complete
@@ -163,13 +164,13 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced):
 def test_a_run_that_was_killed_before_its_first_record_has_nothing_to_analyze(traced):
     (traced / "traces.jsonl").unlink()
     with pytest.raises(DataError, match=r"holds no traces\.jsonl, so nothing was recorded; analyze another run"):
-        METHOD.analyze([traced], SpinOptions())
+        SPIN.analyze([traced], SpinOptions())
 
 
 def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced):
     first, *others = (stored.trace for stored in Run.load(traced).traces())
     dark = replace(first, codes=np.full_like(first.codes, 10))
-    analysis = METHOD.analyze([run_of(traced.parent, [dark, *others])], SpinOptions())
+    analysis = SPIN.analyze([run_of(traced.parent, [dark, *others])], SpinOptions())
     assert len(analysis.runs[0].series) == 2
     (note,) = [text for text in analysis.all_warnings if text.endswith("(no-pulses)")]
     assert "1 of 3 records are left out: no pulses" in note
@@ -180,14 +181,14 @@ def test_a_finding_in_some_records_of_a_run_names_them(traced):
     *others, last = (stored.trace for stored in Run.load(traced).traces())
     codes = last.codes.copy()  # at 28 Hz, from -0.2 s on: its sixth turn
     codes[int((0 - 0.5 / 28 + 0.2) * 4000) : int((0.5 / 28 + 0.2) * 4000)] = 10
-    analysis = METHOD.analyze([run_of(traced.parent, [*others, replace(last, codes=codes)])], SpinOptions())
+    analysis = SPIN.analyze([run_of(traced.parent, [*others, replace(last, codes=codes)])], SpinOptions())
     assert analysis.runs[0].spin.missing == 0
     assert [text for text in analysis.all_warnings if text.endswith("record 3: 1 turn has no pulse (missing)")]
 
 
 def test_the_result_says_what_the_interface_promises(sample_data, tmp_path):
     shutil.copy(sample_data / "scope-files" / "keysight-dsox.csv", tmp_path)
-    analysis = METHOD.analyze([tmp_path / "keysight-dsox.csv"], SpinOptions())
+    analysis = SPIN.analyze([tmp_path / "keysight-dsox.csv"], SpinOptions())
     written = save_found(ANALYSES["spin"], analysis)[0]
     assert written.name == "keysight-dsox.csv.result.spin.json"
     result = json.loads(written.read_text(encoding="utf-8"), parse_constant=pytest.fail)
@@ -202,7 +203,7 @@ def test_findings_are_notes_with_their_names(tmp_path):
     t = np.arange(4000) / 1000
     turns = 30 * t
     signal = np.where(np.isin(np.rint(turns), (20, 21, 50)), 0.1, pulses(turns))  # three turns without their pulse
-    analysis = METHOD.analyze([write_wav(tmp_path / "a.wav", signal, 1000)], SpinOptions())
+    analysis = SPIN.analyze([write_wav(tmp_path / "a.wav", signal, 1000)], SpinOptions())
     assert analysis.runs[0].spin.missing == 3
     assert any(text.endswith("(missing)") for text in analysis.all_warnings)
 
@@ -210,10 +211,10 @@ def test_findings_are_notes_with_their_names(tmp_path):
 def test_a_record_without_pulses_is_refused_in_one_line(tmp_path):
     path = write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
     with pytest.raises(DataError, match=r"dark\.wav: 0 pulses in 4 s, at least 4 are needed"):
-        METHOD.analyze([path], SpinOptions())
+        SPIN.analyze([path], SpinOptions())
 
 
-@pytest.mark.parametrize("find", [METHOD.analyze, ANALYSES["spin"].recall])
+@pytest.mark.parametrize("find", [SPIN.analyze, ANALYSES["spin"].recall])
 def test_a_record_without_pulses_among_others_is_passed_over(find, tmp_path):
     """By a report, too, which recalls."""
     write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
@@ -260,7 +261,7 @@ def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(wh
         "long": [coasting_wav(tmp_path / "long.wav", seconds=14, rate=4000)] if what == "long" else [],
         "many": [sample_data / "scope-files"],
     }
-    figure = spin_figure(METHOD.analyze(files[what], SpinOptions()))
+    figure = spin_figure(SPIN.analyze(files[what], SpinOptions()))
     panels = figure.get_axes()
     assert len(panels) == (12 if what == "many" else 4)
     assert faults(figure) == []
@@ -290,7 +291,7 @@ def test_residuals_of_a_bent_frequency_have_no_bend_left(what, tmp_path):
         text = "time [s],signal [V]\n" + "".join(f"{a:.4f},{b:.4f}\n" for a, b in zip(time, light, strict=True))
     file = tmp_path / "curved.csv"
     file.write_text(text, encoding="utf-8")
-    analysis = METHOD.analyze([file], SpinOptions())
+    analysis = SPIN.analyze([file], SpinOptions())
     bend = analysis.runs[0].spin.bend
     assert bend.value == pytest.approx(0.6, abs=4 * bend.u)
     panel = spin_figure(analysis).get_axes()[2]
@@ -320,7 +321,7 @@ def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_
     """
     settings = {"trace.records": 50, "trace.interval_s": 2.0}
     run = levilab.acquire("trace", mock=True, seed=2, out=tmp_path, settings=settings)
-    found = METHOD.analyze([run.folder], SpinOptions()).runs[0]
+    found = SPIN.analyze([run.folder], SpinOptions()).runs[0]
     straight, weight = found.series.frequency**-0.5, 2 * found.series.frequency**1.5 / found.series.u
     line = np.polynomial.Polynomial.fit(found.series.time, straight, 1, w=weight)
     squares = float((((straight - line(found.series.time)) * weight) ** 2).sum())
@@ -330,7 +331,7 @@ def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_
 
 
 def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data):
-    found = METHOD.analyze([sample_data / "trace-tape"], SpinOptions())
+    found = SPIN.analyze([sample_data / "trace-tape"], SpinOptions())
     (run,) = found.runs
     assert run.which == "record 3 of 5"
     assert run.trend
@@ -354,7 +355,7 @@ def test_each_finding_about_pulses_and_lines_has_a_sentence():
 
 
 def test_of_a_single_record_the_slope_is_its_own(sample_data):
-    found = METHOD.analyze([sample_data / "scope-files"], SpinOptions())
+    found = SPIN.analyze([sample_data / "scope-files"], SpinOptions())
     single = [run for run in found.runs if not run.which]
     assert single
     assert all(run.trend is None for run in single)

@@ -16,7 +16,7 @@ from levilab.files import CannotWrite
 from levilab.formats.columns import NoSuchColumn
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.spindown.analysis import METHOD
+from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.readings import read_spin_file
 from levilab.pipelines.spindown.report import spindown_part, spindown_tables
 from levilab.pipelines.suits import save
@@ -29,7 +29,7 @@ PUBLISHED = (("0.003199", "1.760e-05"), ("0.003134", "1.707e-05"), ("0.003133", 
 
 
 def test_the_straight_lines_give_the_published_constants_to_every_printed_digit(sample_data):
-    analysis = METHOD.analyze([sample_data], SpinDownOptions())
+    analysis = SPINDOWN.analyze([sample_data], SpinDownOptions())
     constants = [
         (run.fit("stokes").linearised["c1"].value, run.fit("newton").linearised["c2"].value) for run in analysis.runs
     ]
@@ -70,7 +70,7 @@ def test_the_sample_traces_are_small_and_labelled_synthetic(sample_data):
 
 
 def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data):
-    analysis = METHOD.analyze([sample_data], SpinDownOptions())
+    analysis = SPINDOWN.analyze([sample_data], SpinDownOptions())
     combined = analysis.combined
     lines = spindown_tables(analysis)[-1]
     assert [row.kind for row in lines.rows] == ["", "", "", "", "together"]
@@ -88,7 +88,7 @@ def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data
 
 
 def test_the_result_is_written_as_the_interface_says(sample_data, tmp_path):
-    save(ANALYSES["spindown"], METHOD.analyze([sample_data], SpinDownOptions()), tmp_path)
+    save(ANALYSES["spindown"], SPINDOWN.analyze([sample_data], SpinDownOptions()), tmp_path)
     text = (tmp_path / "result.json").read_text(encoding="utf-8")
     result = json.loads(text, parse_constant=pytest.fail)
     assert list(result) == sorted(result)
@@ -110,7 +110,7 @@ def test_the_result_is_written_as_the_interface_says(sample_data, tmp_path):
 
 
 def test_one_run_has_its_start_and_covariance_at_the_top(sample_data):
-    analysis = METHOD.analyze([sample_data / "spin-down-1"], SpinDownOptions())
+    analysis = SPINDOWN.analyze([sample_data / "spin-down-1"], SpinDownOptions())
     result = ANALYSES["spindown"].document(analysis, analysis.output_folder)
     disc = next(model for model in result["models"] if model["name"] == "disc")
     assert set(disc["parameters"]) == {"start_frequency", "c32"}
@@ -120,7 +120,7 @@ def test_one_run_has_its_start_and_covariance_at_the_top(sample_data):
 
 
 def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path):
-    analysis = METHOD.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))
+    analysis = SPINDOWN.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))
     result = ANALYSES["spindown"].document(analysis, analysis.output_folder)
     assert analysis.output_folder == tmp_path
     assert (result["synthetic"], result["best_model"]) == (False, "disc")
@@ -128,26 +128,26 @@ def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path):
 
 
 def test_the_same_run_given_twice_counts_once(sample_data, tmp_path):
-    analysis = METHOD.analyze([sample_data, sample_data / "spin-down-1"], SpinDownOptions())
+    analysis = SPINDOWN.analyze([sample_data, sample_data / "spin-down-1"], SpinDownOptions())
     assert len(analysis.sources) == 4
     shutil.copytree(sample_data / "spin-down-1", tmp_path / "copy")
-    analysis = METHOD.analyze([sample_data / "spin-down-1", tmp_path / "copy"], SpinDownOptions())
+    analysis = SPINDOWN.analyze([sample_data / "spin-down-1", tmp_path / "copy"], SpinDownOptions())
     assert len(analysis.sources) == 1
     assert "counted once" in analysis.warnings[0]
 
 
 def test_the_readings_of_a_run_are_that_run_and_as_synthetic(sample_data, tmp_path):
-    (source,) = METHOD.analyze([sample_data / "spin-down-1" / "readings.csv"], SpinDownOptions()).sources
+    (source,) = SPINDOWN.analyze([sample_data / "spin-down-1" / "readings.csv"], SpinDownOptions()).sources
     assert source.synthetic
     shutil.copytree(sample_data / "spin-down-1", tmp_path / "broken")
     (tmp_path / "broken" / "run.json").write_text("{", encoding="utf-8")
-    (source,) = METHOD.analyze([tmp_path / "broken" / "readings.csv"], SpinDownOptions()).sources
+    (source,) = SPINDOWN.analyze([tmp_path / "broken" / "readings.csv"], SpinDownOptions()).sources
     assert any("whether it is SYNTHETIC is not known" in warning for warning in source.warnings)
 
 
 def test_real_and_synthetic_inputs_together_are_warned_of(sample_data, tmp_path):
     path = spin_down_csv(tmp_path / "my.csv")
-    analysis = METHOD.analyze([path, sample_data / "spin-down-1"], SpinDownOptions())
+    analysis = SPINDOWN.analyze([path, sample_data / "spin-down-1"], SpinDownOptions())
     assert "1 of 2 inputs are SYNTHETIC" in analysis.warnings[0]
     assert analysis.output_folder == Path()
 
@@ -157,12 +157,12 @@ def test_inputs_of_the_same_name_are_told_apart(tmp_path):
         (tmp_path / folder).mkdir()
         spin_down_csv(tmp_path / folder / "run.csv", seed=k)
     paths = [tmp_path / "monday" / "run.csv", Path(os.path.relpath(tmp_path / "tuesday" / "run.csv"))]
-    analysis = METHOD.analyze(paths, SpinDownOptions())
+    analysis = SPINDOWN.analyze(paths, SpinDownOptions())
     assert [source.name for source in analysis.sources] == ["monday/run.csv", "tuesday/run.csv"]
 
 
 def test_the_hash_in_the_result_is_that_of_the_file(sample_data, tmp_path):
-    result = ANALYSES["spindown"].document(METHOD.analyze([sample_data], SpinDownOptions()), tmp_path)
+    result = ANALYSES["spindown"].document(SPINDOWN.analyze([sample_data], SpinDownOptions()), tmp_path)
     for given in result["inputs"]:
         assert hashlib.sha256((tmp_path / given["path"]).read_bytes()).hexdigest() == given["sha256"]
 
@@ -173,13 +173,13 @@ def test_another_unit_taken_for_hertz_is_doubted(tmp_path, unit, factor):
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
     np.savetxt(path, np.c_[t, factor * nu], delimiter=",", header="t,f", comments="")
     with pytest.raises(NoSuchColumn) as error:
-        METHOD.analyze([path], SpinDownOptions())
+        SPINDOWN.analyze([path], SpinDownOptions())
     assert error.value.doubt.choices[0].columns == {"t": "1", "f": f"2 [{unit}]"}
     np.savetxt(path, np.c_[t, factor * nu], delimiter=",", header="t,f [Hz]", comments="")
-    (source,) = METHOD.analyze([path], SpinDownOptions()).sources  # stated: a note
+    (source,) = SPINDOWN.analyze([path], SpinDownOptions()).sources  # stated: a note
     assert source.readings.doubtful
     assert f"f=NAME [{unit}]" in source.warnings[0]
-    stated = METHOD.analyze([path], SpinDownOptions(columns={"t": "t", "f": f"f [{unit}]"}))
+    stated = SPINDOWN.analyze([path], SpinDownOptions(columns={"t": "t", "f": f"f [{unit}]"}))
     assert stated.runs[0].frequency[0] == pytest.approx(40, abs=0.1)
     assert not stated.sources[0].readings.doubtful
 
@@ -188,10 +188,10 @@ def test_hertz_taken_for_another_unit_are_doubted(tmp_path):
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     path.write_text(path.read_text("utf-8").replace(path.read_text("utf-8").split("\n", 1)[0], "time,speed"), "utf-8")
     for unit in ("rpm", "rad/s", "°/s"):
-        (source,) = METHOD.analyze([path], SpinDownOptions(columns={"f": f"speed [{unit}]"})).sources
+        (source,) = SPINDOWN.analyze([path], SpinDownOptions(columns={"f": f"speed [{unit}]"})).sources
         assert source.readings.doubtful
         assert "f=NAME [Hz]" in source.warnings[0]
-    (right,) = METHOD.analyze([path], SpinDownOptions(columns={"f": "speed [Hz]"})).sources
+    (right,) = SPINDOWN.analyze([path], SpinDownOptions(columns={"f": "speed [Hz]"})).sources
     assert not right.warnings
 
 
@@ -199,8 +199,8 @@ def test_a_run_whose_unit_is_in_doubt_stays_out_of_the_means(sample_data, tmp_pa
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
     np.savetxt(path, np.c_[t, 360 * nu], delimiter=",", header="t,f [Hz]", comments="")
-    alone = METHOD.analyze([sample_data], SpinDownOptions())
-    both = METHOD.analyze([sample_data, path], SpinDownOptions())
+    alone = SPINDOWN.analyze([sample_data], SpinDownOptions())
+    both = SPINDOWN.analyze([sample_data, path], SpinDownOptions())
     assert both.combined.fit("disc").constants == alone.combined.fit("disc").constants
     assert len(both.runs) == len(alone.runs) + 1
     assert any("my" in warning for warning in both.about_all())
@@ -210,13 +210,13 @@ def test_a_speed_without_unit_may_be_in_hertz_or_turns_per_minute(tmp_path):
     path = tmp_path / "speed.csv"
     path.write_text("time,speed\n0,39.9\n10,38\n20,36\n30,34\n", "utf-8")
     with pytest.raises(DataError, match=r"'speed' has the values 39.9 to 34 and no unit: Hz .* or rpm\? say"):
-        METHOD.analyze([path], SpinDownOptions())
+        SPINDOWN.analyze([path], SpinDownOptions())
 
 
 def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path):
     path = spin_down_csv(tmp_path / "my.csv", u=False)
-    without = METHOD.analyze([path], SpinDownOptions(tilt="none")).runs[0].fit("disc")
-    with_u = METHOD.analyze([path], SpinDownOptions(reading_u=0.03, tilt="none")).runs[0].fit("disc")
+    without = SPINDOWN.analyze([path], SpinDownOptions(tilt="none")).runs[0].fit("disc")
+    with_u = SPINDOWN.analyze([path], SpinDownOptions(reading_u=0.03, tilt="none")).runs[0].fit("disc")
     assert without.statistics.reduced_chi_square is None
     assert with_u.statistics.reduced_chi_square == pytest.approx(1, abs=1)
     ratio = without.parameters["c32"].u / with_u.parameters["c32"].u
@@ -229,28 +229,28 @@ def test_in_a_searched_folder_what_is_broken_is_passed_over_and_told(sample_data
     for name in ("spin-down-1", "spin-down-2", "lower-limits"):
         shutil.copytree(sample_data / name, tmp_path / name)
     (tmp_path / "spin-down-2" / "run.json").write_text("{", encoding="utf-8")
-    analysis = METHOD.analyze([tmp_path], SpinDownOptions())
+    analysis = SPINDOWN.analyze([tmp_path], SpinDownOptions())
     assert [source.name for source in analysis.sources] == ["spin-down-1"]
     assert any("spin-down-2" in warning for warning in analysis.warnings)
 
 
 def test_a_run_of_another_experiment_is_refused_by_name(sample_data):
     with pytest.raises(DataError, match="holds a limit run, spindown needs a spin run"):
-        METHOD.analyze([sample_data / "lower-limits"], SpinDownOptions())
+        SPINDOWN.analyze([sample_data / "lower-limits"], SpinDownOptions())
 
 
 def test_a_folder_without_runs_says_what_it_found(sample_data, tmp_path):
     with pytest.raises(DataError, match="holds no run and no data file"):
-        METHOD.analyze([tmp_path], SpinDownOptions())
+        SPINDOWN.analyze([tmp_path], SpinDownOptions())
     shutil.copytree(sample_data / "lower-limits", tmp_path / "limits")
     with pytest.raises(DataError, match="found only 1 limit"):
-        METHOD.analyze([tmp_path], SpinDownOptions())
+        SPINDOWN.analyze([tmp_path], SpinDownOptions())
 
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_a_folder_that_cannot_be_written_is_reported_in_one_line(sample_data, tmp_path):
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
-    analysis = METHOD.analyze([sample_data], SpinDownOptions())
+    analysis = SPINDOWN.analyze([sample_data], SpinDownOptions())
     with pytest.raises(CannotWrite, match="`out`") as caught:
         save(ANALYSES["spindown"], analysis, tmp_path / "file" / "below")
     assert isinstance(caught.value, LevilabError)
@@ -259,7 +259,7 @@ def test_a_folder_that_cannot_be_written_is_reported_in_one_line(sample_data, tm
 
 @pytest.mark.parametrize("n", [3, 4, 5, 7])
 def test_few_readings_give_a_result_without_nan_that_says_what_it_cannot_tell(tmp_path, n):
-    analysis = METHOD.analyze([spin_down_csv(tmp_path / "my.csv", n=n)], SpinDownOptions())
+    analysis = SPINDOWN.analyze([spin_down_csv(tmp_path / "my.csv", n=n)], SpinDownOptions())
     text = json.dumps(ANALYSES["spindown"].document(analysis, tmp_path), allow_nan=False)
     assert json.loads(text)["warnings"]
 

@@ -10,15 +10,12 @@ import pytest
 from analysis.spindown import drag
 from analysis.spindown.drag import LAWS
 from levilab.errors import DataError, UsageError
-from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import save
-from levilab.pipelines.spindown.analysis import METHOD
-from levilab.pipelines.spindown.document import DOCUMENT
+from levilab.pipelines.spindown.document import SPINDOWN
 from support.equal import differences
 from support.spin_downs import spin_down_csv
 
-SPINDOWN = ANALYSES["spindown"]
 recall_spindowns = SPINDOWN.recall
 
 
@@ -29,9 +26,9 @@ def fitted(monkeypatch):
 
     def noted(source, options):
         names.append(source.path.name)
-        return METHOD.fit(source, options)
+        return SPINDOWN.fit(source, options)
 
-    row = replace(SPINDOWN, result=replace(DOCUMENT, method=replace(METHOD, fit=noted)))
+    row = replace(SPINDOWN, fit=noted)
     monkeypatch.setitem(globals(), "recall_spindowns", row.recall)
     return names
 
@@ -46,8 +43,8 @@ def runs(tmp_path, sample_data):
 
 def analyzed(*paths, **options):
     """The analysis, and its result.json; the figure takes longer than all the rest."""
-    analysis = METHOD.analyze(paths, SpinDownOptions(**options))
-    save(DOCUMENT.of(analysis, analysis.place), analysis.place, picture=b"")
+    analysis = SPINDOWN.analyze(paths, SpinDownOptions(**options))
+    save(SPINDOWN.result_of(analysis, analysis.place), analysis.place, picture=b"")
     return analysis
 
 
@@ -95,7 +92,7 @@ def test_a_run_that_changed_is_analyzed_and_no_other(runs, fitted):
     after = recall_spindowns([runs], SpinDownOptions())
     assert fitted == ["run-2"]
     assert differences(after.runs[0], before.runs[0]) == []
-    assert differences(after.combined.fits, METHOD.analyze([runs], SpinDownOptions(tilt="none")).combined.fits) == []
+    assert differences(after.combined.fits, SPINDOWN.analyze([runs], SpinDownOptions(tilt="none")).combined.fits) == []
     assert not after.runs[1].has_tilt  # with the options of the result that held before
     assert "the readings are others than in" in after.origins[1].text
     assert after.origins[0].text.startswith("as levilab analyze found it")
@@ -116,14 +113,14 @@ def test_runs_analyzed_one_by_one_are_combined_without_a_new_fit(runs, fitted):
         analyzed(run)
     after = recall_spindowns([runs], SpinDownOptions())
     assert fitted == []
-    assert differences(after.combined, METHOD.analyze([runs], SpinDownOptions()).combined) == []
+    assert differences(after.combined, SPINDOWN.analyze([runs], SpinDownOptions()).combined) == []
 
 
 def test_a_run_is_recalled_from_the_result_of_its_folder(runs, fitted):
     analyzed(runs)
     after = recall_spindowns([runs / "run-3"], SpinDownOptions())
     assert fitted == []
-    assert differences(after.runs[0], METHOD.analyze([runs / "run-3"], SpinDownOptions()).runs[0]) == []
+    assert differences(after.runs[0], SPINDOWN.analyze([runs / "run-3"], SpinDownOptions()).runs[0]) == []
 
 
 @pytest.mark.parametrize("given", [{"reading_u": 0.05}, {"keep_outliers": True}])
@@ -155,7 +152,7 @@ def test_names_of_columns_do_not_matter_to_a_run(runs, fitted):
 @pytest.mark.parametrize("path", ["run-1", "run-1/readings.csv"])
 def test_names_of_columns_of_runs_alone_are_refused_with_those_of_the_run(runs, path):
     with pytest.raises(UsageError, match=r"run-1 is a run, whose columns are known \(time_s, spin_frequency_hz"):
-        METHOD.analyze([runs / path], SpinDownOptions(columns={"f": "zz"}))
+        SPINDOWN.analyze([runs / path], SpinDownOptions(columns={"f": "zz"}))
 
 
 def test_nothing_is_written_where_results_are_recalled(runs):

@@ -7,7 +7,7 @@ from matplotlib.colors import to_hex
 
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.spindown.analysis import METHOD
+from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.figure import MOST_POINTS, spindown_figure
 from levilab.present.looks import LOOKS
 from levilab.present.style import as_svg
@@ -18,7 +18,7 @@ COLOURS = {name: LOOKS[name].colour for name in LAWS}
 
 
 def analysis_of(*paths, u=None):
-    return METHOD.analyze(paths, SpinDownOptions(reading_u=u, tilt="none"))
+    return SPINDOWN.analyze(paths, SpinDownOptions(reading_u=u, tilt="none"))
 
 
 @pytest.fixture(scope="module")

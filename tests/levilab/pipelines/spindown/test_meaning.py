@@ -8,7 +8,7 @@ from matplotlib.text import Text
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.spindown.analysis import METHOD
+from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.figure import spindown_figure
 from levilab.pipelines.spindown.report import answer, meaning, spindown_part, spindown_tables
 from levilab.pipelines.spindown.words import SYMBOLS
@@ -69,4 +69,4 @@ def undecided(tmp_path):
         f = (250**-0.5 + c * t / 2) ** -2 / (2 * np.pi) + random.normal(0, U, t.size)
         rows = "\n".join(f"{time},{spin},{U}" for time, spin in zip(t, f, strict=True))
         (tmp_path / f"{c}.csv").write_text(f"t,f,u\n{rows}\n", encoding="utf-8")
-    return METHOD.analyze(sorted(tmp_path.glob("*.csv")), SpinDownOptions())
+    return SPINDOWN.analyze(sorted(tmp_path.glob("*.csv")), SpinDownOptions())
