@@ -32,10 +32,9 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from levilab.bench.person import Task
-    from levilab.notebook.listing import RunList
     from levilab.notebook.motion import SimulatedMotion
     from levilab.notebook.result import AnalysisResult
-    from levilab.notebook.run import RecordedRun
+    from levilab.notebook.run import RecordedRun, RunList
     from levilab.notebook.stability import FloatingTop
     from levilab.notebook.sweep import SimulatedMap
     from levilab.pipelines.options import Method, Tilt
@@ -427,7 +426,7 @@ def runs(folder: str | PathLike[str] = "runs", *, last: int | None = None) -> Ru
     Raises:
         DataError: there is no such folder.
     """
-    from levilab.notebook.listing import runs_in
+    from levilab.notebook.run import runs_in
 
     return runs_in(folder, last)
 

@@ -22,8 +22,8 @@ def of_class(
     **given: Any,
 ) -> None:
     """Put the groups of a class beside each other."""
-    from levilab.report.groups.write import write_class
-    from levilab.report.heading import Heading
+    from levilab.report.groups.document import write_class
+    from levilab.report.reproduction import Heading
 
     app, heading = context.find_root().command, Heading(**{one.name: given.pop(one.name) for one in HEADING})
     with interruptible("nothing is written"):
@@ -50,8 +50,7 @@ def worksheet(
     keys: Annotated[bool, typer.Option("--key/--no-key", help="Keys for the teacher, beside the worksheets.")] = True,
 ) -> None:
     """Write worksheets and keys."""
-    from levilab.report.worksheets.catalog import read_language
-    from levilab.report.worksheets.write import write_worksheets
+    from levilab.report.worksheets.document import read_language, write_worksheets
 
     name = read_language(language).words["group"].capitalize()
     seeds = {f"{name} {k + 1}": seed + k for k in range(groups)}

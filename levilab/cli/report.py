@@ -43,8 +43,8 @@ def report(
     **given: Any,
 ) -> None:
     """Write the report."""
-    from levilab.report.heading import Heading
     from levilab.report.page import write_report
+    from levilab.report.reproduction import Heading
 
     app, heading = context.find_root().command, Heading(**{one.name: given.pop(one.name) for one in HEADING})
     place = place_of_report(out)
@@ -61,7 +61,7 @@ def report(
         )
     result(place)
     if tables:
-        from levilab.report.tables.folder import folder_of
+        from levilab.report.tables.values import folder_of
 
         result(f"its tables are in {folder_of(written)}")
 

@@ -71,7 +71,7 @@ def sniff(source: Text) -> Layout:
         head = stream.read(HEAD)
         whole = not stream.read(1)
     refuse_other_kinds(path, head)
-    encoding = _encoding(head)
+    encoding = encoding_of(head)
     lines = lines_of(path, head, encoding, whole=whole)
     dialect = ALIGNED if source.aligned else find_dialect(lines[-SAMPLE:], lines[:SAMPLE])
     if dialect is None and (words := _of_words(lines, encoding, head)):
@@ -155,9 +155,14 @@ def _of_words(lines: list[str], encoding: str, head: bytes) -> Layout | None:
     return None
 
 
-def _encoding(head: bytes) -> str:
+def encoding_of(head: bytes) -> str:
+    """Return the encoding by the mark at the beginning; else UTF-16 by its NULs, UTF-8, or Latin-1."""
     for mark, encoding in BYTE_ORDER_MARKS:
         if head.startswith(mark):
+            return encoding
+    for first, encoding in ((1, "utf-16-le"), (0, "utf-16-be")):
+        halves = head[first:200:2], head[1 - first : 200 : 2]
+        if len(head) >= 4 and halves[0].count(0) > 0.9 * len(halves[0]) and 0 not in halves[1]:
             return encoding
     try:
         codecs.getincrementaldecoder("utf-8")().decode(head)

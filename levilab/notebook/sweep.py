@@ -14,8 +14,7 @@ from levilab.notebook.names import Helpful, bare
 from levilab.notebook.quantity import Named
 from levilab.notebook.scene import chosen_scene, in_seconds, whole_key
 from levilab.present.html import facts_as_html, fold
-from levilab.report.export.contents import contents_of
-from levilab.report.export.variables import attributes_of
+from levilab.report.export.contents import attributes_of, contents_of
 from levilab.sweeps.adaptive import is_adaptive, run_adaptive
 from levilab.sweeps.axes import axis_of, parse_axis
 from levilab.sweeps.plan import ROWS

@@ -16,9 +16,20 @@ from levilab.formats.device import Device
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, NOW, A, Origin
 from levilab.pipelines.budget import budgets_of_result
 from levilab.pipelines.correction import read_correction
-from levilab.pipelines.dump import Dump
 from levilab.pipelines.options import OF_FILES, options_of
-from levilab.pipelines.result import AGAIN, SCHEMA, Archive, Earlier, Part, Place, Result, RunPart, place_of, relative
+from levilab.pipelines.result import (
+    AGAIN,
+    SCHEMA,
+    Archive,
+    Dump,
+    Earlier,
+    Part,
+    Place,
+    Result,
+    RunPart,
+    place_of,
+    relative,
+)
 from levilab.pipelines.sources import Needs, Skipped, collect
 from levilab.present.units import name_with_unit, split
 from levilab.runs.find import find_run

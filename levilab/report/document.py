@@ -16,8 +16,8 @@ from levilab.present.document.blocks import (
     Section,
     Verdict,
     Warnings,
+    with_marks,
 )
-from levilab.present.document.marks import with_marks
 from levilab.present.numbers import list_in_words
 from levilab.report.inputs import About, describe, in_common
 from levilab.report.reproduction import reproduction

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.pipelines.sources import mark_of
 from levilab.pipelines.tune.owner import washers_text
 from levilab.present.clock import local, moment
-from levilab.present.document.blocks import Details, Fact, Facts, Note, Section, Tabular
-from levilab.present.document.marks import with_marks
+from levilab.present.document.blocks import Details, Fact, Facts, Note, Section, Tabular, with_marks
 from levilab.present.tables import table
 from levilab.present.units import split
 from levilab.present.words import setting_in_words, settings_in_words, value_in_words

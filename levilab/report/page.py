@@ -18,14 +18,12 @@ from levilab.pipelines.suits import recall_suiting, remarks, texts_of
 from levilab.present.clock import local
 from levilab.present.numbers import list_in_words
 from levilab.report.document import document_of, notebook_blocks
-from levilab.report.heading import Heading
 from levilab.report.html.page import fragment_of, page_of
 from levilab.report.kinds import KINDS
 from levilab.report.pdf.renderer import as_pdf, check_typst
-from levilab.report.reproduction import Asked
+from levilab.report.reproduction import Asked, Heading
 from levilab.report.supplements import SUPPLEMENTS, WITH_TRIALS
-from levilab.report.tables.folder import folder_of, write_tables
-from levilab.report.tables.values import of_analysis
+from levilab.report.tables.values import folder_of, of_analysis, write_tables
 from levilab.runs.find import find_runs
 
 if TYPE_CHECKING:

@@ -1,9 +1,9 @@
-"""How to make the report's numbers again: commands, data with their hashes, seeds, versions."""
+"""A person's title above a report, and how to make its numbers again: commands, data with hashes, seeds, versions."""
 
 from __future__ import annotations
 
 import shlex
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,6 @@ from levilab.formats.table import parse_columns
 from levilab.pipelines.options import OF_REPORT, OPTIONS, options_of, typed_name
 from levilab.present.document.blocks import Code, Details, Fact, Facts, Note, Paragraph, Section, Tabular
 from levilab.present.tables import table
-from levilab.report.heading import Heading
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
@@ -20,7 +19,36 @@ if TYPE_CHECKING:
 
     from levilab.pipelines.document import Analysis
     from levilab.pipelines.sources import Source
-    from levilab.present.document.blocks import Block
+    from levilab.present.document.blocks import Block, Document
+
+
+@dataclass(frozen=True)
+class Heading:
+    """The heading of a report, as a person typed it.
+
+    Attributes:
+        title: takes the place of the report's own; empty: that stays.
+        course, author, date: below the title; empty: not said.
+    """
+
+    title: str = ""
+    course: str = ""
+    author: str = ""
+    date: str = ""
+
+    @property
+    def typed(self) -> list[str]:
+        """The options as one types them."""
+        given = ((one.name, getattr(self, one.name)) for one in fields(self))
+        return [word for name, text in given if text for word in (f"--{name}", shlex.quote(text))]
+
+    def above(self, document: Document) -> Document:
+        """Return the document below this heading; its own title then begins the line below."""
+        byline = " · ".join(filter(None, (self.course, self.author, self.date)))
+        if not self.title:
+            return replace(document, byline=byline)
+        return replace(document, title=self.title, lead=f"{document.title}: {document.lead}", byline=byline)
+
 
 #: With more inputs the commands of analyses name none, and the inputs are folded away.
 _MOST_NAMED = 12

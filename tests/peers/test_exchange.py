@@ -9,8 +9,7 @@ import pytest
 
 import levilab
 from levilab.present.units import UNITS
-from levilab.report.export.contents import contents_of
-from levilab.report.export.variables import units_of
+from levilab.report.export.contents import contents_of, units_of
 from levilab.report.export.write import export
 from support.paths import SAMPLE_DATA
 

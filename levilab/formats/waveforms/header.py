@@ -41,7 +41,7 @@ from levilab.formats.titles import (
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from levilab.formats.waveforms.head import Head
+    from levilab.formats.waveforms.rows import Head
 
 #: What is read.
 WANTED = "samples beside their times, a scope's CSV, WAV, .npy, or a column of pulse times is expected"

@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from levilab.formats.dialect import Dialect
-    from levilab.formats.waveforms.head import Head
-    from levilab.formats.waveforms.rows import Block
+    from levilab.formats.waveforms.rows import Block, Head
 
 #: Slower turns are no turns [s]: times in µs or ms without a unit, of which a window of seconds holds none.
 _LONGEST_TURN_S = 10.0

@@ -9,10 +9,10 @@ from levilab.formats.kinds import AUDIO, kind_of_bytes
 from levilab.formats.table import file_errors
 from levilab.formats.texts import SPREADSHEETS, TEXTS, locate, texts_of
 from levilab.formats.waveforms.audio import read_audio
-from levilab.formats.waveforms.head import read_head
 from levilab.formats.waveforms.header import NoWaveform, dialect_of
 from levilab.formats.waveforms.npy import read_npy
 from levilab.formats.waveforms.pulse_times import read_column
+from levilab.formats.waveforms.rows import read_head
 from levilab.formats.waveforms.samples import read_samples
 from levilab.formats.waveforms.scope_binary import SUFFIXES, read_scope_binary
 from levilab.formats.waveforms.sigrok import is_sigrok, read_sigrok

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from levilab.formats.dialect import Dialect
-    from levilab.formats.waveforms.head import Head
-    from levilab.formats.waveforms.rows import Block
+    from levilab.formats.waveforms.rows import Block, Head
 
     Array = NDArray[np.float64]
 

@@ -12,12 +12,11 @@ from analysis.budget import Budget, Component, printed_step, rest, u_of_step
 from analysis.numbers import digits
 from levilab.pipelines.budget import time_base
 from levilab.pipelines.document import Analysis, values_of
-from levilab.pipelines.dump import Dump
 from levilab.pipelines.limit.analysis import LIMIT_ROW, QUANTITIES, LimitAnalysis, Limits, limits_of, together
 from levilab.pipelines.limit.readings import read_limit_file, read_limit_run
 from levilab.pipelines.limit.report import limit_columns, limit_part, limit_tables
 from levilab.pipelines.options import LimitOptions
-from levilab.pipelines.result import Result
+from levilab.pipelines.result import Dump, Result
 from levilab.pipelines.row import find_all, symbols_of
 
 if TYPE_CHECKING:

@@ -9,11 +9,11 @@ in a form of its own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Iterable
     from datetime import datetime
 
     from levilab.present.style import Figure
@@ -286,3 +286,30 @@ class Document:
     byline: str = ""
     language: str = "en"
     date: datetime | None = None
+
+
+B = TypeVar("B", bound="Block")
+
+
+def with_marks(blocks: Iterable[B], mark: str) -> list[B]:
+    """Return the blocks; each table in them that has no mark of its own gets this one.
+
+    Args:
+        blocks: of a document.
+        mark: what of them is synthetic, see `Tabular`.
+
+    >>> from levilab.present.tables import table
+    >>> own, other = (Tabular("laws", table("", ["law"], []), mark=mark) for mark in ("", None))
+    >>> (section,) = with_marks([Section("Result", (own, other))], "SYNTHETIC.")
+    >>> [block.mark for block in section.blocks]
+    ['', 'SYNTHETIC.']
+    """
+    return [_with_mark(block, mark) for block in blocks]
+
+
+def _with_mark(block: B, mark: str) -> B:
+    if isinstance(block, Tabular):
+        return block if block.mark is not None else replace(block, mark=mark)
+    if isinstance(block, Section | Details):
+        return replace(block, blocks=tuple(with_marks(block.blocks, mark)))
+    return block

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from levilab.errors import LevilabError, UsageError
 from levilab.files import CannotWrite, check_writable, replace_atomically, writing
 from levilab.present.numbers import list_in_words
-from levilab.report.export.variables import attributes_of, variables_of
+from levilab.report.export.contents import attributes_of, variables_of
 from levilab.runs.package import field, package, resource
 from levilab.software import how_to_install
 

@@ -1,4 +1,4 @@
-"""A class → blocks of a document: the result, the figure, notes."""
+"""A class → blocks of a document, and page, PDF or spreadsheet, as the file's name says."""
 
 from __future__ import annotations
 
@@ -6,23 +6,29 @@ import re
 import shlex
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from levilab.files import check_writable, replace_atomically
+from levilab.pipelines.suits import recall_suiting
 from levilab.present.document.blocks import Document, Fact, Facts, Note, Picture, Section, Tabular, Verdict
 from levilab.present.numbers import column, enumeration, plain, with_sign, without_unit
 from levilab.present.tables import Row, table
 from levilab.report.document import banner_of, count_inputs
-from levilab.report.groups.words import finding, verdict
+from levilab.report.groups.beside import class_of, finding, verdict
+from levilab.report.groups.sheet import class_workbook
+from levilab.report.page import FORMATS, UnknownFormat, newest_of, writing_report
+from levilab.report.reproduction import Heading
 from levilab.report.tables.values import unit_of_residuals
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from pathlib import Path
 
     from analysis.uncertainty import Estimate
     from levilab.present.document.blocks import Block
     from levilab.present.style import Figure
     from levilab.report.groups.beside import Class, Compared
+
 
 #: Distance from the truth, in u, beyond which a group is named in red: one in four hundred is by chance.
 _FAR = 3.0
@@ -161,3 +167,53 @@ def _made_by(paths: Sequence[Path], ending: str) -> Note:
     typed = " ".join(shlex.quote(str(path)) for path in paths)
     each = "each group's readings, figure and budget of uncertainties are in that of levilab report"
     return Note(f"Made by: levilab class {typed} -o class{ending}; {each}.")
+
+
+SPREADSHEET = ".xlsx"
+
+
+def write_class(
+    paths: Sequence[Path],
+    output: Path,
+    given: Mapping[str, Any] | None = None,
+    tell: Callable[[str], None] | None = None,
+    heading: Heading | None = None,
+) -> Path:
+    """Put the groups of a class beside each other; what has no result yet is analyzed, and nothing is stored.
+
+    Args:
+        paths: run folders, data files, folders to search.
+        output: the file to write; its ending, .html, .pdf or .xlsx, chooses the format.
+        given: options of analyses by their names.
+        tell: called with what lies there and is of no use.
+        heading: title, course, authors and date above it.
+
+    Returns:
+        The file.
+
+    Raises:
+        DataError: there is no run.
+        UnknownFormat: of the output's name.
+        NoTypst: PDF, and the extra `pdf` is not installed.
+        CannotWrite: of the output.
+    """
+    ending = output.suffix.lower()
+    form = FORMATS.get(ending)
+    if form is None and ending != SPREADSHEET:
+        raise UnknownFormat("out", "a name that ends in .html, .pdf or .xlsx is expected", value=output)
+    if form:
+        form.check()
+    with writing_report(output):
+        check_writable(output)
+    results = recall_suiting(paths, given or {}, tell)
+    classes = [class_of(analysis, found) for analysis, found in results]
+    date = newest_of(results)
+    if form:
+        document = (heading or Heading()).above(class_document(classes, paths, form.ending))
+        content = form.content(replace(document, date=date))
+    else:
+        content = class_workbook(classes, date)
+    with writing_report(output):
+        output.parent.mkdir(parents=True, exist_ok=True)
+        replace_atomically(output, content)
+    return output

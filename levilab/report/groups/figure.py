@@ -12,7 +12,7 @@ from levilab.present.drawing import SMALL, headline, in_mathtext, panel, synthet
 from levilab.present.looks import BLUE, GREEN, VERMILION
 from levilab.present.style import STYLE, WIDE, label_of_run
 from levilab.present.units import unit
-from levilab.report.groups.words import finding
+from levilab.report.groups.beside import finding
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

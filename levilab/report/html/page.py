@@ -10,8 +10,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from levilab.present.document.blocks import Section
-from levilab.report.html.blocks import Writer
-from levilab.report.html.elements import Html, element, join, words
+from levilab.report.html.blocks import Html, Writer, element, join, words
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -1,29 +1,109 @@
-"""A worksheet and its key as documents."""
+"""Worksheets and their keys, in the language of a class: texts, documents, files."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from levilab.present.document.blocks import (
-    Banner,
-    Code,
-    Document,
-    Fact,
-    Facts,
-    Listing,
-    Paragraph,
-    Section,
-    Tabular,
-)
+from levilab.acquisition.loop import acquire
+from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.errors import UsageError
+from levilab.files import parse_toml, replace_atomically, writing
+from levilab.pipelines.catalogue import ANALYSES
+from levilab.present.document.blocks import Banner, Code, Document, Fact, Facts, Listing, Paragraph, Section, Tabular
 from levilab.present.numbers import column
+from levilab.present.progress import Display
 from levilab.present.tables import table
+from levilab.report.groups.beside import class_of
 from levilab.report.groups.document import truth_text
+from levilab.report.page import FORMATS
+from levilab.texts.text import in_language, language_of
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
     from levilab.report.groups.beside import Class
-    from levilab.report.worksheets.catalog import Language, Sheet
+
+
+_TEXTS = Path(__file__).parent / "texts.toml"
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """An experiment's worksheet.
+
+    Attributes:
+        experiment, analysis: their names.
+        settings: of the experiment, as one types them: a class has an hour.
+    """
+
+    experiment: str
+    analysis: str
+    settings: tuple[str, ...] = ()
+
+    def commands(self, group: str, seed: int) -> tuple[str, ...]:
+        """Return what a group types."""
+        chosen = "".join(f" --set {one}" for one in self.settings)
+        return (
+            f'levilab acquire {self.experiment} --mock --group "{group}" --seed {seed} --out class{chosen}',
+            f"levilab analyze {self.analysis} class",
+            "levilab report class -o report.html",
+        )
+
+
+#: Number of tops of the worksheet on limits.
+TOPS = 10
+SHEETS = MappingProxyType({
+    sheet.experiment: sheet
+    for sheet in (
+        Sheet("spin", "spindown"),
+        Sheet("limit", "limit", (f"limit.repetitions={TOPS}",)),
+        Sheet("field", "field"),
+        Sheet("precession", "precession"),
+    )
+})  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Texts:
+    """The texts of a worksheet."""
+
+    title: str
+    aim: str
+    tasks: tuple[str, ...]
+    answers: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Language:
+    """A language.
+
+    Attributes:
+        code: of the language, such as "de".
+        words: of all worksheets, by their keys.
+        sheets: experiment → its texts.
+    """
+
+    code: str
+    words: Mapping[str, str]
+    sheets: Mapping[str, Texts]
+
+
+def read_language(code: str) -> Language:
+    """Return a language.  Raises UsageError."""
+    language_of(code)
+    table = parse_toml(_TEXTS.read_text(encoding="utf-8"))
+    sheets = {}
+    for name in SHEETS:
+        title, aim = in_language(table[name]["title"], code), in_language(table[name]["aim"], code)
+        tasks, answers = (tuple(in_language(text, code) for text in table[name][part]) for part in ("tasks", "answers"))
+        sheets[name] = Texts(title, aim.replace("{tops}", str(TOPS)), tasks, answers)
+    return Language(code, {key: in_language(text, code) for key, text in table["words"].items()}, sheets)
+
 
 #: Where a student writes, and how many such lines an answer has.
 _BLANK, _LINES = "…" * 20, 3
@@ -97,3 +177,64 @@ def _numbers(language: Language, seeds: Mapping[str, int], found: Class) -> Tabu
     return Tabular(
         "numbers", table("", heads, rows, numbers=heads[1:]), words["about_numbers"], first_column_wraps=True
     )
+
+
+def write_worksheets(
+    experiments: Sequence[str],
+    out: Path,
+    seeds: Mapping[str, int],
+    *,
+    language: str = "en",
+    ending: str = ".html",
+    keys: bool = True,
+    tell: Callable[[str], None] = lambda _: None,
+) -> list[Path]:
+    """Write a worksheet, and its key, for each experiment.
+
+    Args:
+        experiments: their names; none: all that have a worksheet.
+        out: the folder, which is made.
+        seeds: group → its seed.
+        language: of the texts.
+        ending: of the files, .html or .pdf.
+        keys: whether keys are written, for which each seed's run is acquired and analyzed.
+        tell: called with a line before the runs of an experiment are made.
+
+    Returns:
+        The files.
+
+    Raises:
+        UsageError: there is no such worksheet or language.
+        NoTypst: PDF, and the extra `pdf` is not installed.
+        CannotWrite: of the folder.
+    """
+    texts, form = read_language(language), FORMATS[ending]
+    form.check()
+    for name in experiments:
+        if name not in SHEETS:
+            near = get_close_matches(name, SHEETS, n=1)
+            known = f"did you mean {near[0]}?" if near else f"one of {', '.join(SHEETS)} is expected"
+            raise UsageError("experiment", known, value=name)
+    files = []
+    for sheet in (SHEETS[name] for name in experiments or SHEETS):
+        contents = {sheet.experiment: worksheet(sheet, texts, seeds)}
+        if keys:
+            tell(f"the key of {sheet.experiment}: {len(seeds)} runs on the virtual bench")
+            contents[f"{sheet.experiment}-key"] = key(sheet, texts, seeds, measure(sheet, seeds))
+        with writing(f"{out}: could not be written"):
+            out.mkdir(parents=True, exist_ok=True)
+            for name, document in contents.items():
+                files.append(out / f"{name}-{language}{ending}")
+                replace_atomically(files[-1], form.content(document))
+    return files
+
+
+def measure(sheet: Sheet, seeds: Mapping[str, int]) -> Class:
+    """Return what the runs of the seeds give, as students find it by the commands of the worksheet."""
+    analysis = ANALYSES[sheet.analysis]
+    with TemporaryDirectory() as folder:
+        runs = []
+        for group, seed in seeds.items():
+            options = AcquisitionOptions(mock=True, seed=seed, group=group, out=Path(folder), settings=sheet.settings)
+            runs.append(acquire(request_for(sheet.experiment, options), Display()).folder)
+        return class_of(analysis, analysis.analyze(runs, analysis.options_from({})))

@@ -2,8 +2,8 @@
 
 import pytest
 
-from levilab.report.heading import Heading
 from levilab.report.page import write_report
+from levilab.report.reproduction import Heading
 from support.pages import Page
 from support.paths import SAMPLE_DATA
 

@@ -12,9 +12,8 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.present.document.blocks import Banner, Details, Document, Section, Tabular
 from levilab.present.tables import Row, table
 from levilab.present.units import UNITS
-from levilab.report.tables.folder import CONTENTS, folder_of, write_tables
 from levilab.report.tables.latex import as_latex, to_latex, units_in_heads
-from levilab.report.tables.values import Values, as_csv, of_analysis
+from levilab.report.tables.values import CONTENTS, Values, as_csv, folder_of, of_analysis, write_tables
 from support.paths import SAMPLE_DATA
 
 

@@ -18,7 +18,7 @@ from levilab.live.server import PAGE
 from levilab.live.views import VIEWS
 from levilab.live.words import change_texts
 from levilab.pipelines.look import QUANTITIES
-from levilab.report.worksheets.catalog import TOPS, read_language
+from levilab.report.worksheets.document import TOPS, read_language
 from levilab.texts.text import Text, in_language, language_of, languages, speak, text_from
 from support.sources import sources
 

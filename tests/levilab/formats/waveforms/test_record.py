@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 
 from levilab.errors import DataError, DoesNotSuit, UsageError
 from levilab.formats.columns import TableError
-from levilab.formats.waveforms import head, wav
+from levilab.formats.waveforms import rows as text_rows
+from levilab.formats.waveforms import wav
 from levilab.formats.waveforms.header import NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
@@ -350,7 +351,7 @@ def test_wav_of_every_width(bits, tmp_path):
 @pytest.mark.parametrize("kind", ["csv", "wav"])
 def test_a_file_larger_than_memory_is_read_in_pieces(kind, tmp_path, monkeypatch):
     """Five times as many samples take no more memory, which is less than the larger file's numbers would."""
-    monkeypatch.setattr(head, "PIECE", 1 << 15)
+    monkeypatch.setattr(text_rows, "PIECE", 1 << 15)
     monkeypatch.setattr(wav, "BLOCK", 1 << 11)
     peaks = []
     for n in (20_000, 100_000):

@@ -13,8 +13,7 @@ from levilab.errors import DataError, UsageError, WorkersLost
 from levilab.files import CannotWrite, locked
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.many import table as many
-from levilab.pipelines.many.one import PassedOver, Row, Task, analyze_one, columns_of
-from levilab.pipelines.many.table import Tally, write_table
+from levilab.pipelines.many.table import PassedOver, Row, Tally, Task, analyze_one, columns_of, write_table
 from levilab.workers import Done
 from many_runs import make_runs
 from support.commands import command

@@ -9,7 +9,7 @@ import pytest
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.device import Device, read_device
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.many.one import Row, Task, analyze_one
+from levilab.pipelines.many.table import Row, Task, analyze_one
 from levilab.pipelines.suits import analyze_suiting
 from support.commands import command
 from support.paths import ROOT

@@ -13,8 +13,7 @@ import xarray
 
 import levilab as door
 from levilab.errors import LevilabError
-from levilab.report.export.contents import contents_of
-from levilab.report.export.variables import variables_of
+from levilab.report.export.contents import contents_of, variables_of
 from levilab.report.export.write import FORMATS, export
 from support.paths import SAMPLE_DATA
 

@@ -13,7 +13,7 @@ from levilab.crosscheck.truth import Truth
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.report.groups.beside import _quantity, class_of
-from levilab.report.groups.write import write_class
+from levilab.report.groups.document import write_class
 from levilab.runs.find import RECORD
 from levilab.world.spin_world import SpinScene, random_scene
 from support.acquisitions import RAISED_QUICKLY, Silent

@@ -9,8 +9,7 @@ import pytest
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.report.groups.beside import class_of
-from levilab.report.worksheets.catalog import SHEETS, read_language
-from levilab.report.worksheets.write import measure, write_worksheets
+from levilab.report.worksheets.document import SHEETS, measure, read_language, write_worksheets
 from levilab.texts.text import languages
 from support.pages import Page
 
