@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 import math
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -23,14 +24,15 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import expit
 
-from levilab.benchmark.simulator.motion import A2, B2, I1, I3, MU, G, K
+from analysis.spindown.tilt import THESIS_TOP, TILT2
+from levilab.benchmark.simulator.motion import A2, B2, MU, G, K
 from levilab.benchmark.simulator.taylor import VARIABLES, heyoka_system
 from levilab.crosscheck.calibration import by_ranks
 from levilab.crosscheck.command import print_studies
 from levilab.crosscheck.figure import calibration_figure
 from levilab.crosscheck.stored import as_json
 from levilab.crosscheck.study import study_world
-from levilab.crosscheck.subject import Pull, Subject, pull_of
+from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.formats.device import Device
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.present.progress import ShareBar
@@ -111,60 +113,127 @@ def field(seed: int, folder: Path) -> list[Pull]:
     return [pull_of("strength", values["strength"], strength), pull_of("origin", values["origin"], origin)]
 
 
-# motion: a top above the thesis's base by heyoka, with a moment that is tilted, a nutation, and the drag of a disc
+# motion: a top above the thesis's base by heyoka, with a moment that is tilted, a nutation, and the drag of a disc.
+# The top is drawn from the priors of analysis.spindown.tilt, and half of the tops are read until they fall.
 
-MASS_KG, ALONG, FIRST_HZ, LAST_HZ = 0.0244, 0.97, 34.0, 24.0
-INTERVAL_S, GATE_S, STEPS = 4.0, 2.0, 200
-#: The last reading is before the top leans by this; the field is that near the axis.
-LEAN_RAD = 0.1
+ALONG, RESONANCE_U = 0.97, 0.04
+#: Mean of the square of the nutation's angle: 95 % are below 0.02 rad.
+NUTATION2 = 0.02**2 / 3
+#: β where a tilted top floats above this base.
+BETAS = (2.2, 4.6)
+#: First readings; the others end anywhere up to so far above the fall, with no fewer readings.
+FIRST_HZ, ABOVE_HZ, FEWEST = (34.0, 42.0), 15.0, 8
+INTERVAL_S, GATE_S, STEPS = 10.0, 2.0, 200
+#: A top that leans more [rad], is farther from the axis, or lower [m], has fallen.
+FALLEN_RAD, FALLEN_M, FALLEN_HEIGHT_M = 0.4, 0.01, 0.062
 
 
 @cache
 def integrator() -> Any:
-    """Return the integrator; parameters: the moment's part across the axis, the constant of the drag."""
-    body = ex, ey, ez = hy.make_vars("ex", "ey", "ez")
+    """Return the integrator; parameters: the moment's part across the axis, the drag's constant, μ/m, I₁ and I₃."""
+    body = hy.make_vars("ex", "ey", "ez")
     n, momentum = hy.make_vars(*VARIABLES)[6:9], hy.make_vars(*VARIABLES)[9:]
-    across, constant = hy.par[0], hy.par[1]
+    across, constant, pull, i1, i3 = (hy.par[k] for k in range(5))
     moment = tuple(ALONG * a + across * e for a, e in zip(n, body, strict=True))
-    spin = sum(a * p for a, p in zip(n, momentum, strict=True)) / I3
-    equations = dict(heyoka_system(MU / MASS_KG, moment))
+    spin = sum(a * p for a, p in zip(n, momentum, strict=True)) / i3
+    equations = dict(heyoka_system(pull, moment))
     for axis, p in zip(n, momentum, strict=True):
-        equations[p] = equations[p] - constant * I3 * spin**1.5 * axis
-    wx, wy, wz = (p / I1 + (1 - I3 / I1) * spin * a for p, a in zip(momentum, n, strict=True))
-    turning = [(ex, wy * ez - wz * ey), (ey, wz * ex - wx * ez), (ez, wx * ey - wy * ex)]
-    system = [(hy.make_vars(name), equations[hy.make_vars(name)]) for name in VARIABLES] + turning
-    return hy.taylor_adaptive(system, np.ones(15), tol=1e-10, fast_math=True)
+        equations[p] = equations[p] - constant * i3 * spin**1.5 * axis
+    turning = [p / i1 + (1 - i3 / i1) * spin * a for p, a in zip(momentum, n, strict=True)]
+    equations |= {**across_of(n, turning), **across_of(body, turning)}
+    names = [*hy.make_vars(*VARIABLES), *body]
+    return hy.taylor_adaptive([(name, equations[name]) for name in names], np.ones(15), tol=1e-10, fast_math=True)
 
 
-def floating() -> tuple[float, float]:
-    """Return the height at which an upright top rests [m], and the field there [T]."""
+def across_of(vector: Any, turning: Any) -> dict[Any, Any]:
+    """Return the rates of a vector that turns with the body: ω × vector."""
+    (x, y, z), (wx, wy, wz) = vector, turning
+    return {x: wy * z - wz * y, y: wz * x - wx * z, z: wx * y - wy * x}
+
+
+def on_axis(z: float) -> Any:
+    """Return B, B' and B″ on the axis of the base, to their common sign."""
     rings = ((A2, 1.0), (B2, -1.0))
-    field_at = lambda z: K * sum(sign * a2 / (a2 + z * z) ** 1.5 for a2, sign in rings)  # noqa: E731
-    slope_at = lambda z: K * sum(-3 * sign * a2 * z / (a2 + z * z) ** 2.5 for a2, sign in rings)  # noqa: E731
-    z = float(brentq(lambda z: abs(slope_at(z) * MU) * ALONG - MASS_KG * G, 0.070, 0.080))
-    return z, abs(field_at(z))
+    return sum(
+        sign * a2 * K * np.array([1, -3 * z / (u := a2 + z * z), (15 * z * z / u - 3) / u]) * u**-1.5
+        for a2, sign in rings
+    )
 
 
-def motion(seed: int, folder: Path, lean: float) -> list[Pull]:
-    """Try the counts of a top that spins down, with tilt and nutation as makers of magnets and the eye allow them."""
+@dataclass(frozen=True)
+class Drawn:
+    """A top and its base, drawn as the analysis expects them."""
+
+    height: float
+    mass: float
+    i1: float
+    i3: float
+    pull: float  # P = |μ|B
+    tilt: float
+    nutation: Any
+    first_hz: float
+
+
+def draw_top(by: np.random.Generator) -> Drawn:
+    """Draw tilt and nutation; β, which says where it floats; ν_r and κ, which say its moments of inertia."""
+    top = THESIS_TOP
+    tilt = math.atan(math.sqrt(by.exponential(TILT2)))
+    angle = math.sqrt(by.exponential(NUTATION2)) * np.exp(1j * by.uniform(0, 2 * math.pi))
+    beta = float(np.clip(by.normal(top.beta, top.beta_u), *BETAS))
+    height = float(brentq(lambda z: (f := on_axis(z))[1] ** 2 / (f[0] * f[2]) - beta, 0.0705, 0.0755))
+    flux, slope, _ = np.abs(on_axis(height))
+    pull, rate = abs(MU) * ALONG * flux, 2 * math.pi * top.resonance_hz * by.normal(1, RESONANCE_U)
+    kappa = by.normal(top.kappa, top.kappa_u)
+    i3 = pull / (kappa * rate**2)
+    mass = abs(MU) * ALONG * slope / G
+    return Drawn(height, mass, (1 - kappa) * i3, i3, pull, tilt, (angle.real, angle.imag), by.uniform(*FIRST_HZ))
+
+
+def start_of(top: Drawn) -> list[float]:
+    """Return a top that turns evenly about the vertical, with a free nutation added: (r, v, n, L, e)."""
+    rate = 2 * math.pi * top.first_hz
+    lean = math.tan(top.tilt) / ((top.i3 - top.i1) * rate**2 / top.pull - 1)
+    axis = np.array([math.sin(lean), 0.0, math.cos(lean)])
+    momentum = top.i1 * rate * np.array([0, 0, 1.0]) + (top.i3 - top.i1) * rate * axis[2] * axis
+    # a nutation alone has I₁ times the precession's rate across the vertical: with less, a precession is in it
+    half = top.i3 * rate / (2 * top.i1)
+    momentum[:2] += top.i1 * (half - math.sqrt(half**2 - top.pull / top.i1)) * np.array(top.nutation)
+    axis[:2] += top.nutation
+    axis[2] = math.sqrt(1 - axis[0] ** 2 - axis[1] ** 2)
+    body = np.array([1.0, 0.0, 0.0]) - axis[0] * axis
+    return [0.0, 0.0, top.height, 0.0, 0.0, 0.0, *axis, *momentum, *(body / np.linalg.norm(body))]
+
+
+def count_until_it_falls(top: Drawn, constant: float, lean: float) -> Any:
+    """Return the counts of gates, until the top has fallen or leans by so much [rad]."""
+    solver = integrator()
+    solver.time, solver.state[:] = 0.0, start_of(top)
+    solver.pars[:] = math.tan(top.tilt) * ALONG, constant, MU / top.mass, top.i1, top.i3
+    counted: list[float] = []
+    while True:
+        begin = INTERVAL_S * len(counted)
+        solver.propagate_until(begin)
+        states = solver.propagate_grid(begin + np.arange(round(GATE_S * STEPS) + 1) / STEPS)[-1]
+        away, leaning = np.hypot(*states[:, :2].T).max(), np.hypot(*states[:, 6:8].T).max()
+        if not (leaning < lean and away < FALLEN_M and states[:, 2].min() > FALLEN_HEIGHT_M):
+            return np.array(counted)
+        turns = np.unwrap(np.arctan2(states[:, 13], states[:, 12])) / (2 * math.pi)
+        counted.append(float(turns[-1] - turns[0]) / GATE_S)
+
+
+def motion(seed: int, folder: Path, lean: float | None) -> list[Pull]:
+    """Try the counts of a drawn top that spins down."""
     by = np.random.default_rng((seed, 3))
-    tilt, constant = by.rayleigh(math.sqrt(0.000915 / 2)), by.uniform(2.0e-4, 2.7e-4)
-    jitter = 10 ** by.uniform(-3, -2)
-    nutation = by.normal(0, 0.0115 / math.sqrt(2), 2)
-    top = integrator()
-    top.time = 0.0
-    top.pars[:] = math.tan(tilt) * ALONG, constant
-    top.state[:] = start_of(tilt, nutation)
-    duration = 2 * ((2 * math.pi * LAST_HZ) ** -0.5 - (2 * math.pi * FIRST_HZ) ** -0.5) / constant
-    grid = np.arange(math.floor(duration) * STEPS + 1) / STEPS
-    states = top.propagate_grid(grid)[-1]
-    turns = np.unwrap(np.arctan2(states[:, 13], states[:, 12])) / (2 * math.pi)
-    leaning = np.hypot(states[:, 6], states[:, 7]) > lean
-    end = grid[np.argmax(leaning)] if leaning.any() else grid[-1]
-    first = np.arange(0, end - GATE_S, INTERVAL_S)
-    counted = (np.interp(first + GATE_S, grid, turns) - np.interp(first, grid, turns)) / GATE_S
-    counted += jitter * by.standard_normal(len(counted))
-    file = write_columns(folder, "time [s],frequency [Hz]", first + GATE_S / 2, counted)
+    top, constant, jitter = draw_top(by), by.uniform(2.0e-4, 2.7e-4), 10 ** by.uniform(-3, -2)
+    counted = count_until_it_falls(top, constant, lean or FALLEN_RAD)
+    if len(counted) < FEWEST:
+        raise TrialFailed("the top falls too soon")
+    n = 0
+    while n < FEWEST:
+        above = 0.0 if lean or by.random() < 0.5 else by.uniform(0, ABOVE_HZ)
+        n = int(np.sum(counted >= counted[-1] + above))
+    times = GATE_S / 2 + INTERVAL_S * np.arange(n)
+    file = write_columns(folder, "time [s],frequency [Hz]", times, counted[:n] + jitter * by.standard_normal(n))
     found = analyze("spindown", file).runs[0]
     return [
         pull_of("disc c32", found.fit("disc").parameters["c32"], constant),
@@ -172,21 +241,7 @@ def motion(seed: int, folder: Path, lean: float) -> list[Pull]:
     ]
 
 
-def start_of(tilt: float, nutation: Any) -> list[float]:
-    """Return a top that turns evenly about the vertical, with a nutation added: (r, v, n, L, e)."""
-    z, field_t = floating()
-    rate = 2 * math.pi * FIRST_HZ
-    x = (I3 - I1) * rate**2 / (abs(MU) * ALONG * field_t)
-    lean = math.tan(tilt) / (x - 1)
-    axis = np.array([math.sin(lean), 0.0, math.cos(lean)])
-    momentum = I1 * rate * np.array([0, 0, 1.0]) + (I3 - I1) * rate * axis[2] * axis
-    axis[:2] += nutation
-    axis[2] = math.sqrt(1 - axis[0] ** 2 - axis[1] ** 2)
-    body = np.array([1.0, 0.0, 0.0]) - axis[0] * axis
-    return [0.0, 0.0, z, 0.0, 0.0, 0.0, *axis, *momentum, *(body / np.linalg.norm(body))]
-
-
-def subjects(lean: float) -> tuple[Subject, ...]:
+def subjects(lean: float | None) -> tuple[Subject, ...]:
     """Return what is calibrated."""
     return (
         Subject("light by scipy", "the spin of a record", light),
@@ -201,7 +256,7 @@ def main() -> None:
     options.add_argument("--trials", type=int, default=200)
     options.add_argument("--seed", type=int, default=0)
     options.add_argument("--only", choices=("light", "field", "motion"))
-    options.add_argument("--lean", type=float, default=LEAN_RAD, help="the last reading is before this lean [rad]")
+    options.add_argument("--lean", type=float, help="tops are read until they lean by this [rad], not as is drawn")
     given = options.parse_args()
     studies = [
         study_world(subject, given.trials, given.seed, ShareBar(subject.name))

@@ -12,7 +12,7 @@ about the vertical, with x = (Ω/2πν_r)², κ = 1 − I₁/I₃:
              f acts on the axial spin ω₃ = Ω cos θ.
 
 A top that was driven up goes on nutating.  Its amplitude changes as A² ~ e^∓φ/sinh φ, cosh φ = ν/ν_s, the upper
-sign for the nutation, the lower for the precession (slowly varying solution of I₁N̈ − iI₃ω₃Ṅ + PN = 0), and what each
+sign for the nutation, the lower for the precession (slowly varying solution of I₁N̈ − iI₃ω₃Ṅ − PN = 0), and what each
 adds to the count, A²/2 times its frequency, has one shape: K/√((ν/ν_s)² − 1).  The spin of a top that just sleeps is
 ν_s = 2√(I₁P)/2πI₃ = 2√(κ(1 − κ)) ν_r.
 
@@ -67,9 +67,10 @@ class Nutation:
     u: float
 
 
-#: A nutation by the angle α at 40 Hz has K/ν_ref = 1.2 α², by the equations above.  Both components are normal, so α²
-#: is exponential: standard deviation and mean are equal.  An angle of 0.02 rad moves the rim by 0.3 mm, which the eye
-#: sees from 1 m (1′); 95 % of the tops that seem calm have less.
+#: A nutation by the angle α at the first reading has K/ν_ref = 1.1 α² from 34 Hz on and 1.6 α² from 40 Hz on, by the
+#: equations above; here 1.2 α².  Both components are normal, so α² is exponential: standard deviation and mean are
+#: equal.  An angle of 0.02 rad moves the rim by 0.3 mm, which the eye sees from 1 m (1′); 95 % of the tops that seem
+#: calm have less.
 CALM = Nutation(0.00016, 0.00016)
 #: A drive takes hold at 1.15 ν_r, where its 0.2 mT across 18 mT tilt the axis by 0.2/18/(1.15² − 1) = 0.034 rad.  Its
 #: field at the top is known to 30 %, and α² to 60 %.
