@@ -307,8 +307,7 @@ def _did_not_follow(session: Session[D], target: float, seen: str) -> DidNotFoll
             ),
         )
     return DidNotFollow(
-        observed,
-        Text("ramp slower ({name}.ramp_hz_per_s) or drive harder ({name}.drive_amplitude_vpp)", name=name),
+        observed, Text("ramp slower ({name}.ramp_hz_per_s) or drive harder ({name}.drive_amplitude_vpp)", name=name)
     )
 
 

@@ -85,11 +85,7 @@ def _check_oscilloscope(bench: Bench, light: Light) -> Reading:
     if isinstance(scope, SoundCard):
         return *listen(scope), "dB"
     scope.prepare(
-        duration_s=0.1,
-        points=1000,
-        volts_per_division=0.5,
-        trigger_level_v=light.trigger_level_v,
-        sweep="auto",
+        duration_s=0.1, points=1000, volts_per_division=0.5, trigger_level_v=light.trigger_level_v, sweep="auto"
     )
     scope.acquire(timeout_s=5.0)
     volts = [v for v in scope.trace(1).volts.tolist() if math.isfinite(v)]

@@ -153,11 +153,7 @@ class LaboratoryPerson:
 
 
 def laboratory_wiring(
-    world: World,
-    fate: Fate,
-    models: Mapping[str, str],
-    person: LaboratoryPerson,
-    limits: Limits,
+    world: World, fate: Fate, models: Mapping[str, str], person: LaboratoryPerson, limits: Limits
 ) -> tuple[LaboratoryBench, Wiring]:
     """Return a bench in a world, and the wiring that leads to it."""
     bench = LaboratoryBench.around(virtual_bus(world, models), fate)

@@ -44,9 +44,7 @@ _QUICK = ("hold_s=0", "ramp_hz_per_s=0.2", "drive_frequency_hz=35")
 #: Experiment → how it is carried out, within a fraction of a second.
 WORK: Mapping[str, Work] = {
     "spin": Work(
-        50,
-        (_QUICK, (*_QUICK, "interval_s=20"), ("drive_waveform=NONE",), ("drive_waveform=NONE", "interval_s=5")),
-        900,
+        50, (_QUICK, (*_QUICK, "interval_s=20"), ("drive_waveform=NONE",), ("drive_waveform=NONE", "interval_s=5")), 900
     ),
     "field": Work(30, (("step_m=0.01", "readings=4"), ("step_m=0.02", "readings=2")), 300, 8, ("magnetometer",)),
     "limit": Work(8, (("repetitions=2", "drive_waveform=NONE"), ("repetitions=1", *_QUICK)), 1500, 2),

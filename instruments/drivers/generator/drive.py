@@ -73,11 +73,7 @@ def amplitude_setting(low: float) -> LimitedSetting:
     With a load other than an open circuit the lowest amplitude is smaller.
     """
     return LimitedSetting(
-        *("VOLT", float, "Vpp", low, 20.0),
-        span=(0.0, 20.0),
-        digits=4,
-        quantity="amplitude_vpp",
-        partner="offset_v",
+        *("VOLT", float, "Vpp", low, 20.0), span=(0.0, 20.0), digits=4, quantity="amplitude_vpp", partner="offset_v"
     )
 
 

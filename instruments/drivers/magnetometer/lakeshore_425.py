@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from instruments.drivers.magnetometer.lakeshore import (
-    ZERO_DONE,
-    LakeShoreGaussmeter,
-    ListedNumbers,
-)
+from instruments.drivers.magnetometer.lakeshore import ZERO_DONE, LakeShoreGaussmeter, ListedNumbers
 from instruments.errors import NoAnswer
 from instruments.ieee488 import Form
 

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from instruments.drivers.magnetometer.lakeshore import (
-    LakeShoreGaussmeter,
-    ListedNumbers,
-)
+from instruments.drivers.magnetometer.lakeshore import LakeShoreGaussmeter, ListedNumbers
 from instruments.ieee488 import Form
 
 if TYPE_CHECKING:

@@ -93,11 +93,7 @@ class RigolDS1000Z(Scope):
     trigger_level = Setting(":TRIG:EDGE:LEV", float, unit="V", low=-1e5, high=1e5)
     time_scale = Setting(":TIM:SCAL", float, unit="s", low=5e-9, high=50.0)
     time_offset = Setting(":TIM:OFFS", float, unit="s", low=-300.0, high=5000.0)
-    memory_depth = _Depth(
-        ":ACQ:MDEP",
-        str,
-        choices=("AUTO", *map(str, _SHARED_DEPTHS)),
-    )
+    memory_depth = _Depth(":ACQ:MDEP", str, choices=("AUTO", *map(str, _SHARED_DEPTHS)))
     acquisition_type = Setting(":ACQ:TYPE", str, choices=("NORMal", "AVERages", "PEAK", "HRESolution"))
     trigger_slope = Setting(":TRIG:EDGE:SLOP", str, choices=("POSitive", "NEGative", "RFALl"))
     sweep = Setting(":TRIG:SWE", str, choices=("AUTO", "NORMal", "SINGle"))

@@ -9,12 +9,7 @@ import contextlib
 import functools
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
 
-from instruments.virtual.core.parameters import (
-    boolean,
-    nr3,
-    number,
-    parameter,
-)
+from instruments.virtual.core.parameters import boolean, nr3, number, parameter
 from instruments.virtual.core.parser import Parser, ScpiError
 from instruments.virtual.core.rows import Ask, Do, Own, Table
 from instruments.virtual.core.status import OPERATION_COMPLETE, Status

@@ -44,11 +44,7 @@ def receive(data: bytes, sender: LineSettings, receiver: LineSettings, *, checke
     >>> receive(b"LSCI", line, LineSettings(57600, 8, "N"))
     b'L\xd3CI'
     """
-    if (sender.baud_rate, sender.data_bits, sender.parity) == (
-        receiver.baud_rate,
-        receiver.data_bits,
-        receiver.parity,
-    ):
+    if (sender.baud_rate, sender.data_bits, sender.parity) == (receiver.baud_rate, receiver.data_bits, receiver.parity):
         mask = (1 << sender.data_bits) - 1
         return data if mask == 0xFF else bytes(byte & mask for byte in data)
     parity = _PARITY_BITS.get(receiver.parity) if checked else None

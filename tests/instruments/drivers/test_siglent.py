@@ -204,8 +204,7 @@ def test_a_switch_that_did_not_move_is_refused():
 
 
 @pytest.mark.parametrize(
-    ("setting", "answers"),
-    [("SHORT", ("C1:VDIV 1.00E+00V", "TDIV 1.00E-06S")), ("OFF", ("1.00E+00", "1.00E-06"))],
+    ("setting", "answers"), [("SHORT", ("C1:VDIV 1.00E+00V", "TDIV 1.00E-06S")), ("OFF", ("1.00E+00", "1.00E-06"))]
 )
 def test_a_scope_answers_with_header_and_unit_unless_CHDR_is_OFF(setting, answers):
     device = scope(f"CHDR {setting}")

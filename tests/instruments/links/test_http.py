@@ -145,8 +145,7 @@ def test_a_host_is_written_as_http_wants_it(address, url):
 
 
 @pytest.mark.parametrize(
-    "address",
-    ["phyphox://", "phyphox://:8080", "phyphox://host:port", "phyphox://host:99999", "phyphox://no..host"],
+    "address", ["phyphox://", "phyphox://:8080", "phyphox://host:port", "phyphox://host:99999", "phyphox://no..host"]
 )
 def test_an_address_without_a_host_is_refused(address):
     with pytest.raises(NotConnected, match="phyphox://HOST:8080"):

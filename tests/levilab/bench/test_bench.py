@@ -12,13 +12,7 @@ from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from levilab.acquisition.experiments.spin import SpinSettings
 from levilab.acquisition.table import Configuration, settings_of
 from levilab.bench.bench import OutputMayBeOn, open_bench
-from levilab.bench.config import (
-    BenchConfig,
-    ConfigError,
-    InstrumentSettings,
-    Limits,
-    read_bench,
-)
+from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, Limits, read_bench
 from levilab.bench.wiring import described_wiring
 from levilab.errors import LevilabError
 from levilab.interruption import Interrupted

@@ -235,11 +235,7 @@ def test_a_run_with_an_odd_record_is_not_resumed(
 
 @pytest.mark.parametrize(
     ("row", "says"),
-    [
-        ("80,0,0.03", "spin_frequency_hz"),
-        ("80,-1,0.03", "spin_frequency_hz"),
-        ("1e9,30,0.03", "spin.longest_s"),
-    ],
+    [("80,0,0.03", "spin_frequency_hz"), ("80,-1,0.03", "spin_frequency_hz"), ("1e9,30,0.03", "spin.longest_s")],
 )
 def test_a_run_with_odd_readings_is_not_resumed(tmp_path: Path, half: Path, row: str, says: str) -> None:
     folder = Path(shutil.copytree(half, tmp_path / "run"))

@@ -241,8 +241,7 @@ def test_time_stamps_of_more_readings_than_an_answer_holds_come_in_parts():
 
 
 @pytest.mark.parametrize(
-    "identity",
-    ["PENDULUM, CNT-91, 123456, V1.28 7 Jan 2012", "TEKTRONIX,FCA3000,579249,V1.32 26 May 2022 09:54"],
+    "identity", ["PENDULUM, CNT-91, 123456, V1.28 7 Jan 2012", "TEKTRONIX,FCA3000,579249,V1.32 26 May 2022 09:54"]
 )
 def test_the_cnt91_is_known_under_the_names_of_both_makers(identity):
     with conversation(PendulumCNT91, ("*IDN?", identity)) as counter:

@@ -41,13 +41,7 @@ def said(script):
     assert not script.left, f"never sent: {[sent for sent, _ in script.left]}"
 
 
-PULSES = {
-    "duration_s": 0.1,
-    "points": 100_000,
-    "volts_per_division": 0.2,
-    "offset_v": 0.6,
-    "trigger_level_v": 0.65,
-}
+PULSES = {"duration_s": 0.1, "points": 100_000, "volts_per_division": 0.2, "offset_v": 0.6, "trigger_level_v": 0.65}
 
 #: The settings sent to the scope, as it answers them: numbers in another form, a depth and switches as numbers.
 RIGOL_KEPT = [

@@ -91,8 +91,7 @@ def test_the_same_seed_makes_the_same_noise_and_another_another():
 
 
 @pytest.mark.parametrize(
-    ("kind", "mode", "rate"),
-    [(Virtual425, "1,1,1", 30), (Virtual475, "1,1,1,1,1", 30), (Virtual475, "1,3,1,1,1", 10)],
+    ("kind", "mode", "rate"), [(Virtual425, "1,1,1", 30), (Virtual475, "1,1,1,1,1", 30), (Virtual475, "1,3,1,1,1", 10)]
 )
 def test_there_are_so_many_readings_a_second_and_asking_more_often_gives_the_same_again(kind, mode, rate):
     device = meter(kind, lambda time: 1e-4 * time)

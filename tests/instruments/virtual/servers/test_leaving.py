@@ -175,11 +175,7 @@ def test_a_stream_client_whose_answer_never_comes_is_let_go(loop, instrument):
 
 
 GATE = b"SENS:FREQ:GATE:TIME 100;:SYST:TIM 2000;:READ?"
-HOLDS = {
-    "no trigger": b"TRIG:SOUR EXT;:READ?",
-    "a long gate": GATE,
-    "many questions": b";".join([b"*IDN?"] * 20_000),
-}
+HOLDS = {"no trigger": b"TRIG:SOUR EXT;:READ?", "a long gate": GATE, "many questions": b";".join([b"*IDN?"] * 20_000)}
 
 
 @pytest.fixture
