@@ -5,7 +5,7 @@ Source: Agilent/Keysight 33500 Series Operating and Service Guide, unless a test
 
 import pytest
 
-from instruments.virtual.generator.channel import Output
+from instruments.virtual.generator.channel import Burst, Output
 from support.generators import number
 from support.wire import ask, received, send
 
@@ -70,3 +70,25 @@ def test_the_listener_gets_all_that_shapes_the_signal(generator):
     assert generator.signal().symmetry == 0.25
     send(generator, b"FUNC PULS;FUNC:PULS:WIDT 250 us\n")
     assert generator.signal().duty == pytest.approx(0.25)
+
+
+def test_a_burst_waits_for_its_trigger_and_then_lasts(generator, changes):
+    send(generator, b"OUTP:LOAD INF;:FREQ 100;VOLT 4;BURS:NCYC 50;:TRIG:SOUR BUS;:BURS:STAT ON;:OUTP ON\n")
+    assert generator.signal().amplitude == 0.0
+    generator.clock.sleep(1.0)
+    del changes[:]
+    assert ask(generator, "*TRG;*OPC?") == "1"
+    assert generator.clock.now() == pytest.approx(1.5)  # 50 cycles of 100 Hz
+    assert [(time, output.amplitude) for time, output in changes] == [(1.0, 2.0), (1.5, 0.0)]
+    assert changes[0][1].burst == Burst(50, None)
+
+
+def test_a_change_within_a_burst_announces_its_end_anew(generator, changes):
+    send(generator, b"OUTP:LOAD INF;:FREQ 100;BURS:NCYC 50;:TRIG:SOUR BUS;:BURS:STAT ON;:OUTP ON\n*TRG\n")
+    generator.clock.sleep(0.2)
+    del changes[:]
+    send(generator, b"VOLT 6\n")
+    assert [(time, output.amplitude) for time, output in changes] == [(0.2, 3.0), (0.5, 0.0)]
+    send(generator, b"ABOR\n")
+    assert changes[-1] == (0.2, changes[-1][1])
+    assert changes[-1][1].amplitude == 0.0

@@ -48,14 +48,6 @@ def test_the_automatic_range_follows_the_field_and_does_not_flutter(kind):
     assert seen == [(1, False), (1, False), (2, False), (2, False), (1, False), (3, False)]
 
 
-@EACH
-def test_a_range_chosen_by_hand_ends_the_automatic_choice(kind):
-    device = meter(kind)
-    assert ask(device, "AUTO?") == "1"
-    assert ask(device, "RANGE 4;AUTO?;RANGE?") == "0;4"
-    assert ask(device, "AUTO;AUTO?") == "1"  # as PyMeasure sends it
-
-
 @pytest.mark.parametrize(
     ("kind", "mode", "step_t"),
     [
@@ -110,3 +102,17 @@ def test_a_new_reading_sets_its_bit_of_the_operation_status():
     seen = [int(ask(device, "OPST?")) & 4 for _ in range(4)]
     assert seen == sorted(seen)
     assert seen[-1] == 4
+
+
+def test_extremes_are_kept_until_they_are_reset():
+    field = [0.01]
+    device = meter(Virtual475, lambda _: field[0])
+    for size in (0.01, 0.03, -0.02, 0.0):
+        field[0] = size
+        device.clock.sleep(2.0)
+        ask(device, "RDGFIELD?")
+    lowest, highest = map(float, ask(device, "UNIT 2;RDGMNMX?").split(","))
+    assert (lowest, highest) == (pytest.approx(-0.02, rel=1e-3), pytest.approx(0.03, rel=1e-3))
+    lowest, highest = map(float, ask(device, "MXRST;RDGMNMX?").split(","))
+    assert lowest == pytest.approx(0.0, abs=1e-6)
+    assert highest == pytest.approx(0.0, abs=1e-6)

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from instruments.virtual.oscilloscope.record import Edge
 from support.scopes import RIGOL_READY, constant, pulses, ramp, rigol, rigol_stopped, rigol_volts, slow
-from support.wire import ask, send
+from support.wire import ask
 
 
 @pytest.mark.parametrize("level", [-0.5, 0.0, 0.37])
@@ -66,21 +66,6 @@ def test_the_part_before_the_trigger_is_filled_first():
     assert device.record().trigger >= armed + 0.6
 
 
-@pytest.mark.parametrize("level", [1.3, 0.05])
-def test_a_level_that_is_not_crossed_never_triggers(level):
-    device = rigol(pulses, *RIGOL_READY, f":TRIG:EDGE:LEV {level}", ":SING")
-    for _ in range(20):
-        device.clock.sleep(5.0)
-        assert ask(device, ":TRIG:STAT?") == "WAIT"
-
-
-def test_with_sweep_auto_a_record_comes_without_a_trigger():
-    device = rigol(pulses, *RIGOL_READY, ":TRIG:EDGE:LEV 1.3", ":TRIG:SWE AUTO")
-    device.clock.sleep(1.0)
-    assert ask(device, ":TRIG:STAT?") == "AUTO"
-    assert device.record().forced
-
-
 def test_sweep_auto_loses_pulses_that_come_more_rarely_than_it_waits():
     """The trap for a slow top: below 1/AUTO_AFTER the trace runs away although the level is right."""
     device = rigol(slow, *RIGOL_READY, ":TRIG:SWE AUTO", ":TIM:SCAL 0.0001")
@@ -89,15 +74,6 @@ def test_sweep_auto_loses_pulses_that_come_more_rarely_than_it_waits():
         device.clock.sleep(0.517)
         forced.append(device.record().forced)
     assert any(forced)
-
-
-def test_a_forced_trigger_ends_the_waiting():
-    device = rigol(pulses, *RIGOL_READY, ":TRIG:EDGE:LEV 1.3", ":SING")
-    device.clock.sleep(1.0)
-    send(device, b":TFOR\n")
-    device.clock.sleep(0.5)
-    assert ask(device, ":TRIG:STAT?") == "STOP"
-    assert device.record().forced
 
 
 def test_alternating_coupling_takes_the_mean_away_so_that_a_fixed_level_finds_nothing():
@@ -109,9 +85,3 @@ def test_grounded_shows_nothing_and_inverted_the_negative():
     for setting, expected in (("COUP GND", 0.0), ("INV ON", -0.3)):
         device = rigol(constant(0.3), "CHAN1:PROB 1;SCAL 0.2;OFFS 0", f"CHAN1:{setting}", ":STOP")
         assert rigol_volts(device)[1] == pytest.approx(expected, abs=0.0041)
-
-
-@pytest.mark.parametrize("how", [":RUN", ":SING"])
-def test_while_the_part_before_the_trigger_fills_the_scope_says_that_it_runs(how):
-    slow_sweep = (*RIGOL_READY, "CHAN1:OFFS 0", ":TRIG:EDGE:LEV 0", ":TIM:SCAL 0.1")
-    assert ask(rigol(ramp, *slow_sweep, ":STOP", how), ":TRIG:STAT?") == "RUN"
