@@ -6,20 +6,23 @@ bench file.  A refusal says what was seen, what is expected and what to do.
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, TypeAdapter, ValidationError
 
 from levilab.errors import LevilabError
+from levilab.present.progress import Display
 from levilab.runs.run import LONGEST_GROUP
 from levilab.settings import Settings, in_one_line
 from levilab.texts.text import Text
 
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
+
 #: The speeds of the bench: seconds of it in one of the wall.
 SLOWEST, FASTEST = 0.1, 10.0
-#: The heights at which the magnetometer's probe can stand [m].
-LOWEST_PROBE_M, HIGHEST_PROBE_M = 0.0, 0.5
 #: The slowest and the fastest change of the drive's frequency [Hz/s].
 SLOWEST_RAMP, FASTEST_RAMP = 0.001, 10.0
 
@@ -112,13 +115,6 @@ class Pause(Settings):
     on: StrictBool
 
 
-class PlaceProbe(Settings):
-    """Put the magnetometer's probe on the axis.  height_m: above the base [m]; None: into its chamber."""
-
-    do: Literal["place the probe"] = "place the probe"
-    height_m: Annotated[float, Field(strict=True, ge=LOWEST_PROBE_M, le=HIGHEST_PROBE_M)] | None
-
-
 class RecordRun(Settings):
     """Carry out an experiment on this bench, and write a run folder.
 
@@ -143,7 +139,7 @@ class StopRun(Settings):
 
 Command = (
     SwitchDrive | TuneDrive | MatchDrive | PutBack | ChangeBench | TakeSeed | BeginTask | AnswerTask
-    | SetSpeed | Pause | PlaceProbe | RecordRun | StopRun
+    | SetSpeed | Pause | RecordRun | StopRun
 )  # fmt: skip
 _COMMANDS: TypeAdapter[Command] = TypeAdapter(Annotated[Command, Field(discriminator="do")])
 
@@ -170,7 +166,7 @@ class PracticeEvent:
     Attributes:
         kind: "ready" once the instruments answer; "done" or "refused" for each command; "message", a line for the
             person at the bench; "recording" and "recorded", a run; "ended", the process is over.
-        text: for people, but data like everything in a run.
+        text: for people, but data like everything in a run; empty for "done".
         number: of the command that it answers, or that began the run; None where there is none.
         folder: of the run.
         status: of the run that ended: finished, interrupted or failed.
@@ -186,3 +182,35 @@ class PracticeEvent:
     scene: dict[str, Any] = field(default_factory=dict)
     port: int = 0
     token: str = ""
+
+
+@dataclass
+class Voice(Display):
+    """What the bench says: events in their order, and the line that stays in the page's picture of the top.
+
+    Attributes:
+        pipe: to the process that holds the bench; where that is gone, to nowhere.
+        text: what stays.
+    """
+
+    pipe: Connection
+    text: str = ""
+
+    def report(self, kind: EventKind, text: str, number: int | None = None, **about: Any) -> None:
+        """Send an event."""
+        with contextlib.suppress(OSError):
+            self.pipe.send(PracticeEvent(kind, text, number, **about))
+
+    def message(self, text: str) -> None:
+        """Report a line for the person at the bench, as a run does that is recorded."""
+        self.report("message", text)
+
+    def say(self, text: str, lasting: str | None = None) -> None:
+        """Report a line, and leave it in the page.
+
+        Args:
+            text: with the numbers of this moment.
+            lasting: what stays, where those numbers would grow old; None: the text itself.
+        """
+        self.text = text if lasting is None else lasting
+        self.message(text)

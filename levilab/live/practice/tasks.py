@@ -5,6 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from levilab.live.practice.commands import CommandRefused
+from levilab.texts.text import Text
+
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
@@ -113,25 +118,58 @@ TASKS: dict[str, Task] = {
 }  # fmt: skip
 
 
-@dataclass
-class Progress:
-    """A task under way.
+class Tasks:
+    """The tasks of a person: the one under way, and those that were reached.
 
     Attributes:
-        name: in TASKS.
-        chance: the random number that hides what is hidden.
-        since: when the goal was there first, without a break, bench time [s].
+        name: of the task under way, in TASKS; empty: none.
+        share: the part of the way to its goal, from 0 to 1.
+        done: names of those that were reached, in order.
+
+    Args:
+        seed: of the random numbers that hide what is hidden.
     """
 
-    name: str
-    chance: float
-    since: float | None = None
+    def __init__(self, seed: int) -> None:
+        self._random, self._chance = np.random.default_rng(seed), 0.0
+        self.name, self.share, self.done = "", 0.0, list[str]()
+        self._since: float | None = None  # when the goal was there first, without a break, bench time [s]
 
-    def share(self, look: Look) -> float:
-        """Return the part of the way to the goal, from 0 to 1, at which it is reached."""
-        task = TASKS[self.name]
-        if not task.holds(look):
-            self.since = None
-            return 0.0
-        self.since = look.time_s if self.since is None else self.since
-        return 1.0 if not task.for_s else min(1.0, (look.time_s - self.since) / task.for_s)
+    @property
+    def hidden(self) -> dict[str, Any]:
+        """What the task under way hides: keys of a scene."""
+        return TASKS[self.name].hidden(self._chance) if self.name else {}
+
+    def begin(self, name: str) -> None:
+        """Begin a task in the place of the one under way; empty: none.  Raises CommandRefused."""
+        if name and name not in TASKS:
+            raise CommandRefused(
+                Text("{name}: one of {known} is expected", name=f"task = {name}", known=", ".join(TASKS))
+            )
+        self.name, self.share, self._since, self._chance = name, 0.0, None, float(self._random.uniform())
+
+    def check(self, answer: float) -> None:
+        """Raise CommandRefused where an answer is wrong, or none is asked."""
+        if not self.name or not TASKS[self.name].answers:
+            raise CommandRefused("no task asks for an answer: begin one that does")
+        if answer != exponent_of(self._chance):
+            raise CommandRefused(
+                Text("n = {value:g} is not it: put the top back, and watch it once more", value=answer)
+            )
+
+    def look(self, look: Look) -> Task | None:
+        """Return the task under way if its goal is reached at a moment."""
+        task = TASKS.get(self.name)
+        if task is None or not task.holds(look):
+            self._since, self.share = None, 0.0
+            return None
+        self._since = look.time_s if self._since is None else self._since
+        self.share = min(1.0, (look.time_s - self._since) / task.for_s) if task.for_s else 1.0
+        if self.share < 1:
+            return None
+        self.reach(self.name)
+        return task
+
+    def reach(self, name: str) -> None:
+        """Note that a goal is reached, whether its task is under way or not."""
+        self.done += [name] * (name not in self.done)

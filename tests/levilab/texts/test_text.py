@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 LANGUAGES = [code for code in languages() if code != "en"]
 #: Functions whose text a person reads, in the modules of these rooms, and the number of the argument.
 SAYING = {
-    "_say": 0, "CommandRefused": 0, "event": 1, "warn": 0, "progress": 0, "tell": 0,
+    "_say": 0, "say": 0, "message": 0, "CommandRefused": 0, "event": 1, "warn": 0, "progress": 0, "tell": 0,
     "Task": 0, "FloatTop": 0, "PlaceProbe": 0, "ShieldProbe": 0,
     "ExperimentFailed": 0, "DidNotFollow": 0, "NoLight": 0, "_unfit": 0,
 }  # fmt: skip
@@ -128,9 +128,7 @@ def test_no_text_is_of_a_sentence_that_is_said_no_more(code: str) -> None:
 
 def test_a_text_is_the_english_sentence_and_comes_through_json_and_pickle() -> None:
     why = Text("the top spins at {spin:.2f} Hz", spin=21.5)
-    said = Text(
-        "drive on at {frequency_hz:g} Hz, but {beside}: {takes}", frequency_hz=30.5, beside=why, takes="no more"
-    )
+    said = Text("drive on at {hz:g} Hz, but {beside}: {takes}", hz=30.5, beside=why, takes="no more")
     assert said == "drive on at 30.5 Hz, but the top spins at 21.50 Hz: no more"
     german = "Antrieb ein bei 30,5 Hz, aber der Kreisel dreht sich mit 21,50 Hz: no more"
     for copy in (said, pickle.loads(pickle.dumps(said)), text_from(json.loads(json.dumps(said.as_table())))):
