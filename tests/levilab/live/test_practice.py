@@ -146,7 +146,7 @@ def type_into_the_fields(page: Page) -> None:
 
 
 def change_what_if(page: Page) -> None:
-    """A slider has its effect at once; the task under way takes the guide's place, and opens what it needs."""
+    """A slider has its effect at once; the task under way stands in the place of the guide."""
     slider = "document.querySelector('#quantities input')"
     assert page.locator("#quantities input").count() == len(WHAT_IF)
     page.evaluate(f"{slider}.value = 0.02, {slider}.dispatchEvent(new Event('input'))")
@@ -156,13 +156,8 @@ def change_what_if(page: Page) -> None:
     page.get_by_role("tab", name="Measure").press("ArrowLeft")  # the last one
     page.get_by_role("button", name="Hold it for three minutes").click()
     until(page, "document.getElementById('guide').hidden && document.getElementById('task-share').value > 0")
-    assert page.evaluate(NEEDED) == "drive"
-    page.get_by_role("button", name="Find the mass that floats").click()
-    until(page, f"{NEEDED} === 'washers_g' && document.activeElement.offsetParent === null")  # its tab is open
-    assert page.locator("#washers_g").is_visible()
     page.click("#leave-task")
     until(page, "!document.getElementById('guide').hidden && document.getElementById('task').hidden")
-    until(page, "levilab.data.up && levilab.data.bench.last.spin_frequency_hz > 25")  # the usual one floats again
     page.get_by_role("tab", name="Measure").click()
 
 
@@ -288,6 +283,26 @@ def test_nothing_can_be_pressed_before_the_bench_is_there(starting: Hall, watche
     until(page, "document.body.dataset.state === 'slow'")  # and not silent: it has not ended
 
 
+def test_a_task_opens_the_control_that_it_needs_and_leads_to_the_next(starting: Hall, page: Page) -> None:
+    page.goto(address(starting, token=True))
+    until(page, "levilab.frames > 0")
+    here = State(2.0, last={"spin_frequency_hz": 30.0}, drive=Drive("SQU", 30.0, 10.0), count=Count(30.0, 1.8, 0.5))
+    publish(starting.watches[""], here)
+    until(page, f"{NEEDED} === 'match'")
+    assert page.locator("#experiment").is_visible()
+    publish(starting.watches[""], replace(here, time_s=3.0, task="mass"))
+    until(page, f"{NEEDED} === 'washers_g'")
+    assert page.locator("#washers_g").is_visible()
+    assert not page.locator("#guide").is_visible()
+    page.get_by_role("tab", name="Tasks").click()  # a person may go elsewhere
+    publish(starting.watches[""], replace(here, time_s=4.0, tasks_done=("catch", "mass")))
+    until(page, "!document.getElementById('offer').hidden")
+    assert page.inner_text("#offer-text").startswith("✓ Find the mass that floats: of 25 g only some tenths are free")
+    assert page.inner_text("#next-task") == "Hold it for three minutes"
+    assert page.locator("#guide").is_visible()  # its steps are not done
+    assert page.inner_text("#tasks-done") == "2 of 5 done"
+
+
 #: Whether the panel of each tab is seen whole, without a scroll of the page or of its part.
 SEEN_WHOLE = """() => [...document.querySelectorAll('[role=tab]')].map((tab) => {
   tab.click();
@@ -307,6 +322,15 @@ STAYS_IN_VIEW = """() => {
 }"""
 
 
+def show_a_top(starting: Hall, page: Page) -> None:
+    """A top that stands still, on a bench that takes commands."""
+    page.goto(address(starting, token=True))
+    until(page, "levilab.frames > 0")
+    up = Poses(2.0, 1 / 400, np.full((1, 3), 0.07), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ones(1, dtype=bool))
+    publish(starting.watches[""], State(2.0, last={"spin_frequency_hz": 30.0}, drive=Drive("SQU", 30.0, 10.0)), up)
+    until(page, "!document.getElementById('controls').disabled && levilab.space?.state && levilab.space.frames")
+
+
 @pytest.mark.parametrize(
     ("width", "height", "whole"), [(1280, 800, True), (1024, 768, True), (390, 844, True), (640, 400, False)]
 )
@@ -315,14 +339,68 @@ def test_controls_and_top_are_seen_together(
 ) -> None:
     """640 × 400 is a window of 1280 × 800 at a zoom of 200 %: there the controls scroll beside the top."""
     page = watched(viewport={"width": width, "height": height})
-    page.goto(address(starting, token=True))
-    until(page, "levilab.frames > 0")
-    up = Poses(2.0, 1 / 400, np.full((1, 3), 0.07), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ones(1, dtype=bool))
-    publish(starting.watches[""], State(2.0, last={"spin_frequency_hz": 30.0}, drive=Drive("SQU", 30.0, 10.0)), up)
-    until(page, "!document.getElementById('controls').disabled && levilab.space?.state")
+    show_a_top(starting, page)
     assert page.evaluate(SEEN_WHOLE) == 3 * [whole]
     assert page.evaluate(STAYS_IN_VIEW) == [True, True]
     assert page.evaluate("document.documentElement.scrollWidth") == width
+
+
+#: The control that has the focus, and whether it is marked, in the window, and covered by nothing.
+FOCUSED = """() => {
+  const one = document.activeElement, style = getComputedStyle(one);
+  const {top, bottom, left, right} = one.getBoundingClientRect();
+  const over = document.elementFromPoint((left + right) / 2, (top + bottom) / 2);
+  const free = one.contains(over) || over?.contains(one) || [...one.labels || []].some((label) => label.contains(over));
+  const inside = top >= 0 && bottom <= innerHeight + 1 && left >= 0 && right <= innerWidth + 1;
+  return [one.id || one.textContent, style.outlineStyle !== 'none' && inside && free];
+}"""
+
+
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (640, 400)])
+def test_the_keyboard_comes_to_each_control_in_order_and_sees_it(
+    starting: Hall, watched: Callable[..., Page], width: int, height: int
+) -> None:
+    """Nothing that stays in view covers what has the focus."""
+    page = watched(viewport={"width": width, "height": height})
+    show_a_top(starting, page)
+    page.focus("#space")
+    seen = [("space", True)]
+    while seen[-1][0] != "record":
+        page.keyboard.press("Tab")
+        seen.append(tuple(page.evaluate(FOCUSED)))
+        assert len(seen) < 40
+    assert [name for name, is_seen in seen if not is_seen] == []
+    order = ["space", "show-path", "motion", "drive", "frequency", "speed", "Measure", "experiment", "record"]
+    assert [name for name, _ in seen if name in order] == order
+    page.keyboard.press("?")
+    assert page.locator("#keys").is_visible()
+    page.keyboard.press("Escape")
+    assert not page.locator("#keys").is_visible()
+
+
+def test_fingers_turn_the_top_come_nearer_and_scroll(starting: Hall, watched: Callable[..., Page]) -> None:
+    """A phone: one finger from side to side, two apart, and one upwards."""
+    page = watched(viewport=PHONE, has_touch=True)
+    show_a_top(starting, page)
+    cdp, box = page.context.new_cdp_session(page), page.locator("#space").bounding_box()
+    assert box
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+    def draw(*paths: tuple[float, float]) -> bytes:
+        """Move a finger for each path, and return the picture then."""
+        frames = page.evaluate("levilab.space.frames")
+        for k in range(9):
+            points = [{"x": x + k * dx, "y": y + k * dy, "id": n} for n, (dx, dy) in enumerate(paths)]
+            cdp.send("Input.dispatchTouchEvent", {"type": "touchMove" if k else "touchStart", "touchPoints": points})
+        cdp.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        if any(dx for dx, _ in paths):
+            until(page, f"levilab.space.frames > {frames}")
+        return page.locator("#space").screenshot()
+
+    pictures = [page.locator("#space").screenshot(), draw((10.0, 0.0)), draw((-6.0, 0.0), (6.0, 0.0))]
+    assert len(set(pictures)) == 3
+    draw((0.0, -20.0))
+    until(page, "scrollY > 40")
 
 
 def test_an_axis_has_two_numbers_at_least(starting: Hall, page: Page) -> None:
