@@ -90,11 +90,10 @@ def scans_as_text(means: Mapping[str, Estimate], runs: int, scatter: float) -> s
 def scan_as_text(scan: FieldScan, floating: Floating | None) -> str:
     """Return what a scan says, in a few sentences."""
     base = (
-        f"The base has ρ = {_format('strength', scan.parameters['strength'])}, its middle at "
+        f"The base has the strength ρ = {_format('strength', scan.parameters['strength'])}, its middle at "
         f"{_format('origin', scan.parameters['origin'])}; its field points {_pole(scan)} above it."
     )
-    parts = [base, _learned_as_text(scan)]
-    parts.append(_advice(floating.values) if floating else "No top floats above it.")
+    parts = [_advice(floating.values) if floating else "No top floats above this base.", base, _learned_as_text(scan)]
     return " ".join(part for part in parts if part)
 
 

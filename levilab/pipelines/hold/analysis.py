@@ -81,10 +81,10 @@ class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
 
 def text_of(run: Hold) -> str:
     """Return what a held spin says, in a sentence."""
-    drag = f": {with_uncertainty(run.drag)}" if run.drag else ""
+    drag = f", {with_uncertainty(run.drag)}" if run.drag else ""
     return (
-        f"Held at {with_uncertainty(run.spin)}, s.d. of a reading {plain(run.scatter.value, 2)} Hz; "
-        f"{100 * run.share:.1f} % of the amplitude balanced the drag{drag}."
+        f"{100 * run.share:.1f} % of the drive's amplitude held the top at {with_uncertainty(run.spin)}: so much "
+        f"balanced the drag of the air{drag}. A reading scatters by {plain(run.scatter.value, 2)} Hz."
     )
 
 

@@ -446,7 +446,9 @@ def warnings_of(statistics: Statistics) -> list[str]:
 def _sentences(limits: Limits) -> Iterable[str]:
     found = limits.statistics
     name = limits.conditions.name(found.n)
-    many = f"{found.n} {name} have the mean" if found.n > 1 else f"one {name},"
+    falls = "The top fell at one" if limits.which == "lower" else "The drive lost the top at one"
+    one = "One" if limits.conditions.levels_off else falls
+    many = f"{found.n} {name} have the mean" if found.n > 1 else f"{one} {name},"
     scatter = f" and scatter by {with_uncertainty(found.scatter)}" if found.scatter and found.scatter.value else ""
     scatter = scatter or " and do not scatter" * (found.scatter is not None)
     yield f"{many} {with_uncertainty(found.mean)}{scatter} ({limits.conditions_text})."

@@ -174,7 +174,7 @@ def _draw_departures(axes: Axes, analysis: PrecessionAnalysis) -> None:
         tallest = max(tallest, 1.1 * float((np.abs(off) + 2 * bars)[_used(run.fit)].max()))
     if tallest > 0:
         axes.set_ylim(-tallest, tallest)
-    axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel="ν$_p$ − ν$_d$  [Hz]")
+    axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel="precession − drive  [Hz]")
     bar = "u of each point" if fit.line.chi_square is not None else "the scatter"
     axes.set_title("Departures from a locked top")
     about = f"bars: ± {bar};\nlines and bands as above.\nA locked top scatters\nabout the dashed line."

@@ -32,8 +32,8 @@ def intercept_of(fit: SweepFit) -> Estimate:
 
 def verdict(fit: SweepFit) -> str:
     """Return what a sweep says, in a few sentences."""
-    head = f"Slope {with_uncertainty(slope_of(fit))}, intercept {with_uncertainty(intercept_of(fit))}."
-    return " ".join((head, _about_lock(fit), *([_about_power(fit.power)] if fit.power else [])))
+    line = f"Slope {with_uncertainty(slope_of(fit))}, intercept {with_uncertainty(intercept_of(fit))}."
+    return " ".join((_about_lock(fit), line, *([_about_power(fit.power)] if fit.power else [])))
 
 
 def _about_lock(fit: SweepFit) -> str:
@@ -41,9 +41,13 @@ def _about_lock(fit: SweepFit) -> str:
     if p is None:
         return "Whether the top was locked to the drive cannot be tested without the u of the points."
     if p >= EXCLUDED_P:
-        return f"A locked top, slope 1 and intercept 0, agrees with the {fit.line.n} points (p = {plain(p, 2)})."
+        return (
+            f"The stem goes round once for each turn of the drive: slope 1 and intercept 0 agree with the {fit.line.n} "
+            f"points (p = {plain(p, 2)})."
+        )
     return (
-        f"A locked top, slope 1 and intercept 0, is excluded (p = {plain(p, 1)}): the precession that was counted lies "
+        "The stem does not go round once for each turn of the drive: slope 1 and intercept 0 are excluded "
+        f"(p = {plain(p, 1)}), and the precession that was counted lies "
         f"{digits(abs(_offset(fit)))} Hz {'above' if _offset(fit) > 0 else 'below'} the drive at "
         f"{fit.line.centre:.4g} Hz."
     )

@@ -68,6 +68,8 @@ if TYPE_CHECKING:
 _POWERS: Mapping[str, float] = MappingProxyType(
     {law.name: n for law in sorted(LAWS.values(), key=lambda one: one.orders) if (n := law.exponent) is not None}
 )
+#: How the drag by such a law depends on the spin ω, in plain notation.
+_DRAGS = {"stokes": "ω", "disc": "ω^(3/2)", "newton": "ω²"}
 #: C₃/₂ of a bare disc as large as the thesis's top in laminar air, without a free parameter (PHYSICS.md §5) [SI].
 KARMAN = 2.235e-4
 #: Power of the laminar layer of air on a disc.
@@ -128,8 +130,10 @@ def answer(analysis: SpinDownAnalysis) -> str:
     ]
     if not verdict.describes or not known:
         return ""
-    law = f"by the {verdict.best} law" if verdict.decided else f"if the {verdict.best} law holds"
-    return f"{enumeration(known)} {law}."
+    if not verdict.decided:
+        return f"{enumeration(known)} if the {verdict.best} law holds."
+    drag = _DRAGS.get(verdict.best, "")
+    return f"{drag and f'The drag of the air grows as {drag}: '}{enumeration(known)} by the {verdict.best} law."
 
 
 def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:

@@ -75,7 +75,7 @@ def test_several_sweeps_share_a_line(tmp_path):
     other = sweep_csv(tmp_path / "3.csv", slope=1.05, seed=3)
     together = PRECESSION.analyze([*files, other], PrecessionOptions())
     assert any("slopes of the 3 runs differ" in text for text in together.all_warnings)
-    assert "is excluded" in together.text
+    assert "are excluded" in together.text
 
 
 def test_other_options_than_those_of_the_result_fit_again_with_the_rest_as_before(tmp_path):
