@@ -4,7 +4,7 @@ A file is opened (`texts`) and understood (`understanding`), and its rows are re
 """
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -112,12 +112,22 @@ def read_table(
     )
 
 
+def refuse(table: Table, wrong: "NDArray[np.bool_]", say: Callable[[int], str]) -> None:
+    """Raise TableError, which names the line, for the first of the wrong readings.
+
+    Args:
+        table: of the readings.
+        wrong: which of them, shape (n,).
+        say: from the index of a reading, what is wrong with it.
+    """
+    if wrong.any():
+        i = int(wrong.argmax())
+        raise TableError(table.path, say(i), line=int(table.lines[i]))
+
+
 def must_be_positive(table: Table, values: "NDArray[np.float64]", what: str, advice: str) -> None:
     """Raise TableError, which names the line, for the first of these values that is not above 0."""
-    wrong = np.flatnonzero(values <= 0)
-    if wrong.size:
-        i = int(wrong[0])
-        raise TableError(table.path, f"{what} is {values[i]:.9g} {advice}", line=int(table.lines[i]))
+    refuse(table, values <= 0, lambda i: f"{what} is {values[i]:.9g} {advice}")
 
 
 def read_run_readings(path: Path, channels: Collection[str] = ()) -> Table:

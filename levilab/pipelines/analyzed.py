@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from levilab.pipelines.options import InputOptions
-from levilab.pipelines.sources import Readings, Remark, Source
+from levilab.pipelines.sources import NotTaken, Readings, Source
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -67,7 +67,7 @@ class Analyzed(Generic[S, R, T, Opt]):
     options: Opt
     place: Place
     warnings: tuple[str, ...]
-    remarks: tuple[Remark, ...]
+    remarks: tuple[NotTaken, ...]
     origins: tuple[Origin[Opt], ...]
     budget: tuple[Budget, ...] = ()
 

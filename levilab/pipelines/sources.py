@@ -253,7 +253,7 @@ def files_by_kind(left_out: Sequence[LeftOut]) -> str:
 
 
 #: What lies in a folder and is no input, without a cause for a warning.
-Remark = SkippedRuns | Skipped | LeftOut
+NotTaken = SkippedRuns | Skipped | LeftOut
 
 
 @dataclass(frozen=True)
@@ -267,7 +267,7 @@ class Found(Generic[R]):
 
     sources: tuple[Source[R], ...]
     warnings: tuple[str, ...] = ()
-    remarks: tuple[Remark, ...] = ()
+    remarks: tuple[NotTaken, ...] = ()
 
 
 # --- finding the inputs --------------------------------------------------------------------------------
@@ -454,7 +454,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
     """Find the runs and data files below a folder that suit; a broken or too short one is skipped with a warning."""
     found: list[Source[R]] = []
     broken: list[Skipped] = []
-    remarks: list[Remark] = []
+    remarks: list[NotTaken] = []
     others: Counter[str] = Counter()
     for folder in find_runs(root):
         chosen = options(folder)
@@ -485,7 +485,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
 
 
 @contextmanager
-def _skipping(file: Path, broken: list[Skipped], remarks: list[Remark]) -> Iterator[None]:
+def _skipping(file: Path, broken: list[Skipped], remarks: list[NotTaken]) -> Iterator[None]:
     """Note what is wrong with a data file that was found in a folder, or of which kind it is."""
     try:
         yield

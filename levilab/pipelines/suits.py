@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.document import Analysis
     from levilab.pipelines.options import InputOptions
     from levilab.pipelines.result import Archive, Written
-    from levilab.pipelines.sources import Remark, Source
+    from levilab.pipelines.sources import NotTaken, Source
 
     Tell = Callable[[str], None]
 
@@ -263,13 +263,13 @@ def _usable_runs(root: Path) -> list[Run]:
     return runs
 
 
-def remarks(of_each: Sequence[Sequence[Remark]]) -> list[Remark]:
+def remarks(of_each: Sequence[Sequence[NotTaken]]) -> list[NotTaken]:
     """Join the remarks of several analyses; runs and files that were left out count only if all of them did."""
     said = list(dict.fromkeys(remark for those in of_each for remark in those))
     return [one for one in said if isinstance(one, Skipped) or all(one in those for those in of_each)]
 
 
-def left_out_of(remarks: Sequence[Remark]) -> list[dict[str, str]]:
+def left_out_of(remarks: Sequence[NotTaken]) -> list[dict[str, str]]:
     """Return the files that are left out, for programs."""
     return [
         {"path": one.path.as_posix(), "kind": one.kind.name.partition(" ")[2], "advice": one.kind.advice}
@@ -278,7 +278,7 @@ def left_out_of(remarks: Sequence[Remark]) -> list[dict[str, str]]:
     ]
 
 
-def texts_of(remarks: Sequence[Remark]) -> list[str]:
+def texts_of(remarks: Sequence[NotTaken]) -> list[str]:
     """Return remarks as lines of text, the files that are left out in one."""
     left_out = [one for one in remarks if isinstance(one, LeftOut)]
     return [*(str(one) for one in remarks if not isinstance(one, LeftOut)), *([in_words(left_out)] if left_out else [])]

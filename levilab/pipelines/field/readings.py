@@ -11,10 +11,11 @@ from analysis.field.errors import TooFewHeights
 from analysis.field.fit import FEWEST_HEIGHTS, SAME_HEIGHT_M
 from analysis.numbers import digits
 from levilab.formats.columns import TableError
-from levilab.formats.table import read_table
+from levilab.formats.table import read_table, refuse
 from levilab.pipelines.sources import Readings
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -73,9 +74,8 @@ def field_readings(table: Table) -> FieldReadings:
     height_u = table.column("height_u_m") if "height_u_m" in columns else None
     u = table.column(u_name) if u_name in columns else None
     for values, what, lowest in ((height_u, "the uncertainty of a height", 0.0), (u, "an uncertainty", 1e-12)):
-        if values is not None and (wrong := np.flatnonzero(values < lowest)).size:
-            seen, line = float(values[wrong[0]]), int(table.lines[wrong[0]])
-            raise TableError(table.path, f"{what} is {seen:g}, more than 0 is expected: correct it", line=line)
+        if values is not None:
+            refuse(table, values < lowest, _not_positive(what, values))
     strongest = float(np.abs(flux_density).max())
     doubts = []
     if strongest > _STRONGEST_MAGNET_T:
@@ -84,15 +84,15 @@ def field_readings(table: Table) -> FieldReadings:
     return FieldReadings(height, flux_density, height_u, u, own, (*table.warnings, *doubts))
 
 
+def _not_positive(what: str, values: Array) -> Callable[[int], str]:
+    return lambda i: f"{what} is {values[i]:g}, more than 0 is expected: correct it"
+
+
 def _must_be_in_range(table: Table, values: Array, most: float, what: str, *, unit: str, column: str) -> None:
-    wrong = np.flatnonzero(np.abs(values) > most)
-    if wrong.size:
-        raise TableError(
-            table.path,
-            f"{what} of {values[wrong[0]]:.6g} {unit} cannot be, up to {most:g} {unit} is expected: if the unit is "
-            f"another one, say so, as `columns` = {column}",
-            line=int(table.lines[wrong[0]]),
-        )
+    refuse(table, np.abs(values) > most, lambda i: (
+        f"{what} of {values[i]:.6g} {unit} cannot be, up to {most:g} {unit} is expected: if the unit is another one, "
+        f"say so, as `columns` = {column}"
+    ))  # fmt: skip
 
 
 #: Columns of a table that are looked at.

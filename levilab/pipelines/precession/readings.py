@@ -10,7 +10,7 @@ import numpy as np
 from analysis.numbers import digits
 from analysis.precession.gates import rates_at_point, shared_scatter
 from levilab.formats.columns import TableError
-from levilab.formats.table import FEWEST, read_table
+from levilab.formats.table import FEWEST, read_table, refuse
 from levilab.pipelines.sources import SAME, Readings
 from levilab.present.numbers import pulses_too_many
 from levilab.runs.gates import gates_of
@@ -170,24 +170,13 @@ def sweep_readings(table: Table) -> SweepReadings:
 
 
 def _check(table: Table, values: Array, what: str) -> None:
-    wrong = np.flatnonzero((values < SLOWEST_HZ) | (values > HIGHEST_HZ))
-    if wrong.size:
-        i = int(wrong[0])
-        raise TableError(
-            table.path,
-            f"{what} is {values[i]:.9g} Hz, a number above 0 and up to {HIGHEST_HZ:g} is expected: remove the point",
-            line=int(table.lines[i]),
-        )
+    refuse(table, (values < SLOWEST_HZ) | (values > HIGHEST_HZ), lambda i: (
+        f"{what} is {values[i]:.9g} Hz, a number above 0 and up to {HIGHEST_HZ:g} is expected: remove the point"
+    ))  # fmt: skip
 
 
 def _check_u(table: Table, values: Array, of: str, size: Array) -> None:
     """Refuse an uncertainty that is not above 0, or below the rounding of the number itself, is a mistake."""
-    wrong = np.flatnonzero(~((values > 1e-15 * size) & (values < 1e15 * size)))
-    if wrong.size:
-        i = int(wrong[0])
-        raise TableError(
-            table.path,
-            f"the uncertainty of the {of} frequency is {digits(float(values[i]), 3)} Hz: correct it or remove the "
-            "column",
-            line=int(table.lines[i]),
-        )
+    refuse(table, ~((values > 1e-15 * size) & (values < 1e15 * size)), lambda i: (
+        f"the uncertainty of the {of} frequency is {digits(float(values[i]), 3)} Hz: correct it or remove the column"
+    ))  # fmt: skip

@@ -2,6 +2,7 @@
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -15,7 +16,7 @@ from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from analysis.spindown.readings import check_readings
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
-from levilab.formats.table import FEWEST, Table, read_table
+from levilab.formats.table import FEWEST, Table, read_table, refuse
 from levilab.formats.understanding import is_possible_spin, possible_spins
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
@@ -251,13 +252,11 @@ def _must_be_ordinary(table: Table, time: "NDArray[np.float64]", frequency: "NDA
         (size > HIGHEST_HZ, frequency, "frequency", f"up to {HIGHEST_HZ:g} Hz"),
         ((size > 0) & (size < SLOWEST_HZ), frequency, "frequency", f"from {SLOWEST_HZ:g} Hz"),
     ):
-        if wrong.any():
-            i = int(np.flatnonzero(wrong)[0])
-            raise TableError(
-                table.path,
-                f"a {what} of {values[i]:.9g} is no measurement, {allowed}: check the unit",
-                line=int(table.lines[i]),
-            )
+        refuse(table, wrong, partial(_no_measurement, what, values, allowed))
+
+
+def _no_measurement(what: str, values: "NDArray[np.float64]", allowed: str, i: int) -> str:
+    return f"a {what} of {values[i]:.9g} is no measurement, {allowed}: check the unit"
 
 
 def _in_the_file(table: Table, error: AnalysisError) -> TableError:
@@ -293,12 +292,7 @@ _ABOVE_0 = {
 def _must_be_possible(table: Table, u: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:
     """Refuse an uncertainty below the rounding of the number itself, or one that is not above 0."""
     above_0 = (u > 0) & (frequency > 0)
-    wrong = np.flatnonzero(above_0 & ((u < 1e-15 * frequency) | (u > 1e15 * frequency)))
-    if wrong.size:
-        i = int(wrong[0])
-        raise TableError(
-            table.path,
-            f"an uncertainty of {digits(float(u[i]), 3)} Hz for {frequency[i]:.9g} Hz cannot be meant: correct it or "
-            "drop the column",
-            line=int(table.lines[i]),
-        )
+    refuse(table, above_0 & ((u < 1e-15 * frequency) | (u > 1e15 * frequency)), lambda i: (
+        f"an uncertainty of {digits(float(u[i]), 3)} Hz for {frequency[i]:.9g} Hz cannot be meant: correct it or drop "
+        "the column"
+    ))  # fmt: skip

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from levilab.formats.columns import NoSuchColumn, TableError
-from levilab.formats.table import read_run_readings, read_table
+from levilab.formats.table import read_run_readings, read_table, refuse
 from levilab.formats.understanding import Request, plan_of
 from levilab.pipelines.sources import Readings
 from levilab.runs.run import STATES
@@ -101,12 +101,8 @@ def read_motion_run(run: Run, _: InputOptions) -> SwayReadings:
 
 def _readings(table: Table) -> SwayReadings:
     time, x, y = (table.column(name) for name in NEEDED)
-    far = np.flatnonzero(np.hypot(x - np.median(x), y - np.median(y)) > _FARTHEST_M)
-    if far.size:
-        raise TableError(
-            table.path,
-            f"the top is {np.hypot(x, y)[far[0]]:.3g} m off, less than {_FARTHEST_M:g} m is expected: if the unit is "
-            "another one, say so, as `columns` = x=NAME [mm],y=NAME [mm]",
-            line=int(table.lines[far[0]]),
-        )
+    refuse(table, np.hypot(x - np.median(x), y - np.median(y)) > _FARTHEST_M, lambda i: (
+        f"the top is {np.hypot(x, y)[i]:.3g} m off, less than {_FARTHEST_M:g} m is expected: if the unit is another "
+        "one, say so, as `columns` = x=NAME [mm],y=NAME [mm]"
+    ))  # fmt: skip
     return SwayReadings(time, x, y, table.columns.get("spin_frequency_hz"), table.warnings)
