@@ -1,8 +1,10 @@
-"""What pages take from the program: the help of all commands, the columns of tables of many runs, the drag laws."""
+"""What pages take from the program: the help of all commands, and tables of columns, laws, names and keys."""
 
 from __future__ import annotations
 
+import json
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -87,10 +89,59 @@ def _raised(equation: str) -> str:
     return re.sub(r"\^\(([^()]*)\)", r"<sup>\1</sup>", equation)
 
 
+def observables() -> str:
+    """Return the columns of a sweep but for the lines of the axis, in Markdown."""
+    from levilab.sweeps.observables import GROUPS, OBSERVABLES
+
+    rows = (f"| `{one}` | {row.meaning} |\n" for one, row in OBSERVABLES.items() if one not in GROUPS["lines"])
+    return "| name | meaning |\n|---|---|\n" + "".join(rows)
+
+
+def fit() -> str:
+    """Return the names of a fit, which are lmfit's, with their meanings, in Markdown."""
+    from levilab.notebook.fit import FIT
+
+    rows = (f"| `{name}` | {meaning} |\n" for name, (meaning, _) in FIT.items())
+    return "| name | meaning |\n|---|---|\n" + "".join(rows)
+
+
+def scene() -> str:
+    """Return the scene that has every key with a comment, as a block."""
+    from importlib.resources import files
+
+    return f"```toml\n{files('levilab.simulator').joinpath('scenes/undriven.toml').read_text(encoding='utf-8')}```"
+
+
+#: Kept results of the cross-check, and the least number of trials that the page shows.
+CHECKS, FEWEST_TRIALS = Path(__file__).parents[2] / "benchmarks/results/crosscheck.json", 30
+
+
+def checks() -> str:
+    """Return the pulls of the kept cross-check, in Markdown."""
+    kept = json.loads(CHECKS.read_text(encoding="utf-8"))["checks"]
+    heads = "subject, seed | quantity | trials | mean pull | s.d. | within 1 u [%] | beyond 2 u [%] | beyond 3 u [%]"
+    return f"| {heads} |\n{'|---' * 8}|\n" + "".join(
+        f"| `{check['name']}`, {check['seed']} | {one['quantity']} | {one['n']} | {one['mean']:+.2f} | "
+        f"{one['deviation']:.2f} | {100 * one['coverage']:.0f} | {_beyond(one, 2)} | {_beyond(one, 3)} |\n"
+        for check in kept
+        for one in check["spreads"]
+        if one["n"] >= FEWEST_TRIALS
+    )
+
+
+def _beyond(spread: Any, limit: float) -> str:
+    pulls = spread["pulls"]
+    return f"{100 * sum(abs(pull) > limit for pull in pulls) / len(pulls):.0f}"
+
+
 #: Page → mark in it → what takes its place.
 MADE = {
+    "crosscheck": {"<!-- all results -->": checks},
     "reference/commands": {"<!-- all commands -->": reference},
     "data": {"<!-- all columns -->": columns, "<!-- all laws -->": laws},
+    "notebook": {"<!-- all names of a fit -->": fit},
+    "simulator": {"<!-- all keys -->": scene},
+    "sweeps": {"<!-- all observables -->": observables},
 }
 
 

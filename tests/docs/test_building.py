@@ -3,7 +3,7 @@
 import pytest
 import typer.main
 
-from building.commands import MADE, columns, reference
+from building.commands import MADE, checks, columns, fit, observables, reference, scene
 from building.docstrings import as_markup
 from building.outside_pages import lead_to_site
 from building.requests import loaded_from_elsewhere
@@ -27,6 +27,10 @@ def test_the_page_of_data_has_each_column_and_each_mark_stands_in_its_page():
     for page, marks in MADE.items():
         text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
         assert [mark for mark in marks if text.count(mark) != 1] == []
+    assert "| `redchi` | χ² per degree" in fit()
+    assert "\nmass_kg = " in scene()
+    assert "| `survived` | Whether" in observables()
+    assert "| `spin`, 1000 | frequency | 200 |" in checks()
 
 
 @pytest.mark.parametrize(("page", "written", "led"), [

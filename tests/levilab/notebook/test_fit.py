@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import levilab
-from levilab.notebook.fit import FIT
-from support.paths import ROOT, SAMPLE_DATA
+from support.paths import SAMPLE_DATA
 
 
 def _disc(t, start_frequency, c32):  # type: ignore[no-untyped-def]
@@ -93,9 +92,3 @@ def test_a_fit_pickles(result) -> None:  # type: ignore[no-untyped-def]
     again = pickle.loads(pickle.dumps(result.fit))
     assert again == result.fit
     assert again.best_fit == pytest.approx(result.best_fit)
-
-
-def test_the_document_has_the_table_of_names() -> None:
-    text = (ROOT / "docs/notebook.md").read_text(encoding="utf-8")
-    for name, (meaning, _) in FIT.items():
-        assert f"| `{name}` | {meaning} |" in text

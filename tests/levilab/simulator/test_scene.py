@@ -2,7 +2,6 @@
 
 import contextlib
 import math
-import re
 import tomllib
 from pathlib import Path
 
@@ -34,7 +33,6 @@ from levilab.simulator.scene import (
     with_settings,
 )
 from levilab.simulator.spin import DECAYS
-from support.paths import DOCS
 
 SCENES = Path(levilab.simulator.__file__).parent / "scenes"
 
@@ -73,16 +71,6 @@ def test_undriven_is_the_default_and_its_file_names_every_key():
     for name, value in Scene().as_table().items():
         for key in value if isinstance(value, dict) else [name]:
             assert key == "name" or f"{key} = " in text, key
-
-
-def test_the_page_of_the_simulator_has_every_key_in_its_table():
-    page = DOCS / "simulator.md"
-    rows = re.findall(r"^\| (`\w+`|none|) ?\| ([^|]*) \|", page.read_text(encoding="utf-8"), re.MULTILINE)
-    found, table = [], ""
-    for name, keys in rows:
-        table = {"none": "", "": table}.get(name, f"{name.strip('`')}.")
-        found += [table + key for key in re.findall(r"`(\w+)`", keys)]
-    assert sorted(found) == sorted(KEYS)
 
 
 def test_presets_are_the_thesiss_four_runs():
