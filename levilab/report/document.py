@@ -5,13 +5,18 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from levilab.crosscheck.own.study import OWN, quick_study
+from levilab.crosscheck.stored import read_study
+from levilab.crosscheck.table import blocks_of
 from levilab.errors import unquote
 from levilab.pipelines.sources import mark_of
 from levilab.present.document.blocks import (
     Banner,
+    Code,
     Document,
     Facts,
     Note,
+    Paragraph,
     Picture,
     Section,
     Verdict,
@@ -20,8 +25,7 @@ from levilab.present.document.blocks import (
 )
 from levilab.present.numbers import list_in_words
 from levilab.report.inputs import About, describe, in_common
-from levilab.report.reproduction import reproduction
-from levilab.report.supplements import SUPPLEMENTS
+from levilab.report.reproduction import Asked, paths_in_commands, reproduction
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -33,8 +37,6 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
     from levilab.present.document.blocks import Block
     from levilab.report.inputs import Input
-    from levilab.report.reproduction import Asked
-    from levilab.report.supplements import Supplement
 
     Results = Sequence[tuple[Analysis[Any], Any]]
 
@@ -46,33 +48,29 @@ MOST_IN_FULL = 12
 def document_of(
     results: Results,
     others: Sequence[Section] = (),
-    supplements: Sequence[Supplement] = SUPPLEMENTS,
     asked: Asked | None = None,
-    *,
-    short: bool = False,
 ) -> Document:
     """Return the report.
 
     Args:
         results: of measurements: analyses with what they found.
         others: sections of inputs that are no measurement; at least one of the two has something in it.
-        supplements: what it says of each analysis beyond its own part.
-        asked: what was asked for, where that is known.
-        short: whether it has result, figure and notes alone.
+        asked: what was asked for; None: the whole report, but no cross-check where none is stored.
     """
+    asked = asked or Asked(crosscheck=False)
     parts = [analysis.part(found) for analysis, found in results]
     alone = len(results) == 1 and not others
     sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
     banner = _document_banner(results, sources, others)
     blocks: list[Block] = []
     for (analysis, found), part in zip(results, parts, strict=True):
-        own = blocks_of_part(analysis, found, part, deeper=not alone, supplements=supplements, short=short)
+        own = blocks_of_part(analysis, found, part, asked, deeper=not alone)
         blocks += own if alone else [_of_one_analysis(found, part, own, first=not blocks)]
     blocks += others
-    if results and not short:
+    if results and not asked.short:
         blocks.append(_measurements(results, parts))
     if results:
-        blocks.append(reproduction(results, asked, short=short))
+        blocks.append(reproduction(results, asked))
     counts = count_inputs(sources)
     subjects = ", ".join([*(part.subject for part in parts), *(one.title.lower() for one in others)])
     return Document(
@@ -89,10 +87,9 @@ def blocks_of_part(
     analysis: Analysis[A],
     found: A,
     part: ReportPart,
+    asked: Asked,
     *,
     deeper: bool = False,
-    supplements: Sequence[Supplement] = SUPPLEMENTS,
-    short: bool = False,
 ) -> list[Block]:
     """Return what one analysis found: result, figure, notes, what else is known, run by run.
 
@@ -100,9 +97,8 @@ def blocks_of_part(
         analysis: the row of the catalogue.
         found: what it found.
         part: its words.
+        asked: what was asked for.
         deeper: whether sections stand below a heading of the analysis, and need no links of their own.
-        supplements: what it says beyond the part.
-        short: whether result, figure and notes are all of it.
     """
 
     def section(title: str, anchor: str, *blocks: Block) -> Section:
@@ -110,15 +106,40 @@ def blocks_of_part(
 
     groups = tuple(tuple(map(unquote, alike)) for alike in found.grouped_warnings)
     notes = [section("Notes", "notes", Warnings(groups))] if groups else []
-    more = [block for supplement in supplements for block in supplement(analysis, found)]
-    more.append(section(part.runs_title, "runs", *part.runs))
     blocks = [
         section("Result", "result", Verdict(_verdict(found, part)), *part.result),
         section("Figure", "figure", picture_of(analysis, found, part)),
         *notes,
-        *([] if short else more),
     ]
+    if not asked.short:
+        blocks += [_budget(analysis, found), *_trials(analysis, found, made=asked.crosscheck)]
+        blocks.append(section(part.runs_title, "runs", *part.runs))
     return with_marks(blocks, mark_of(found.sources))
+
+
+def _budget(analysis: Analysis[A], found: A) -> Section:
+    """Return what the uncertainties are made of."""
+    lead = "What u of each result is made of, what would make it smaller, and what it does not contain."
+    return Section("Uncertainty budget", analysis.budgets(found), anchor="budget", lead=lead)
+
+
+def _trials(analysis: Analysis[Any], found: Any, *, made: bool) -> Iterable[Section]:
+    """Yield the cross-check that `levilab crosscheck --like` made of this result.
+
+    made: where there is none, whether one is made of as many trials as a report has time for.
+    """
+    settings = analysis.settings_of(found)
+    study = read_study(found.place, analysis.name, [source.sha256 for source in found.sources], settings)
+    made = made and study is None and analysis.name in OWN
+    if made:
+        study = quick_study(analysis.name, found, settings)
+    named = " ".join(paths_in_commands(found.sources))
+    why = Paragraph("Not made: it takes longer than a report. This makes and keeps it:")
+    advice = (why, Code(f"levilab crosscheck {analysis.name} --like {named}")) if made else ()
+    blocks = blocks_of(study, analysis.symbols) if study else advice
+    if blocks:
+        lead = "Readings made up with these values, times and scatters, through the same analysis: is it right here?"
+        yield Section("Cross-check with these parameters", tuple(blocks), anchor="crosscheck", lead=lead)
 
 
 def _verdict(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
@@ -247,7 +268,7 @@ def notebook_blocks(analysis: Analysis[A], found: A) -> tuple[Block, ...]:
         if source.run and source.run.record.synthetic
     ]
     how = [Section("How it was made", tuple(made_up))] if made_up else []
-    blocks = (*([mark] if mark else []), *blocks_of_part(analysis, found, part), *how)
+    blocks = (*([mark] if mark else []), *blocks_of_part(analysis, found, part, Asked(crosscheck=False)), *how)
     return (Section(part.heading, blocks, lead=_lead(found, part)),)
 
 

@@ -22,7 +22,6 @@ from levilab.report.html.page import fragment_of, page_of
 from levilab.report.kinds import KINDS
 from levilab.report.pdf.renderer import as_pdf, check_typst
 from levilab.report.reproduction import Asked, Heading
-from levilab.report.supplements import SUPPLEMENTS, WITH_TRIALS
 from levilab.report.tables.values import folder_of, of_analysis, write_tables
 from levilab.runs.find import find_runs
 
@@ -108,10 +107,9 @@ def write_report(
     others, left = _sorted_by_kind(paths)
     sections = [section for kind, found in others for section in kind.sections(found)]
     results = _results(left, given or {}, tell, needed=not others)
-    supplements = () if short else WITH_TRIALS if crosscheck else SUPPLEMENTS
     heading = heading or Heading()
     asked = Asked(paths, form.ending, given or {}, crosscheck, short, heading)
-    document = heading.above(document_of(results, sections, supplements, asked, short=short))
+    document = heading.above(document_of(results, sections, asked))
     document = replace(document, date=newest_of(results, others))
     content = form.content(document)
     with writing_report(output):

@@ -84,13 +84,10 @@ class Asked:
         return " ".join(["levilab", "report", *words, "-o", f"report{self.ending}"])
 
 
-def reproduction(
-    results: Sequence[tuple[Analysis[Any], Any]], asked: Asked | None = None, *, short: bool = False
-) -> Block:
+def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked) -> Block:
     """Return the section at the end of a report of measurements; of a short one the command that made it."""
-    asked = asked or Asked()
     sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
-    if short:
+    if asked.short:
         return Note(f"Made by: {asked.command(sources)}")
     many = len(sources) > _MOST_NAMED
     data = (_data(sources), *_recording(sources))

@@ -174,7 +174,7 @@ def test_the_drive_is_that_of_the_run_s_own_experiment():
 
 
 def test_times_are_to_the_second_and_what_is_not_known_is_left_out(run):
-    assert "not known" not in text_of(run)
+    assert "not known" not in text_of(run).rpartition("What was measured, and with what")[2]
     started, ended = "2026-11-21T00:52:00.123456Z", "2026-11-21T00:55:10.5Z"
     text = text_of(changed(run, started_utc=started, ended_utc=ended))
     assert "2026-11-21 00:52:00 UTC to 2026-11-21 00:55:10 UTC" in text

@@ -38,7 +38,7 @@ def test_options_that_no_command_can_hold_are_named_as_they_are_typed():
     field = ANALYSES["field"]
     given = read_options({"device": SAMPLE_DATA / "device.toml", "height": 75.8, "free_radii": True}, typed=True)
     found = field.analyze([SAMPLE_DATA / "field-scan"], field.options_from(given))
-    section = reproduction([(field, found)])
+    section = reproduction([(field, found)], Asked())
     assert [block.text for block in section.blocks if isinstance(block, Note)] == [
         "Besides, these options were given: --device, --height."
     ]
@@ -53,7 +53,7 @@ def test_commands_hashes_seeds_and_what_recorded_it_are_there(tmp_path):
     (run / "run.json").write_text(json.dumps(record), encoding="utf-8")
     limit = ANALYSES["limit"]
     found = limit.analyze([run], limit.options_from({"reading_u": 0.06}))
-    section = reproduction([(limit, found)])
+    section = reproduction([(limit, found)], Asked())
     (code,) = (block for block in section.blocks if isinstance(block, Code))
     assert code.text.splitlines() == [
         f"levilab analyze limit '{run}' --reading-u 0.06",
@@ -81,7 +81,7 @@ def test_what_recorded_all_runs_alike_is_said_once(tmp_path):
     def recorded(*runs):
         found = limit.analyze(list(runs), limit.options_from({}))
         (section,) = (
-            one for one in reproduction([(limit, found)]).blocks if getattr(one, "title", "") == "Recorded by"
+            one for one in reproduction([(limit, found)], Asked()).blocks if getattr(one, "title", "") == "Recorded by"
         )
         (facts,) = section.blocks
         return [(fact.name, fact.texts) for fact in facts.facts]
