@@ -41,6 +41,14 @@ class Script:
             raise NoAnswer(self.address, message, self.timeout + patience)
         return answer
 
+    def query_block(self, message: str, *, patience: float = 0.0, form: object = None) -> bytes | str | None:
+        answer = self._next(message)
+        self.waited.append(patience)
+        if answer == SILENCE:
+            raise NoAnswer(self.address, message, self.timeout + patience)
+        assert isinstance(answer, bytes), f"{message!r} is not answered with a block"
+        return answer
+
     def clear(self) -> None:
         self._next(CLEAR)
 

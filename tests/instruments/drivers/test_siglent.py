@@ -15,13 +15,11 @@ from instruments.drivers.oscilloscope import NeverTriggered
 from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange
 from instruments.ieee488 import BlockForm, BrokenBlock, block_of
-from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.generator.siglent_sdg1000x import VirtualSDG1000X
 from instruments.virtual.oscilloscope.siglent_sds1000xe import VirtualSDS1000XE
 from support.conversation import CLEAR, conversation
 from support.scopes import pulses
+from support.talks import connected
 from support.wire import ask, errors, received, send
 
 AFTER_RESET = "C1:BSWV WVTP,SINE,FRQ,1000HZ,PERI,0.001S,AMP,4V,AMPVRMS,1.414Vrms,OFST,0V,HLEV,2V,LLEV,-2V,PHSE,0"
@@ -161,8 +159,7 @@ def test_a_generator_answers_without_headers_where_a_program_wants_none():
     send(device, b"CHDR OFF\n")
     assert ask(device, "C2:OUTP?") == "OFF,LOAD,HZ,PLRT,NOR"
     assert ask(device, "C1:BSWV?") == AFTER_RESET.removeprefix("C1:BSWV ")
-    address = "TCPIP0::generator::inst0::INSTR"
-    driver = SiglentSDG1000X(VisaTransport(address, library=library_for(VirtualBench({address: device}))))
+    driver = connected(SiglentSDG1000X, device)
     driver.off()  # it asks for headers again
     assert driver.frequency == 1000.0
 
@@ -275,10 +272,7 @@ class KeepsItsMemory(VirtualSDS1000XE):
 def test_a_scope_that_keeps_its_memory_gives_all_its_points():
     device = KeepsItsMemory(VirtualClock(), signals={1: pulses, 2: pulses})
     device.settings["depth"] = "140K"
-    address = "TCPIP0::scope::inst0::INSTR"
-    driver = SiglentSDS1000XE(
-        VisaTransport(address, library=library_for(VirtualBench({address: device}))), clock=device.clock
-    )
+    driver = connected(SiglentSDS1000XE, device, clock=device.clock)
     wanted = {"duration_s": 0.1, "points": 1000, "volts_per_division": 0.2, "offset_v": 0.65, "trigger_level_v": 0.65}
     driver.prepare(channels=(1, 2), **wanted)
     driver.acquire(timeout_s=1.0)
@@ -292,10 +286,7 @@ def test_a_scope_that_keeps_its_memory_gives_all_its_points():
 
 def test_a_trigger_that_never_comes_is_waited_for_as_long_as_a_record_and_the_time_given():
     device = scope(signal=lambda _start, _step, n: np.full(n, 0.4))
-    address = "TCPIP0::scope::inst0::INSTR"
-    driver = SiglentSDS1000XE(
-        VisaTransport(address, library=library_for(VirtualBench({address: device}))), clock=device.clock
-    )
+    driver = connected(SiglentSDS1000XE, device, clock=device.clock)
     driver.prepare(duration_s=0.1, points=1000, volts_per_division=0.2, trigger_level_v=0.65)
     before = device.clock.now()
     with pytest.raises(NeverTriggered, match=r"0\.65 V"):
@@ -305,10 +296,7 @@ def test_a_trigger_that_never_comes_is_waited_for_as_long_as_a_record_and_the_ti
 
 def test_a_record_without_a_trigger_is_forced_where_auto_is_asked_for():
     device = scope(signal=lambda _start, _step, n: np.full(n, 0.4))
-    address = "TCPIP0::scope::inst0::INSTR"
-    driver = SiglentSDS1000XE(
-        VisaTransport(address, library=library_for(VirtualBench({address: device}))), clock=device.clock
-    )
+    driver = connected(SiglentSDS1000XE, device, clock=device.clock)
     driver.prepare(duration_s=0.1, points=1000, volts_per_division=0.2, trigger_level_v=0.65, sweep="auto")
     driver.acquire(timeout_s=1.0)
     assert driver.trace(1).volts == pytest.approx(0.4, abs=0.01)

@@ -12,14 +12,12 @@ from instruments.drivers.counter.keysight_34461a import Keysight34461A
 from instruments.drivers.generator.rigol_dg1000z import RigolDG1000Z
 from instruments.drivers.oscilloscope.tektronix_tds2000 import TektronixTDS2000
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange, SettingsLost
-from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.keysight_34461a import Virtual34461A
 from instruments.virtual.generator.rigol_dg1000z import DG832, VirtualDG1000Z
 from instruments.virtual.oscilloscope.tektronix_tds2000 import VirtualTDS2000
 from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 from support.scopes import constant, pulses
+from support.talks import connected
 from support.wire import ask, errors, received, send
 
 # --- multimeters as counters ---
@@ -30,8 +28,7 @@ OLD_METER = ("*IDN?", "HEWLETT-PACKARD,34401A,0,11-5-2")
 
 def meter(signal=pulses, **model):
     device = Virtual34461A(VirtualClock(), signal=signal, **model)
-    address = "TCPIP0::meter::inst0::INSTR"
-    return device, Keysight34461A(VisaTransport(address, library=library_for(VirtualBench({address: device}))))
+    return device, connected(Keysight34461A, device)
 
 
 @pytest.mark.parametrize(("identity", "filter_"), [(METER, "FREQ:RANG:LOW 3.0"), (OLD_METER, "DET:BAND 3.0")])
@@ -145,8 +142,7 @@ def test_a_waveform_is_applied_and_asked_for_in_one_command(sent, answer):
 
 def test_a_rigol_is_prepared_as_the_drive_and_its_triangle_is_a_ramp():
     device = VirtualDG1000Z(VirtualClock())
-    address = "TCPIP0::rigol::inst0::INSTR"
-    driver = RigolDG1000Z(VisaTransport(address, library=library_for(VirtualBench({address: device}))))
+    driver = connected(RigolDG1000Z, device)
     driver.prepare(waveform="TRI", frequency_hz=30.5, amplitude_vpp=4.0, offset_v=-1.0)
     driver.output = True
     put_out = device.signal()
@@ -169,9 +165,7 @@ ASKED = {"duration_s": 0.1, "points": 1000, "volts_per_division": 0.2, "offset_v
 
 def scope(signal=pulses):
     device = VirtualTDS2000(VirtualClock(), signals={1: signal, 2: signal})
-    address = "TCPIP0::scope::inst0::INSTR"
-    link = VisaTransport(address, library=library_for(VirtualBench({address: device})))
-    return device, TektronixTDS2000(link, clock=device.clock)
+    return device, connected(TektronixTDS2000, device, clock=device.clock)
 
 
 def recorded(*messages):

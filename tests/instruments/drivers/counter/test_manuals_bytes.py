@@ -19,233 +19,189 @@ from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 from support.conversation import CLEAR, NO_ERROR, SILENCE, accepted, conversation
 from support.light import DARK, pulses
+from support.talks import Raises, connected, talk, talks
+
+ENDED = [(CLEAR, None), ("*CLS", None)]
+NONE_WRONG = ("SYST:ERR?", '0,"No error"')
 
 
 def preparation(gate, level, timeout, channel=1):
     return accepted(
-        f"CONF:FREQ (@{channel})",
-        "SENS:FREQ:GATE:SOUR TIME",
-        f"SENS:FREQ:GATE:TIME {gate}",
-        f"INP{channel}:COUP DC",
-        f"INP{channel}:IMP 1000000.0",
-        f"INP{channel}:PROB 1.0",
-        f"INP{channel}:RANG 5.0",
-        f"INP{channel}:LEV:AUTO OFF",
-        f"INP{channel}:LEV1 {level}",
-        f"INP{channel}:SLOP1 POS",
-        f"SYST:TIM {timeout}",
-        "FORM ASC,15",
+        *(
+            f"CONF:FREQ (@{channel})",
+            "SENS:FREQ:GATE:SOUR TIME",
+            f"SENS:FREQ:GATE:TIME {gate}",
+            f"INP{channel}:COUP DC",
+        ),
+        *(f"INP{channel}:IMP 1000000.0", f"INP{channel}:PROB 1.0", f"INP{channel}:RANG 5.0"),
+        *(f"INP{channel}:LEV:AUTO OFF", f"INP{channel}:LEV1 {level}", f"INP{channel}:SLOP1 POS"),
+        *(f"SYST:TIM {timeout}", "FORM ASC,15"),
     )
 
 
-def test_the_counter_is_prepared_with_direct_coupling_and_a_fixed_level():
-    with conversation(Keysight53230A, *preparation("1.0", "0.6", "3.0")) as counter:
-        counter.prepare(gate_s=1.0, trigger_level_v=0.6)
-
-
-def test_the_other_input_is_set_up_with_its_own_suffix():
-    # Programmer's Reference, INPut[{1|2}]:..., CONFigure:FREQuency (@2)
-    asked = [("INP2:LEV1?", "+6.00000000000000E-001")]
-    with conversation(Keysight53230A, *preparation("1.0", "0.6", "3.0", channel=2), *asked) as counter:
-        counter.prepare(gate_s=1.0, trigger_level_v=0.6, channel=2)
-        assert counter.trigger_level == 0.6
-
-
-@pytest.mark.parametrize("driver", [Keysight53230A, PendulumCNT91])
-def test_an_input_that_counts_no_slow_pulses_is_refused(driver):
-    with conversation(driver) as counter, pytest.raises(OutOfRange) as refused:
-        counter.prepare(gate_s=1.0, trigger_level_v=0.6, channel=3)
-    assert (refused.value.name, refused.value.value) == ("channel", 3)
-
-
-@pytest.mark.parametrize(("gate", "patience"), [(0.1, 1.2), (1.0, 3.0), (10.0, 21.0)])
-def test_the_answer_is_waited_for_beyond_the_time_at_which_the_counter_itself_gives_up(gate, patience):
-    lines = [*preparation(f"{gate}", "0.6", f"{patience}"), NO_ERROR, ("READ?", "+9.91000000000000E+037")]
-    with conversation(Keysight53230A, *lines) as counter:
-        counter.prepare(gate_s=gate, trigger_level_v=0.6)
-        counter.frequency()
-    # on top of the transport's own timeout, that is for the way
-    assert counter.transport.waited[-1] == pytest.approx(patience)
-
-
-def test_the_longest_gate_meets_the_longest_time_out():
-    with conversation(Keysight53230A, *preparation("1000.0", "0.6", "2000.0")) as counter:
-        counter.prepare(gate_s=1000.0, trigger_level_v=0.6)
-
-
-def test_a_gate_that_the_counter_does_not_have_is_refused_by_name():
-    with (
-        conversation(Keysight53230A, *accepted("CONF:FREQ (@1)", "SENS:FREQ:GATE:SOUR TIME")) as counter,
-        pytest.raises(OutOfRange) as refused,
-    ):
-        counter.prepare(gate_s=0.0, trigger_level_v=0.6)
-    assert (refused.value.name, refused.value.value) == ("gate", 0.0)
-
-
-def test_a_reading_is_a_number_in_hertz():
-    with conversation(Keysight53230A, NO_ERROR, ("READ?", "+2.345678900000000E+01")) as counter:
-        assert counter.frequency() == 23.4567890
-
-
-def test_the_counters_own_time_out_is_no_reading():
-    with conversation(Keysight53230A, NO_ERROR, ("READ?", "+9.91000000000000E+037")) as counter:
-        assert counter.frequency() is None
-
-
-def test_a_counter_that_waits_for_ever_is_cleared_and_aborted_and_gives_no_reading():
-    lines = [NO_ERROR, ("READ?", SILENCE), (CLEAR, None), ("*CLS", None), ("ABOR", None), NO_ERROR]
-    with conversation(Keysight53230A, *lines) as counter:
-        assert counter.frequency() is None
-
-
-def test_a_link_that_is_dead_is_not_taken_for_a_missing_signal():
-    lines = [NO_ERROR, ("READ?", SILENCE), (CLEAR, None), ("*CLS", None), ("ABOR", None), ("SYST:ERR?", SILENCE)]
-    with conversation(Keysight53230A, *lines) as counter, pytest.raises(NoAnswer) as silence:
-        counter.frequency()
-    assert silence.value.question == "READ?"
-
-
-@pytest.mark.parametrize("garbage", ["", "DC", "+2.3E+01,+2.4E+01", '-230,"Data corrupt or stale"'])
-def test_garbage_is_no_reading_but_an_error(garbage):
-    lines = [NO_ERROR, ("READ?", garbage), (CLEAR, None)]  # it may have been the answer to something else
-    with conversation(Keysight53230A, *lines) as counter, pytest.raises(BadAnswer) as bad:
-        counter.frequency()
-    assert (bad.value.question, bad.value.answer) == ("READ?", garbage)
-
-
-def test_an_error_that_waits_is_raised_before_a_number_is_believed():
-    waiting = [("SYST:ERR?", '-222,"Data out of range"'), NO_ERROR]
-    with conversation(Keysight53230A, *waiting) as counter, pytest.raises(CommandRefused, match=r"READ\?.*-222"):
-        counter.frequency()
-
-
-# --- series of readings ---
-
-
-def test_a_series_is_fetched_as_it_comes_and_the_counter_is_left_as_it_was():
-    lines = [
-        *accepted("SAMP:COUN 1002", "INIT"),
-        NO_ERROR,
-        ("DATA:REM? 1000,WAIT", ",".join(["+2.50000000000000E+001"] * 1000)),
-        NO_ERROR,
-        ("DATA:REM? 2,WAIT", "+2.60000000000000E+001,+9.91000000000000E+037"),
-        *accepted("SAMP:COUN 1"),
-    ]
-    with conversation(Keysight53230A, *lines) as counter:
-        found = counter.readings(1002)
-    np.testing.assert_array_equal(found, [25.0] * 1000 + [26.0, np.nan])
-    assert counter.transport.waited[-2:] == [6.0, 0.0]  # two readings, then the queue
-
-
-def test_a_series_that_stops_is_filled_up_with_missing_readings():
-    lines = [
-        *accepted("SAMP:COUN 3", "INIT"),
-        NO_ERROR,
-        ("DATA:REM? 3,WAIT", SILENCE),
-        (CLEAR, None),
-        ("*CLS", None),
-        *accepted("ABOR", "SAMP:COUN 1"),
-    ]
-    with conversation(Keysight53230A, *lines) as counter:
-        assert np.isnan(counter.readings(3)).tolist() == [True] * 3
-
-
-def test_a_series_of_the_wrong_length_is_none():
-    lines = [
-        *accepted("SAMP:COUN 3", "INIT"),
-        NO_ERROR,
-        ("DATA:REM? 3,WAIT", "+2.5E+01,+2.5E+01"),
-        (CLEAR, None),
-        ("*CLS", None),
-        *accepted("ABOR", "SAMP:COUN 1"),
-    ]
-    with conversation(Keysight53230A, *lines) as counter, pytest.raises(BadAnswer) as bad:
-        counter.readings(3)
-    assert bad.value.answer == "+2.5E+01,+2.5E+01"
-
-
-@pytest.mark.parametrize("driver", [Keysight53230A, PendulumCNT91])
-@pytest.mark.parametrize("count", [0, -1, 1_000_001])
-def test_a_series_longer_than_the_memory_is_refused(driver, count):
-    with conversation(driver) as counter, pytest.raises(OutOfRange, match="count"):
-        counter.readings(count)
-
-
-# --- CNT-91 ---
-
-NONE_WRONG = ("SYST:ERR?", '0,"No error"')
-
-
-@pytest.mark.parametrize("channel", [1, 2])
-def test_the_cnt91_is_prepared_with_direct_coupling_a_fixed_level_and_a_time_out(channel):
-    lines = accepted(
-        f"CONF:FREQ (@{channel})",
-        "INIT:CONT OFF",
-        "CALC:AVER:STAT OFF",
-        "FORM ASC",
-        "FORM:TINF OFF",
-        "ACQ:APER 10.0",
-        f"INP{channel}:COUP DC",
-        f"INP{channel}:IMP 1000000.0",
-        f"INP{channel}:ATT 1.0",
-        f"INP{channel}:FILT OFF",
-        f"INP{channel}:LEV:AUTO OFF",
-        f"INP{channel}:LEV 0.6",
-        f"INP{channel}:SLOP POS",
-        "ARM:SOUR IMM",
-        "TRIG:COUN 1",
-        "ARM:COUN 1",
-        "SYST:TOUT:TIME 21.0",
-        "SYST:TOUT ON",
+def preparation_of_cnt91(channel):
+    return accepted(
+        *(f"CONF:FREQ (@{channel})", "INIT:CONT OFF", "CALC:AVER:STAT OFF", "FORM ASC", "FORM:TINF OFF"),
+        *("ACQ:APER 10.0", f"INP{channel}:COUP DC", f"INP{channel}:IMP 1000000.0", f"INP{channel}:ATT 1.0"),
+        *(f"INP{channel}:FILT OFF", f"INP{channel}:LEV:AUTO OFF", f"INP{channel}:LEV 0.6", f"INP{channel}:SLOP POS"),
+        *("ARM:SOUR IMM", "TRIG:COUN 1", "ARM:COUN 1", "SYST:TOUT:TIME 21.0", "SYST:TOUT ON"),
     )
-    with conversation(PendulumCNT91, *lines, NONE_WRONG, ("READ?", "+2.5000000000000E+01")) as counter:
-        counter.prepare(gate_s=10.0, trigger_level_v=0.6, channel=channel)
-        assert counter.frequency() == 25.0
-    assert counter.transport.waited[-1] == 21.0
 
 
-@pytest.mark.parametrize("nothing", ["+9.9100000000000E+37", ""])
-def test_the_cnt91_has_two_ways_to_say_that_there_was_nothing(nothing):
-    # compatible and native mode: handbook, 8-36
-    with conversation(PendulumCNT91, NONE_WRONG, ("READ?", nothing)) as counter:
-        assert counter.frequency() is None
+def prepare(counter, gate_s=1.0, **options):
+    counter.prepare(gate_s=gate_s, trigger_level_v=0.6, **options)
 
 
-def test_the_cnt91_gives_time_stamps_beside_the_readings():
-    lines = [
-        *accepted("FORM:TINF ON", "ARM:COUN 2", "INIT"),
-        NONE_WRONG,
-        ("*OPC?", "1"),
-        NONE_WRONG,
-        ("FETC:ARR? 2", "+2.5E+01,+7.0E+02,+9.91E+37,+7.1E+02"),
-        *accepted("ARM:COUN 1", "FORM:TINF OFF"),
-    ]
-    with conversation(PendulumCNT91, *lines) as counter:
-        np.testing.assert_array_equal(counter.timed_readings(2), [[25.0, 700.0], [np.nan, 710.0]])
+def frequency(counter):
+    return counter.frequency()
 
 
-def test_time_stamps_of_more_readings_than_an_answer_holds_come_in_parts():
-    lines = [
-        *accepted("FORM:TINF ON", "ARM:COUN 1002", "INIT"),
-        NONE_WRONG,
-        ("*OPC?", "1"),
-        NONE_WRONG,
-        ("FETC:ARR? 1000", ",".join(["+2.5E+01,+7.0E+02"] * 1000)),
-        NONE_WRONG,
-        ("FETC:ARR? 2", "+2.6E+01,+7.1E+02,+2.7E+01,+7.2E+02"),
-        *accepted("ARM:COUN 1", "FORM:TINF OFF"),
-    ]
-    with conversation(PendulumCNT91, *lines) as counter:
-        found = counter.timed_readings(1002)
-    np.testing.assert_array_equal(found[-3:], [[25.0, 700.0], [26.0, 710.0], [27.0, 720.0]])
+def reading(answer, no_error=NO_ERROR):
+    return [no_error, ("READ?", answer)]
 
 
-@pytest.mark.parametrize(
-    "identity", ["PENDULUM, CNT-91, 123456, V1.28 7 Jan 2012", "TEKTRONIX,FCA3000,579249,V1.32 26 May 2022 09:54"]
-)
-def test_the_cnt91_is_known_under_the_names_of_both_makers(identity):
-    with conversation(PendulumCNT91, ("*IDN?", identity)) as counter:
-        assert counter.identity() == identity
+def patience(gate_s, channel=1):
+    """How long the answer is waited for, on top of the transport's own timeout, that is for the way."""
+
+    def act(counter):
+        prepare(counter, gate_s, channel=channel)
+        return counter.frequency(), counter.transport.waited[-1]
+
+    return act
+
+
+def series(count):
+    """A series of readings, its numbers or nan."""
+    return lambda counter: counter.readings(count).tolist()
+
+
+def stamped(count):
+    return lambda counter: counter.timed_readings(count)[-3:].ravel().tolist()
+
+
+def numbers(*wanted):
+    return pytest.approx(list(wanted), rel=0, abs=0, nan_ok=True)
+
+
+BEGUN, OVER = accepted("SAMP:COUN 3", "INIT"), accepted("ABOR", "SAMP:COUN 1")
+READINGS = {
+    "direct coupling and a fixed level": (Keysight53230A, preparation("1.0", "0.6", "3.0"), prepare, None),
+    "the other input is set up with its own suffix": (  # INPut[{1|2}]:..., CONFigure:FREQuency (@2)
+        *(Keysight53230A, [*preparation("1.0", "0.6", "3.0", 2), ("INP2:LEV1?", "+6.00000000000000E-001")]),
+        *(lambda it: prepare(it, channel=2) or it.trigger_level, 0.6),
+    ),
+    **{
+        f"the answer is waited for beyond the time at which the counter itself gives up, {gate} s": (
+            Keysight53230A,
+            [*preparation(f"{gate}", "0.6", f"{waited}"), *reading("+9.91000000000000E+037")],
+            *(patience(gate), (None, pytest.approx(waited))),
+        )
+        for gate, waited in ((0.1, 1.2), (1.0, 3.0), (10.0, 21.0))
+    },
+    "the longest gate meets the longest time-out": (
+        *(Keysight53230A, preparation("1000.0", "0.6", "2000.0"), lambda it: prepare(it, 1000.0), None),
+    ),
+    "a gate that the counter does not have is refused by name": (
+        *(Keysight53230A, accepted("CONF:FREQ (@1)", "SENS:FREQ:GATE:SOUR TIME"), lambda it: prepare(it, 0.0)),
+        Raises(OutOfRange, has={"name": "gate", "value": 0.0}),
+    ),
+    "a reading is a number in hertz": (Keysight53230A, reading("+2.345678900000000E+01"), frequency, 23.456789),
+    "the counter's own time-out is no reading": (Keysight53230A, reading("+9.91000000000000E+037"), frequency, None),
+    "a counter that waits for ever is cleared and aborted and gives no reading": (
+        *(Keysight53230A, [*reading(SILENCE), *ENDED, *accepted("ABOR")], frequency, None),
+    ),
+    "a link that is dead is not taken for a missing signal": (
+        *(Keysight53230A, [*reading(SILENCE), *ENDED, ("ABOR", None), ("SYST:ERR?", SILENCE)], frequency),
+        Raises(NoAnswer, has={"question": "READ?"}),
+    ),
+    **{
+        f"{garbage!r} is no reading but an error": (  # it may have been the answer to something else
+            *(Keysight53230A, [*reading(garbage), (CLEAR, None)], frequency),
+            Raises(BadAnswer, has={"question": "READ?", "answer": garbage}),
+        )
+        for garbage in ("", "DC", "+2.3E+01,+2.4E+01", '-230,"Data corrupt or stale"')
+    },
+    "an error that waits is raised before a number is believed": (
+        *(Keysight53230A, [("SYST:ERR?", '-222,"Data out of range"'), NO_ERROR], frequency),
+        Raises(CommandRefused, r"READ\?.*-222"),
+    ),
+    "a series is fetched as it comes, and the counter is left as it was": (
+        Keysight53230A,
+        [
+            *(*accepted("SAMP:COUN 1002", "INIT"), NO_ERROR),
+            *(("DATA:REM? 1000,WAIT", ",".join(["+2.50000000000000E+001"] * 1000)), NO_ERROR),
+            *(("DATA:REM? 2,WAIT", "+2.60000000000000E+001,+9.91000000000000E+037"), *accepted("SAMP:COUN 1")),
+        ],
+        lambda it: [*it.readings(1002), *it.transport.waited[-2:]],  # two readings, then the queue
+        numbers(*[25.0] * 1000, 26.0, np.nan, 6.0, 0.0),
+    ),
+    "a series that stops is filled up with missing readings": (
+        *(Keysight53230A, [*BEGUN, NO_ERROR, ("DATA:REM? 3,WAIT", SILENCE), *ENDED, *OVER], series(3)),
+        numbers(np.nan, np.nan, np.nan),
+    ),
+    "a series of the wrong length is none": (
+        *(Keysight53230A, [*BEGUN, NO_ERROR, ("DATA:REM? 3,WAIT", "+2.5E+01,+2.5E+01"), *ENDED, *OVER], series(3)),
+        Raises(BadAnswer, has={"answer": "+2.5E+01,+2.5E+01"}),
+    ),
+    **{
+        f"the CNT-91 has direct coupling, a fixed level and a time-out, input {channel}": (
+            *(PendulumCNT91, [*preparation_of_cnt91(channel), *reading("+2.5000000000000E+01", NONE_WRONG)]),
+            *(patience(10.0, channel), (25.0, 21.0)),
+        )
+        for channel in (1, 2)
+    },
+    **{
+        f"the CNT-91 says {nothing!r} when there was nothing": (  # compatible and native mode: handbook, 8-36
+            *(PendulumCNT91, reading(nothing, NONE_WRONG), frequency, None),
+        )
+        for nothing in ("+9.9100000000000E+37", "")
+    },
+    "the CNT-91 gives time stamps beside the readings": (
+        PendulumCNT91,
+        [
+            *(*accepted("FORM:TINF ON", "ARM:COUN 2", "INIT"), NONE_WRONG, ("*OPC?", "1"), NONE_WRONG),
+            ("FETC:ARR? 2", "+2.5E+01,+7.0E+02,+9.91E+37,+7.1E+02"),
+            *accepted("ARM:COUN 1", "FORM:TINF OFF"),
+        ],
+        *(stamped(2), numbers(25.0, 700.0, np.nan, 710.0)),
+    ),
+    "time stamps of more readings than an answer holds come in parts": (
+        PendulumCNT91,
+        [
+            *(*accepted("FORM:TINF ON", "ARM:COUN 1002", "INIT"), NONE_WRONG, ("*OPC?", "1"), NONE_WRONG),
+            *(("FETC:ARR? 1000", ",".join(["+2.5E+01,+7.0E+02"] * 1000)), NONE_WRONG),
+            ("FETC:ARR? 2", "+2.6E+01,+7.1E+02,+2.7E+01,+7.2E+02"),
+            *accepted("ARM:COUN 1", "FORM:TINF OFF"),
+        ],
+        *(stamped(1002), numbers(25.0, 700.0, 26.0, 710.0, 27.0, 720.0)),
+    ),
+    **{
+        f"the CNT-91 is known as {identity.partition(',')[0]}": (
+            *(PendulumCNT91, [("*IDN?", identity)], lambda it: it.identity(), identity),
+        )
+        for identity in (
+            *("PENDULUM, CNT-91, 123456, V1.28 7 Jan 2012", "TEKTRONIX,FCA3000,579249,V1.32 26 May 2022 09:54"),
+        )
+    },
+    **{
+        f"an input of the {driver.__name__} that counts no slow pulses is refused": (
+            *(driver, [], lambda it: prepare(it, channel=3), Raises(OutOfRange, has={"name": "channel", "value": 3})),
+        )
+        for driver in (Keysight53230A, PendulumCNT91)
+    },
+    **{
+        f"a series of {count} is not in the memory of the {driver.__name__}": (
+            *(driver, [], series(count), Raises(OutOfRange, "count")),
+        )
+        for driver in (Keysight53230A, PendulumCNT91)
+        for count in (0, -1, 1_000_001)
+    },
+}
+
+
+@talks(READINGS)
+def test_a_counter_is_talked_to_as_its_manual_says(driver, lines, act, end):
+    talk(driver, lines, act, end)
 
 
 # --- the drivers on the virtual instruments ---
@@ -392,10 +348,7 @@ def test_a_series_whose_end_could_not_be_sent_is_ended_before_the_next_reading()
 
 
 def test_time_stamps_are_the_gates_openings():
-    clock = VirtualClock()
-    counter = PendulumCNT91(
-        VisaTransport(ADDRESS, library=library_for(VirtualBench({ADDRESS: VirtualCNT91(clock, signal=light)})))
-    )
+    counter = connected(PendulumCNT91, VirtualCNT91(VirtualClock(), signal=light))
     counter.prepare(gate_s=0.09, trigger_level_v=0.6)
     values, times = counter.timed_readings(5).T
     np.testing.assert_allclose(values, 25.0, rtol=1e-4)

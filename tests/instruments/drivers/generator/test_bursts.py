@@ -15,15 +15,13 @@ from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.drivers.generator.rigol_dg1000z import RigolDG1000Z
 from instruments.drivers.generator.siglent_sdg1000x import SiglentSDG1000X
 from instruments.errors import CommandRefused, OutOfRange
-from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.generator.agilent_33220a import Virtual33220A
 from instruments.virtual.generator.channel import Triggered
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from instruments.virtual.generator.rigol_dg1000z import VirtualDG1000Z
 from instruments.virtual.generator.siglent_sdg1000x import VirtualSDG1000X
 from support.conversation import accepted, conversation
+from support.talks import connected
 from support.wire import ask, errors, send
 
 ASKED = {"waveform": "SIN", "frequency_hz": 33.0, "amplitude_vpp": 10.0, "phase_deg": 180.0}
@@ -98,8 +96,7 @@ PAIRS = [
 @pytest.mark.parametrize(("driver", "twin", "latency"), PAIRS)
 def test_every_model_waits_for_the_edges_that_its_driver_names(driver, twin, latency):
     device = twin(VirtualClock())
-    address = "TCPIP0::generator.levilab::inst0::INSTR"
-    generator = driver(VisaTransport(address, library=library_for(VirtualBench({address: device}))))
+    generator = connected(driver, device)
     generator.identity()
     generator.forget_errors()
     generator.prepare_triggered(**ASKED, cycles=2, rising=False, delay_s=1e-3)

@@ -5,11 +5,9 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
-from instruments.links.visa import VisaTransport
-from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
+from support.talks import connected
 
 DRIVERS = [(LakeShore425, Virtual425, "425"), (LakeShore475, Virtual475, "475"), (LakeShore475, Virtual475, "455")]
 
@@ -19,9 +17,7 @@ def test_the_drivers_measure_zero_and_notice_an_overload(driver, kind, model):
     field = [0.0]
     options = {} if kind is Virtual425 else {"identity": f"LSCI,MODEL{model},VIRTUAL,01012020"}
     device = kind(VirtualClock(), flux_density=lambda _: field[0], zero_error=5e-6, **options)
-    # GPIB has no line settings to get wrong
-    address = "GPIB0::12::INSTR"
-    magnetometer = driver(VisaTransport(address, library=library_for(VirtualBench({address: device}))))
+    magnetometer = connected(driver, device, "GPIB0::12::INSTR")  # it has no line settings to get wrong
     assert f"MODEL{model}" in magnetometer.identity()
     magnetometer.forget_errors()
     magnetometer.prepare(range_t=None)
