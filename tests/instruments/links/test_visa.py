@@ -11,26 +11,13 @@ from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import LevilabVisaLibrary, library_for
-from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.rows import Ask
+from support.slow import IDENTITY, Slow
 
 ADDRESS = "TCPIP0::slow.levilab::inst0::INSTR"
 SOCKET = "TCPIP0::slow.levilab::5025::SOCKET"
-IDENTITY = "levilab,slow,0,0"
 
 _unique = itertools.count()
-
-
-class Slow(VirtualInstrument):
-    """Answers ``SLOW?`` after five seconds, and ``BINary?`` with what is no text."""
-
-    identity = IDENTITY
-
-    ROWS = (Ask("SLOW", lambda d: d._slow()), Ask("BINary", lambda _d: "\xff\xfe"))
-
-    def _slow(self):
-        self.busy_until(self.clock.now() + 5.0)
-        return "slow"
 
 
 @pytest.fixture
@@ -52,61 +39,6 @@ def library_with(bench, **methods):
 
 def test_a_question_is_answered_without_its_line_end(bench):
     assert VisaTransport(ADDRESS, library=library_for(bench)).query("*IDN?") == IDENTITY
-
-
-def test_silence_raises_with_its_question_and_costs_virtual_time_only(bench, clock):
-    transport = VisaTransport(ADDRESS, library=library_for(bench), timeout=3600.0)
-    with pytest.raises(NoAnswer) as silence:
-        transport.query("FOO?")
-    assert (silence.value.question, silence.value.timeout) == ("FOO?", 3600.0)
-    # an hour, to a nanosecond, in a test that takes none
-    assert clock.now() == pytest.approx(3600.0, abs=1e-9)
-
-
-def test_an_answer_that_takes_its_time_needs_patience(bench, clock):
-    transport = VisaTransport(ADDRESS, library=library_for(bench), timeout=2.0)
-    assert transport.query("SLOW?", patience=4.0) == "slow"
-    assert clock.now() == pytest.approx(5.0, abs=1e-9)  # not the six seconds that it might have taken
-    with pytest.raises(NoAnswer) as silence:
-        transport.query("SLOW?", patience=2.5)
-    assert silence.value.timeout == 4.5
-
-
-def test_patience_is_for_one_answer_only(bench):
-    transport = VisaTransport(ADDRESS, library=library_for(bench), timeout=2.0)
-    transport.query("SLOW?", patience=4.0)
-    with pytest.raises(NoAnswer):
-        transport.query("SLOW?")
-
-
-def test_a_late_answer_never_reaches_the_next_question(bench, clock):
-    transport = VisaTransport(ADDRESS, library=library_for(bench), timeout=2.0)
-    with pytest.raises(NoAnswer):
-        transport.query("SLOW?")
-    clock.sleep(10.0)
-    assert transport.query("*IDN?") == IDENTITY
-
-
-def test_an_interrupted_wait_leaves_no_answer_for_the_next_question(bench, clock, monkeypatch):
-    transport = VisaTransport(ADDRESS, library=library_for(bench), timeout=2.0)
-
-    def interrupted(duration):
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(clock, "sleep", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            transport.query("SLOW?")
-    clock.sleep(10.0)
-    assert transport.query("*IDN?") == IDENTITY
-
-
-def test_an_answer_that_is_no_text_raises_and_is_forgotten(bench):
-    transport = VisaTransport(ADDRESS, library=library_for(bench))
-    with pytest.raises(BadAnswer, match="expected plain text") as bad:
-        transport.query("BIN?")
-    assert bad.value.question == "BIN?"
-    assert transport.query("*IDN?") == IDENTITY
 
 
 @pytest.mark.parametrize("address", ["TCPIP0::absent.levilab::inst0::INSTR", "no resource name at all", ""])
@@ -165,16 +97,6 @@ def test_the_log_gets_the_bytes_of_both_directions(bench):
         (ADDRESS, "<", IDENTITY.encode() + b"\n"),
         (ADDRESS, ">", b"FOO?\n"),
     ]
-
-
-@pytest.mark.parametrize("address", [ADDRESS, SOCKET])
-@pytest.mark.parametrize("act", ["query", "write", "query_block", "clear", "reopen", "lock"])
-def test_a_closed_link_says_that_it_was_closed_whatever_it_is_used_for(bench, address, act):
-    transport = VisaTransport(address, library=library_for(bench))
-    transport.close()
-    transport.close()
-    with pytest.raises(NotConnected, match="this session was closed: open another one"):
-        getattr(transport, act)(*(["*IDN?"] if act in {"query", "write", "query_block"} else []))
 
 
 # --- how long things may take ---
