@@ -43,6 +43,8 @@ _ABORT = re.compile(r"[\x00-\x20]*:?ABORT?[\x00-\x20]*", re.IGNORECASE)
 # blanks match in one place only: \s* before a set that has them, too, takes a time that grows with their square
 _CHANNELS = re.compile(r"\(@([\d,\s]+)\)")
 _BRACKETED = re.compile(r"\(([^@()]*)\)")
+#: Characters of a channel list, for two or three channels; megabytes of it would keep all other clients waiting.
+_LONGEST_LIST = 1000
 
 
 def channels_of(parameters: list[str], numbered: Sequence[int]) -> tuple[int, ...]:
@@ -53,14 +55,16 @@ def channels_of(parameters: list[str], numbered: Sequence[int]) -> tuple[int, ..
         numbered: the channels of the counter.
 
     Raises:
-        ScpiError: the counter does not have one of them.
+        ScpiError: the counter does not have one of them, or a list is longer than it can be.
 
     >>> channels_of(["10", "(@2)", "(@1)"], (1, 2))
     (2, 1)
     """
     lists = [found for text in parameters if (found := _CHANNELS.fullmatch(text))]
-    named = [word.strip().lstrip("0") for found in lists for word in found[1].split(",") if word.strip()]
-    if any(word not in map(str, numbered) for word in named):  # compared as text: a number may have any length
+    too_long = any(len(found[1]) > _LONGEST_LIST for found in lists)
+    listed = () if too_long else lists
+    named = [word.strip().lstrip("0") for found in listed for word in found[1].split(",") if word.strip()]
+    if too_long or any(word not in map(str, numbered) for word in named):  # as text: a number may have any length
         raise ScpiError(-224, "channel")
     return tuple(map(int, named))
 

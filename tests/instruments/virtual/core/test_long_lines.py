@@ -74,6 +74,12 @@ def test_a_long_line_is_cut_apart(text):
     assert sum(1 for unit in split_units(text) if unit) <= MANY
 
 
+def test_a_long_list_of_channels_is_none_and_is_not_read():
+    counter = Virtual53230A(VirtualClock(), signal=no_light)
+    send(counter, b"CONF:FREQ (@" + b"1," * MANY + b"1)\n")
+    assert errors(counter) == [-224]
+
+
 def test_a_mantissa_has_no_more_digits_than_the_standard_allows():
     digits = "1" * MOST_DIGITS
     assert number(digits, low=0, high=1e300, default=0) == pytest.approx(float(digits))
