@@ -73,7 +73,7 @@ def test_a_late_answer_never_reaches_the_next_question(link, clock, late, later)
     assert [link.query(question) for question in ("LIST?", "*IDN?", "LIST?")] == ["1,2,1,1,1", IDENTITY, "1,2,1,1,1"]
 
 
-def test_an_answer_that_nobody_asked_for_is_dropped_before_the_next_question(link, clock):
+def test_an_answer_without_a_question_is_dropped_before_the_next_question(link, clock):
     link.write("LIST?")
     link.clear()
     clock.sleep(1.0)
