@@ -446,22 +446,24 @@ def warnings_of(statistics: Statistics) -> list[str]:
 def _sentences(limits: Limits) -> Iterable[str]:
     found = limits.statistics
     name = limits.conditions.name(found.n)
-    falls = "The top fell at one" if limits.which == "lower" else "The drive lost the top at one"
-    one = "One" if limits.conditions.levels_off else falls
-    many = f"{found.n} {name} have the mean" if found.n > 1 else f"{one} {name},"
-    scatter = f" and scatter by {with_uncertainty(found.scatter)}" if found.scatter and found.scatter.value else ""
-    scatter = scatter or " and do not scatter" * (found.scatter is not None)
-    yield f"{many} {with_uncertainty(found.mean)}{scatter} ({limits.conditions_text})."
+    if found.n == 1:
+        lost = "The top fell" if limits.which == "lower" else "The drive lost the top"
+        lost = "The top went no faster" if limits.conditions.levels_off else lost
+        yield f"{lost} at {with_uncertainty(found.mean)}: one {name} ({limits.conditions_text})."
+    else:
+        scatter = f" and scatter by {with_uncertainty(found.scatter)}" if found.scatter and found.scatter.value else ""
+        scatter = scatter or " and do not scatter" * (found.scatter is not None)
+        yield f"{found.n} {name} have the mean {with_uncertainty(found.mean)}{scatter} ({limits.conditions_text})."
     if found.between:
         beyond = with_uncertainty(found.between) if found.between.value else "no more than their tops do"
         yield f"They are of {found.runs} runs, which differ by {beyond}."
-    if limits.ends:
+    if limits.ends and found.n > 1:
         yield "The top " + ", ".join(f"{ENDS[kind]} {_times(n)}" for kind, n in limits.ends.items()) + "."
     if limits.conditions.levels_off:
         yield "The pull of the drive equals the drag there: a stronger drive gets higher, this is no limit of the top."
         return
     if limits.causes:
-        told = ", ".join(f"{cause} {_times(n)}" for cause, n in sorted(limits.causes.items()))
+        told = ", ".join(f"{cause} {_times(n)}" if found.n > 1 else cause for cause, n in sorted(limits.causes.items()))
         yield f"{'Causes' if limits.conditions.triggered else 'The phase before each loss tells why'}: {told}."
     yield from map(_compare, limits.theory)
 

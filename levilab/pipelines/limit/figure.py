@@ -111,7 +111,7 @@ def _draw_limits(axes: Axes, height: float, analysis: LimitAnalysis, group: Limi
         _draw_theory(axes, one.name, one.expected)
     _shade_beyond_window(axes, group)
     axes.set_xlim(0.4, len(every) + 0.6)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
     axes.ticklabel_format(axis="y", useOffset=False)
     axes.set(xlabel="top, one after another", ylabel="spin frequency ν  [Hz]")
     title = ("Lower limit: the spin at which a free top falls", _upper_title(group))[group.which == "upper"]
