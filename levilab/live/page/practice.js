@@ -189,7 +189,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     write("offer-text", reached ? `✓ ${phrase(tasks[reached].title)}: ${phrase(tasks[reached].teaches)}` : phrase("These were the first steps. Now a task:"));
     put(by("next-task"), {hidden: !next, value: next?.name ?? "", textContent: next ? phrase(next.title) : ""});
     put(by("task-share"), {value: bench.task_share});
-    write("tasks-done", bench.tasks_done.length ? phrase("{done} of {all} done", {done: bench.tasks_done.length, all: about.tasks.length}) : "");
+    write("tasks-done", bench.tasks_done.length ? `${bench.tasks_done.length}/${about.tasks.length}` : "");
     for (const [name, {item}] of Object.entries(tasks)) put(item, {className: bench.tasks_done.includes(name) ? "done" : ""});
     if (bench.task === shownTask) return;
     shownTask = bench.task;
@@ -267,7 +267,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
   function guide(bench, run_now, readings) {
     const name = run(), recorded = Boolean(run_now) && run_now.status !== "running" && readings > 0 && isOwn(name);  // by this bench
     const done = {
-      drive: bench.took_hold, tune: bench.tuned_up, record: recorded, analyze: recorded && now.analyzed === name, report: recorded && now.read === name,
+      drive: bench.took_hold, tune: bench.tuned_up || now.busy, record: recorded, analyze: recorded && now.analyzed === name, report: recorded && now.read === name,
     };
     const items = [...by("guide").children], last = items.map((item) => Boolean(done[item.dataset.step])).lastIndexOf(true);
     items.forEach((item, k) => {  // a run drives the top itself: it has done the steps before it

@@ -1,7 +1,7 @@
 // What an analysis says, always in one order: its sentences, figures, notes, and the link to the report.
 
 import {GONE, read} from "./connection.js";
-import {LANGUAGE, by, make, phrase, put, write} from "./words.js";
+import {LANGUAGE, by, make, phrase, put, typeset, write} from "./words.js";
 
 /** What is under way, by the step that the server names; "" once all is there. */
 const STEPS = {analyze: phrase("Analyzing…"), report: phrase("The report is being written…"), "": ""};
@@ -17,7 +17,11 @@ const STEPS = {analyze: phrase("Analyzing…"), report: phrase("The report is be
  */
 export async function showResult(begin, at, wanted, analyzed) {
   const clear = (texts, step) => {
-    by("verdict").replaceChildren(...texts.map((text) => make("p", text)));
+    by("verdict").replaceChildren(...texts.map((text) => {
+      const paragraph = make("p");
+      typeset(paragraph, text);
+      return paragraph;
+    }));
     for (const id of ["figures", "results-notes"]) by(id).replaceChildren();
     put(by("report"), {hidden: true});
     say(step);

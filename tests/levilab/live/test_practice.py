@@ -300,7 +300,7 @@ def test_a_task_opens_the_control_that_it_needs_and_leads_to_the_next(starting: 
     assert page.inner_text("#offer-text").startswith("✓ Find the mass that floats: of 25 g only some tenths are free")
     assert page.inner_text("#next-task") == "Hold it for three minutes"
     assert page.locator("#guide").is_visible()  # its steps are not done
-    assert page.inner_text("#tasks-done") == "2 of 5 done"
+    assert page.inner_text("#tasks-done") == "2/5"
 
 
 #: Whether the panel of each tab is seen whole, without a scroll of the page or of its part.
