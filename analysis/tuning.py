@@ -83,6 +83,7 @@ class Prior:
         temperature: to which these belong [°C].
         width: median of the window's width, relative to its middle.
         width_log_u: standard deviation of the logarithm of the width.
+        widest: that of small motions, relative: no hand floats more.
         per_k, per_k_u: relative change of the masses per kelvin, and its standard uncertainty.
     """
 
@@ -92,6 +93,7 @@ class Prior:
     temperature: float = 20.0
     width: float = SHARE * THEORY_WIDTH
     width_log_u: float = SHARE_LOG_U
+    widest: float = THEORY_WIDTH
     per_k: float = 2 * MAGNET_PER_K
     per_k_u: float = math.sqrt(2) * MAGNET_PER_K_U
 
@@ -101,8 +103,8 @@ class Prior:
         value, theory = middle.value or 0.0, heaviest - lightest
         u = math.hypot(middle.u or 0.0, OFF_MIDDLE * theory)
         reach = _REACH * u
-        width = SHARE * theory / value
-        return cls(value - reach, value + reach, Estimate(value, u, "kg"), temperature, width)
+        widest = theory / value
+        return cls(value - reach, value + reach, Estimate(value, u, "kg"), temperature, SHARE * widest, widest=widest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,8 +199,7 @@ def learn(trials: Sequence[Trial], prior: Prior) -> Posterior:
     shift = math.exp(prior.per_k * (reference - prior.temperature))
     ends = [
         (prior.low * shift - reach, prior.high * shift + reach),
-        # wider than half of the mass is no window
-        (log_width - log_u, min(log_width + log_u, math.log(0.5))),
+        (log_width - log_u, min(log_width + log_u, math.log(prior.widest))),
         (prior.per_k - _REACH * prior.per_k_u, prior.per_k + _REACH * prior.per_k_u),
     ]
     for left in reversed(range(_ROUNDS)):

@@ -134,7 +134,7 @@ class Owner:
         self.rng = np.random.default_rng(seed)
         self.top, self.span = 24.4 * G, 1.2 * G
         self.middle = self.top + self.rng.uniform(0.2, 1.0) * self.span
-        self.width = math.exp(self.rng.normal(math.log(0.012), 0.7))
+        self.width = min(math.exp(self.rng.normal(math.log(0.012), 0.7)), tuning.THEORY_WIDTH)
         self.per_k = self.rng.normal(-0.0036, 0.0009)
 
     def middle_at(self, temperature):
