@@ -17,8 +17,8 @@ from analysis.locked import Slip, slip_of
 from instruments.errors import InstrumentError, OutOfRange
 from levilab.acquisition.counting import prepare_counter_again, spin_now
 from levilab.acquisition.experiment import CounterSettings
-from levilab.acquisition.failures import DidNotFollow, NoLight, NotHeld
 from levilab.acquisition.grip import COUNTS, GRIP_GATE_S, Grip
+from levilab.acquisition.session import DidNotFollow, NoLight, NotHeld
 from levilab.acquisition.triggering import CYCLE, Motor, spin_up
 from levilab.bench.config import ConfigError
 from levilab.bench.person import FloatTop

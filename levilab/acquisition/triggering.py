@@ -16,8 +16,7 @@ import numpy as np
 from analysis.limits import U_OF_WAY
 from analysis.uncertainty import Estimate
 from levilab.acquisition.counting import prepare_counter_again, spin_now
-from levilab.acquisition.failures import DidNotFollow, NotHeld
-from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NotHeld
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
 

@@ -1,17 +1,16 @@
-"""What must hold in each laboratory."""
+"""What one process of a laboratory has shown and left behind, and what must hold of it."""
 
 from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from levilab.errors import LevilabError
-from levilab.laboratory.life import Compared
 from levilab.runs.run import Run
 from levilab.simulator.laws import LAWS
 from levilab.world.spin_world import SpinWorld
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
 
     from levilab.acquisition.session import Row, Session
     from levilab.laboratory.bench import LaboratoryBench
-    from levilab.laboratory.life import Life
     from levilab.laboratory.plan import Plan
     from levilab.world.spin_world import World
 
@@ -38,6 +36,56 @@ _U = {"spin_frequency_hz": "spin_frequency_u_hz", "flux_density_t": "flux_densit
 _FEW = 10
 #: What no message may hold: Python's own words.
 _PYTHON = re.compile(r"Traceback|<[a-z_.]+ object at|\bNone\b|\bNaN\b|Error\(|\{\}|errno")
+
+
+@dataclass(frozen=True)
+class Compared:
+    """A reading beside the truth.
+
+    Attributes:
+        row: the reading.
+        truth: [Hz].
+        u: of the reading [Hz].
+    """
+
+    row: Row
+    truth: float
+    u: float
+
+
+@dataclass
+class Life:
+    """What one process of a laboratory has shown and left behind.
+
+    Attributes:
+        number: from 0 on.
+        ended: finished, interrupted, failed, killed, refused (before anything was begun) or broken (by a defect).
+        status: its exit status; None: it was killed, or is broken.
+        text: its last message.
+        error: that ended it.
+        folder: of its run.
+        shown, events, messages: rows, texts of events, and all texts that were shown.
+        zero: time on the bench of time_s = 0 [s].
+        first: index of the first of the rows that this process has read.
+        left: the status of its run, as others read it then; empty where there is none.
+        output_on: whether the drive was on when it had ended.
+        truth: what the world says of the rows that it has read.
+    """
+
+    number: int
+    ended: str = "broken"
+    status: int | None = None
+    text: str = ""
+    error: BaseException | None = None
+    folder: Path | None = None
+    shown: list[Row] = field(default_factory=list)
+    events: list[str] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
+    zero: float | None = None
+    first: int = 0
+    left: str = ""
+    output_on: bool = False
+    truth: list[Compared] = field(default_factory=list)
 
 
 @dataclass(frozen=True)

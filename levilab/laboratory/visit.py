@@ -28,7 +28,7 @@ from levilab.laboratory.bench import LaboratoryClock, LaboratoryPerson, laborato
 from levilab.laboratory.disk import SimulatedComputer
 from levilab.laboratory.events import EVENTS
 from levilab.laboratory.fate import Fate, Killed
-from levilab.laboratory.life import Life
+from levilab.laboratory.judge import Life
 from levilab.laboratory.plan import MOST_LIVES
 from levilab.pipelines.suits import analyze_suiting
 from levilab.present.progress import Display

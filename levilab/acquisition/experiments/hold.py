@@ -14,7 +14,7 @@ from instruments.errors import InstrumentError
 from levilab.acquisition.counting import prepare_counter
 from levilab.acquisition.driving import DriveSettings, drive_off, drive_up, reach_generator_again
 from levilab.acquisition.experiment import Experiment
-from levilab.acquisition.failures import NotHeld
+from levilab.acquisition.session import NotHeld
 from levilab.bench.config import ConfigError
 from levilab.formats.table import FEWEST
 from levilab.present.numbers import with_uncertainty

@@ -26,8 +26,7 @@ from levilab.acquisition.driving import (
     is_over,
 )
 from levilab.acquisition.experiment import Experiment
-from levilab.acquisition.failures import DidNotFollow, NotHeld
-from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NotHeld
 from levilab.acquisition.triggering import CYCLE
 from levilab.bench.config import ConfigError
 from levilab.present.numbers import with_uncertainty

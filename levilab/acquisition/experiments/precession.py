@@ -16,8 +16,7 @@ from instruments.errors import InstrumentError
 from levilab.acquisition.counting import gate_began, prepare_counter, prepare_counter_again
 from levilab.acquisition.driving import DriveSettings, PointFailed, check_drive, held_spin, sweep_drive
 from levilab.acquisition.experiment import Experiment
-from levilab.acquisition.failures import NotHeld
-from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.session import ExperimentFailed, NotHeld
 from levilab.bench.config import ConfigError
 from levilab.bench.kinds import COUNTER
 from levilab.bench.person import Task

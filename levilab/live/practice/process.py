@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 from instruments.clock import PacedClock
 from instruments.errors import InstrumentError
-from levilab.acquisition.failures import DidNotFollow, NoLight
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.onlooker import Sent, counting_of, state_of
 from levilab.acquisition.request import AcquisitionOptions, request_at
-from levilab.acquisition.session import ExperimentFailed, last_count
+from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NoLight, last_count
 from levilab.bench.bench import open_bench
 from levilab.errors import LevilabError
 from levilab.interruption import watching_for_end

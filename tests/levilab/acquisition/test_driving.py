@@ -21,8 +21,8 @@ from levilab.acquisition.driving import (
     sweep_drive,
 )
 from levilab.acquisition.experiment import Experiment
-from levilab.acquisition.failures import NotHeld
 from levilab.acquisition.loop import AcquisitionRequest, acquire
+from levilab.acquisition.session import NotHeld
 from levilab.acquisition.table import EXPERIMENTS, Configuration, with_settings
 from levilab.interruption import Interrupted, Stop
 from levilab.runs.channel import Channel

@@ -13,9 +13,9 @@ from instruments.errors import NoAnswer
 from instruments.virtual.generator.channel import Output, Triggered
 from levilab.acquisition import triggering
 from levilab.acquisition.experiments.spin import SpinSettings
-from levilab.acquisition.failures import DidNotFollow, NotHeld
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.acquisition.session import DidNotFollow, NotHeld
 from levilab.acquisition.triggering import CYCLE, Motor, response, slope_of
 from levilab.bench.bench import open_bench
 from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings

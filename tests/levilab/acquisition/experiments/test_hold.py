@@ -9,9 +9,9 @@ import pytest
 from instruments.clock import VirtualClock
 from levilab.acquisition.driving import drive_off
 from levilab.acquisition.experiments import hold
-from levilab.acquisition.failures import DidNotFollow, NotHeld
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.acquisition.session import DidNotFollow, NotHeld
 from levilab.acquisition.triggering import Motor
 from levilab.errors import UsageError
 from levilab.runs.run import Run

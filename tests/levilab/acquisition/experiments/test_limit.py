@@ -13,10 +13,9 @@ from instruments.virtual.generator.channel import Output, Triggered
 from levilab.acquisition.counting import FreeTop
 from levilab.acquisition.driving import held_spin
 from levilab.acquisition.experiments.limit import LimitSettings
-from levilab.acquisition.failures import DidNotFollow, NotHeld
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
-from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NotHeld
 from levilab.acquisition.table import Configuration, settings_of, with_settings
 from levilab.acquisition.triggering import CYCLE
 from levilab.bench.config import ConfigError
