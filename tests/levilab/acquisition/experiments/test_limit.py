@@ -243,7 +243,7 @@ def test_the_cause_of_a_loss_in_full_motion_is_the_only_possible_one(tmp_path, d
     (group,) = LIMIT.analyze([run.folder], LimitOptions()).groups
     assert causes(run) == [cause]
     assert group.causes == {cause: 1}
-    assert f"The phase before each loss tells why: {cause} once." in group.text
+    assert f"The phase before each loss tells why: {cause}." in group.text
     (lag,) = (event["lag_turns"] for event in run.events() if "cause" in event)
     assert lag > 1.0 or lag < 0.5  # the boundary is 0.75
 
