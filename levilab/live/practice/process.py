@@ -247,6 +247,7 @@ class PracticeProcess:
         if self._looking:
             return
         self._looking = True
+        self.clock.paused = False  # an instrument that obeys takes its time, in which nothing would end a pause
         try:
             self._read_commands()
             self._look_meanwhile()

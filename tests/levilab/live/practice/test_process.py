@@ -21,6 +21,7 @@ from levilab.live.practice.commands import (
     ChangeBench,
     Command,
     MatchDrive,
+    Pause,
     PracticeEvent,
     PutBack,
     RecordRun,
@@ -121,6 +122,41 @@ def test_the_time_of_a_bench_stands_still_while_no_view_looks(tmp_path: Path) ->
     script = carry_out(tmp_path, (1000.0, None), script=Lonely, rests=True)
     assert script.states[-1].time_s < 2.0  # and not 1000 s
     assert not script.states[-1].paused  # which is what a person says
+
+
+class OneALook(Script):
+    """Sends no two commands in one look."""
+
+    has_sent = False
+
+    def poll(self) -> bool:
+        self.has_sent = super().poll() and not self.has_sent
+        return self.has_sent
+
+
+class Impatient(PacedClock):
+    """Fails where nobody ends a pause."""
+
+    looks = 0
+
+    def _pass(self, end: float) -> None:
+        self.looks = self.looks + 1 if self.paused else 0
+        assert self.looks < 50, "time stands still for good"
+        super()._pass(end)
+
+
+def test_what_is_asked_for_while_time_stands_still_is_done_at_once(tmp_path: Path) -> None:
+    asked = MatchDrive(), SwitchDrive(on=True), TuneDrive(frequency_hz=31.0), Pause(on=True)
+    meanwhile = TuneDrive(amplitude_vpp=5.0), SwitchDrive(on=False), SwitchDrive(on=True), TuneDrive(frequency_hz=31.5)
+    commands = [(20.0 + 10 * k, command) for k, command in enumerate(asked)]
+    commands += [(50.0, command) for command in (*meanwhile, Pause(on=False))]
+    script = carry_out(tmp_path, *commands, (90.0, None), script=OneALook, clock=Impatient(math.inf))
+    assert script.said("refused") == []
+    still = [state.time_s for state in script.states if state.paused]
+    assert len(still) > len(meanwhile)
+    assert still[-1] - still[0] < 2.0  # messages to the generator take their time
+    assert script.states[-1].drive
+    assert script.states[-1].drive.frequency_hz == pytest.approx(31.5, abs=0.2)
 
 
 class Patient(Script):
