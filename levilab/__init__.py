@@ -21,7 +21,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any, Literal
 
 from levilab.errors import LevilabError
-from levilab.notebook.names import bare
+from levilab.notebook.names import NoSuchAttribute, bare, border, meant
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -50,6 +50,10 @@ __all__ = [
 ]  # fmt: skip
 
 
+#: What other libraries call the functions → our names.
+_INSTEAD = {"read": "load", "open": "load", "load_run": "load", "fit": "analyze", "run": "runs", "save": "export"}
+
+
 class _FrontDoor(ModuleType):
     """This package, whose functions stay where the import system would put rooms of their names."""
 
@@ -57,8 +61,11 @@ class _FrontDoor(ModuleType):
         return [*__all__, *(name for name in vars(self) if name.startswith("__")), "__version__"]
 
     def __getattr__(self, name: str) -> Any:
-        if name != "__version__":
+        if name.startswith("_") and name != "__version__":
             raise AttributeError(f"module 'levilab' has no attribute {name!r}")
+        if name != "__version__":
+            with border:
+                raise NoSuchAttribute(f"levilab has no {name!r}: {meant(_INSTEAD.get(name, name), __all__)}")
         from importlib.metadata import version
 
         return version("levilab")

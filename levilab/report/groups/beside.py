@@ -14,7 +14,7 @@ from analysis.spindown.drag import LAWS
 from analysis.uncertainty import Estimate
 from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import unquote
-from levilab.present.numbers import plain, with_uncertainty
+from levilab.present.numbers import enumeration, plain, with_uncertainty
 from levilab.present.units import unit
 
 if TYPE_CHECKING:
@@ -199,13 +199,23 @@ def finding(of: Class) -> str:
     if not of.quantities:
         return f"{len(of.groups)} groups: no quantity has a value with u"
     first = of.quantities[0]
-    return f"{_mean(first)}, mean of {_count(first)}: {_agreement(first)}"
+    return f"{_mean(first)}, mean of {_count(of, first)}: {_agreement(first)}"
 
 
 def verdict(of: Class) -> str:
     """Return what the class found, quantity by quantity, and how well it met the truth."""
-    texts = [f"{_mean(one)} is the mean of {_count(one)}; {_chi_square(one)}." for one in of.quantities]
-    return "  ".join([*texts, *([_truth(of)] if of.knows_truth else [])]) or finding(of)
+    texts = [f"{_mean(one)} is the mean of {_count(of, one)}; {_chi_square(one)}." for one in of.quantities]
+    return "  ".join([*_scenes(of), *texts, *([_truth(of)] if of.knows_truth else [])]) or finding(of)
+
+
+def _scenes(of: Class) -> list[str]:
+    """Return a sentence where the virtual benches of the runs had several scenes, whose tops are not comparable."""
+    records = [source.run.record for source in of.found.sources if source.run]
+    scenes = {(record.configuration.get("scene") or {}).get("name", "") for record in records if record.synthetic}
+    if len(scenes) < 2:
+        return []
+    named = enumeration(sorted(name or "a spin alone" for name in scenes))
+    return [f"Compare these runs apart: they are of several scenes of the virtual bench ({named}), whose tops differ."]
 
 
 def _mean(of: Compared) -> str:
@@ -216,9 +226,12 @@ def _mean(of: Compared) -> str:
     return f"{of.symbol} = {with_uncertainty(Estimate(together.mean * factor, together.u * factor, of.shown_unit))}"
 
 
-def _count(of: Compared) -> str:
-    n = sum(one is not None for one in of.estimates)
-    return f"{n} group{'s' * (n > 1)}"
+def _count(of: Class, one: Compared) -> str:
+    """Return the number of groups with a value, and that of their runs where it is another one."""
+    found = [group.source for group, estimate in zip(of.groups, one.estimates, strict=True) if estimate]
+    n = len({source.group or source.name for source in found})
+    groups = f"{n} group{'s' * (n > 1)}"
+    return groups if len(found) == n else f"{len(found)} runs of {groups}"
 
 
 def _agreement(of: Compared) -> str:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from levilab.errors import unquote
 from levilab.files import check_writable, replace_atomically
 from levilab.pipelines.suits import recall_suiting
 from levilab.present.document.blocks import Document, Fact, Facts, Note, Picture, Section, Tabular, Verdict
@@ -71,7 +72,7 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
     yield section("Result", "result", Verdict(verdict(of)), *tables, _groups(of))
     if of.quantities:
         yield section("Figure", "figure", _picture(of))
-    if any(group.warnings or group.source.note for group in of.groups):
+    if of.found.warnings or any(group.warnings or group.source.note for group in of.groups):
         yield section("Notes", "notes", Facts(tuple(_notes(of))))
 
 
@@ -139,7 +140,9 @@ def _groups(of: Class) -> Tabular:
 
 
 def _notes(of: Class) -> Iterator[Fact]:
-    """Yield the note and the warnings of each group that has some."""
+    """Yield what is to be known of all runs, as that one was given twice, and notes and warnings of each group."""
+    if of.found.warnings:
+        yield Fact("all", tuple(map(unquote, of.found.warnings)))
     for group in of.groups:
         note = [f"note: {group.source.note}"] if group.source.note else []
         if note or group.warnings:

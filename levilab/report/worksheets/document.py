@@ -21,7 +21,7 @@ from levilab.present.tables import table
 from levilab.report.groups.beside import class_of
 from levilab.report.groups.document import truth_text
 from levilab.report.page import FORMATS
-from levilab.texts.text import in_language, language_of
+from levilab.texts.text import ENGLISH, in_language, language_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -39,11 +39,13 @@ class Sheet:
     Attributes:
         experiment, analysis: their names.
         settings: of the experiment, as one types them: a class has an hour.
+        has_clicks: whether the bench in the browser gives the numbers that the questions ask for.
     """
 
     experiment: str
     analysis: str
     settings: tuple[str, ...] = ()
+    has_clicks: bool = True
 
     def commands(self, group: str, seed: int) -> tuple[str, ...]:
         """Return what a group types."""
@@ -61,7 +63,8 @@ SHEETS = MappingProxyType({
     sheet.experiment: sheet
     for sheet in (
         Sheet("spin", "spindown"),
-        Sheet("limit", "limit", (f"limit.repetitions={TOPS}",)),
+        # in the browser the moment is tilted, and tops fall sooner
+        Sheet("limit", "limit", (f"limit.repetitions={TOPS}",), has_clicks=False),
         Sheet("field", "field"),
         Sheet("precession", "precession"),
     )
@@ -125,6 +128,8 @@ def worksheet(sheet: Sheet, language: Language, seeds: Mapping[str, int]) -> Doc
         (f"{number}.  {task}", "\n".join([_BLANK] * _LINES)) for number, task in enumerate(texts.tasks, start=1)
     ]
     asked = table("", (words["question"], words["answer"]), questions)
+    spoken = "" if language.code == ENGLISH else f" --language {language.code}"
+    live = f"levilab live --mock --seed {seed}{spoken} --out class"
     return Document(
         title=texts.title,
         lead=words["worksheet"],
@@ -132,7 +137,7 @@ def worksheet(sheet: Sheet, language: Language, seeds: Mapping[str, int]) -> Doc
         blocks=(
             Section(words["aim"], (Paragraph(texts.aim),)),
             Section(words["commands"], (Code("\n".join(sheet.commands(group, seed))),)),
-            Section(words["clicks"], (Paragraph(words["with_clicks"]),)),
+            *([Section(words["clicks"], (Code(live), Paragraph(words["with_clicks"])))] if sheet.has_clicks else []),
             Section(words["seeds"], (Paragraph(told), Listing("seeds", listed, rows_in_a_piece=5))),
             Section(words["tasks"], (Tabular("tasks", asked, wraps=asked.heads, first_column_wraps=True),)),
         ),

@@ -194,6 +194,8 @@ GUESSES: dict[str, Callable[[Any], object]] = {
 }
 #: Wrong guesses → what the error says instead.
 REFUSED = {
+    "levilab.read('run')": "did you mean load?",
+    "levilab.fit(result)": "did you mean analyze?",
     "levilab.simulate('undrivn')": "did you mean undriven?",
     "levilab.acquire('spinn', mock=True)": "spin, trace, field",
     "levilab.load(folder)": "levilab.runs lists",

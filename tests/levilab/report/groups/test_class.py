@@ -12,7 +12,7 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.crosscheck.truth import Truth
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.report.groups.beside import _quantity, class_of
+from levilab.report.groups.beside import _quantity, class_of, finding, verdict
 from levilab.report.groups.document import write_class
 from levilab.runs.find import RECORD
 from levilab.world.spin_world import SpinScene, random_scene
@@ -83,6 +83,22 @@ def test_the_page_names_groups_whose_seed_has_another_law(of_three, tmp_path, gr
     assert of.others == {group: "stokes"}
     page = write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")
     assert f"have another law, and so no truth to compare with: {escape(group)} (stokes)." in page
+
+
+def test_two_runs_of_a_group_are_no_two_groups(of_three, tmp_path):
+    assert "mean of 3 groups" in finding(compared(of_three))
+    again = with_changes(of_three, tmp_path, "Group 10", {"group": "Group 2"})
+    assert "mean of 3 runs of 2 groups" in finding(compared(again))
+
+
+def test_a_run_given_twice_and_runs_of_several_scenes_are_named(of_three, tmp_path):
+    root = with_changes(of_three, tmp_path, "Group 2", {"configuration": {"scene": {"name": "practice"}}})
+    run, *_ = sorted(root.glob("2*"))
+    shutil.copytree(run, root / "copy")
+    page = write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")
+    assert "holds the same readings as" in page
+    assert "several scenes of the virtual bench (a spin alone and practice)" in page
+    assert "several scenes" not in verdict(compared(of_three))
 
 
 @pytest.mark.parametrize(("value", "u"), [(1.0, float("nan")), (1.0, 0.0), (1.0, None), (float("nan"), 1.0)])
