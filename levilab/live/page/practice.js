@@ -6,8 +6,6 @@ import {by, fixed, lapse, local, make, option, phrase, put, short, write} from "
 
 /** Least time between two messages of a slider [ms]. */
 const SENDS_EVERY_MS = 120;
-/** A drive takes hold of a top that spins as fast, within this [Hz]. */
-const CATCHES_HZ = 1;
 
 /** The bench for practice as guests see it: its controls stay hidden, and keys do nothing. */
 export function watchPractice() {
@@ -82,7 +80,10 @@ export function openPractice(about, command, run, isOwn, allowed) {
       now.matched = true;
       send("match the drive");
     },
-    back: () => send("put the top back"),
+    back: () => {
+      now.matched = false;
+      send("put the top back");
+    },
     hold: () => send("pause", {on: !now.paused}),
     record: () => now.busy ? send("stop the run") : send("record a run", {experiment: by("experiment").value, group: by("group").value}),
     analyze: () => openResult(run()),
@@ -274,8 +275,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
       put(item, {className: k <= last ? "done" : k === last + 1 ? "now" : ""});
       put(item, {ariaCurrent: item.className === "now" ? "step" : null});
     });
-    const off = Math.abs(bench.drive?.frequency_hz - bench.last.spin_frequency_hz);
-    const needs = {drive: now.matched && off < CATCHES_HZ ? "drive" : "match", tune: "frequency", record: "record", analyze: "analyze", report: "analyze"};
+    const needs = {drive: now.matched ? "drive" : "match", tune: "frequency", record: "record", analyze: "analyze", report: "analyze"};
     now.learned ||= last === items.length - 1;  // the next run brings the steps not back
     return now.learned ? "" : needs[items[last + 1].dataset.step];
   }

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from instruments.errors import InstrumentError
-from levilab.acquisition.grip import COUNTS, Grip
+from levilab.acquisition.grip import Grip
 from levilab.acquisition.onlooker import drive_of
 from levilab.live.practice.commands import CommandRefused, TuneDrive
 from levilab.telemetry.messages import Drive
@@ -79,6 +79,7 @@ class PracticeDrive:
         self.bench: Bench | None = None
         self._set = Drive("SQU", 30.0, 10.0)  # as a person set it: where its frequency is, or is going
         self._ramp_hz_per_s = 0.1
+        self._is_matched = False  # to the top, which spins more slowly by the time it is switched on
         self._hold: Hold | None = None  # while it is on near the top's spin
         self.took_hold = self.tuned_up = False
         self._moved = 0.0  # bench time of the last step of the frequency [s]
@@ -130,6 +131,7 @@ class PracticeDrive:
                 "switch it off, then match"
             )
         self.tune(TuneDrive(frequency_hz=round(spin, 2)))
+        self._is_matched = True
 
     def tune(self, command: TuneDrive) -> None:
         """Change what the command names."""
@@ -137,6 +139,7 @@ class PracticeDrive:
         before, wanted = self._set, replace(self._set, **changes)
         self._check(wanted)
         self._set, self._ramp_hz_per_s = wanted, command.ramp_hz_per_s or self._ramp_hz_per_s
+        self._is_matched = self._is_matched and wanted.frequency_hz == before.frequency_hz
         if wanted.output and wanted.waveform != before.waveform:
             self._switch_on(self.frequency)
         elif wanted.output and command.amplitude_vpp is not None:
@@ -152,7 +155,8 @@ class PracticeDrive:
         self._check(self._set)
         self._set = replace(self._set, output=True)
         hz = self._set.frequency_hz
-        if spin is not None and abs(spin - hz) <= _CATCHES_WITHIN_HZ:
+        if spin is not None and (self._is_matched or abs(spin - hz) <= _CATCHES_WITHIN_HZ):
+            self._is_matched = False
             self._take_hold(spin)
             return
         self._switch_on(hz)
@@ -231,13 +235,7 @@ class PracticeDrive:
         self._switch_on(spin)
         limits = self.generator.limits
         self._hold = Hold(self._set.frequency_hz, Grip(spin, limits.drive_lowest_hz, limits.drive_frequency_hz))
-        self._voice.say(
-            Text(
-                "drive on at the top's spin, {spin:.2f} Hz; it takes hold within about {within:.0f} s",
-                spin=spin,
-                within=COUNTS * GATE_S + _COMPARED_S,
-            )
-        )
+        self._voice.say(Text("drive on at the top's spin, {spin:.2f} Hz; it takes hold within 20 s", spin=spin))
 
     def _yield(self, hold: Hold, spin: float | None) -> None:
         grip = hold.grip

@@ -281,8 +281,13 @@ class PracticeProcess:
 
     def _finish(self, why: str) -> None:
         """End all: a run is kept, and time passes at once."""
-        self._over, self._stopped = True, self._stopped or why
+        self._over = True
+        self._stop(why)
         self.clock.speed, self.clock.paused = math.inf, False  # and `_rest` leaves it so
+
+    def _stop(self, why: str) -> None:
+        """End the run that is recorded, also one that has not begun."""
+        self._stopped = self._stopped or why
         if self._session is not None:
             self._session.stop.by = self._session.stop.by or self._stopped
 
@@ -324,11 +329,9 @@ class PracticeProcess:
     # --- commands: each may raise CommandRefused or InstrumentError ---
 
     def _stop_run(self, _: ask.StopRun) -> None:
-        if self._session is None and self._wanted is None:
+        if self._wanted is None:
             raise CommandRefused("no run is being recorded: nothing to stop")
-        self._stopped = "the stop button"
-        if self._session is not None:
-            self._session.stop.by = self._stopped
+        self._stop("the stop button")
 
     def _want_run(self, command: ask.RecordRun) -> None:
         plan = plan_of(command)
@@ -390,8 +393,7 @@ class PracticeProcess:
             self._voice.say(self._fell)
         if AFTER_A_RUN < self.clock.speed < math.inf:
             self.clock.speed = AFTER_A_RUN
-            text = Text("the run is over: speed {speed:g}\u00a0× again", speed=AFTER_A_RUN)
-            self._voice.message(text)  # it does not stay: the speed may be changed
+            self._voice.message(Text("the run is over: speed {speed:g}\u00a0× again", speed=AFTER_A_RUN))
 
     @contextlib.contextmanager
     def _watching(self, session: Session[Any], wiring: Wiring) -> Iterator[Callable[[], None]]:
@@ -399,9 +401,8 @@ class PracticeProcess:
         self._session, self._folder = session, str(session.writer.folder)
         if self._stopped:
             session.stop.by = self._stopped
-        experiment = session.writer.record.experiment
-        scene = self.top.scene.as_table()
-        self._voice.report("recording", experiment, self._number, folder=self._folder, scene=scene)
+        scene, name = self.top.scene.as_table(), session.writer.record.experiment
+        self._voice.report("recording", name, self._number, folder=self._folder, scene=scene)
         try:
             yield self.look
         except ExperimentFailed as failed:

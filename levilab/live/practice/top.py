@@ -6,6 +6,7 @@ import contextlib
 from typing import TYPE_CHECKING, Any
 
 from levilab.bench.config import Limits
+from levilab.live.practice.drive import GATE_S
 from levilab.live.practice.seeds import keys_of_seed
 from levilab.live.practice.what_if import USUAL, keys_of
 from levilab.simulator.compilation import announce_compilation
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
 #: Experiments that move the magnetometer's probe: where it stands, their readings say.
 MOVE_THE_PROBE = frozenset({"field"})
-#: A top is looked at over this time up to now [s].
-_LOOKED_S = 0.5
 
 
 def _changeable(scene: Scene) -> dict[str, Any]:
@@ -67,7 +66,7 @@ class PracticeTop:
     def floats(self) -> bool:
         """Return whether the top is up now, as a person at the bench sees; the counter knows it a second later."""
         poses = self.wiring.poses
-        return poses is not None and bool(poses(self.world.clock.now(), _LOOKED_S, 1).up[0])
+        return poses is not None and bool(poses(self.world.clock.now(), GATE_S, 1).up[0])
 
     def put_back(self) -> None:
         """Spin a top by hand and let it float."""
@@ -84,11 +83,7 @@ class PracticeTop:
         return None if since is None or self.up_since is not None else now - since
 
     def change(self, values: Mapping[str, float]) -> None:
-        """Change the usual top and its surroundings, by names in WHAT_IF; no values: all as usual.
-
-        Raises:
-            CommandRefused: by `keys_of`.
-        """
+        """Change the usual top, by names in WHAT_IF; no values: all as usual.  Raises CommandRefused."""
         values = {**self.what_if, **values} if values else dict(USUAL)
         keys = keys_of(self._usual, values)
         with announce_compilation(self._voice.message):

@@ -280,6 +280,14 @@ def test_a_drive_that_is_too_weak_to_hold_the_top_goes_off_and_says_so(tmp_path:
     assert not any(state.took_hold or state.tuned_up for state in script.states)
 
 
+def test_a_drive_that_was_matched_takes_hold_also_later(tmp_path: Path) -> None:
+    """At 10 x the top is slower by 1 Hz a second after the match."""
+    script = carry_out(tmp_path, (2.0, MatchDrive()), (25.0, SwitchDrive(on=True)), (50.0, None))
+    before, after = (script.spins(a, a + 1.0)[-1] for a in (24.0, 49.0))
+    assert script.states[-1].took_hold
+    assert after[1] == pytest.approx(before[2], abs=0.3)  # 27.5 Hz, and not the 29.7 Hz of the match
+
+
 def test_a_drive_far_from_the_spin_says_why_it_holds_nothing(tmp_path: Path) -> None:
     script = carry_out(tmp_path, (2.0, TuneDrive(frequency_hz=40.0)), (2.1, SwitchDrive(on=True)), (3.0, None))
     (text,) = script.said("message")
