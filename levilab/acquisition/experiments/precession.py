@@ -195,6 +195,11 @@ def run(session: Session[PrecessionSettings]) -> None:
         RunEvent.DRIVE_OFF,
         Text("drive off, {some} of {all} points were measured", some=len(session.rows), all=len(settings.sweep)),
     )
+    if not session.rows and not session.stop.by:
+        raise ExperimentFailed(
+            "the top was held at no point of the sweep",
+            "choose points at which it floats, by precession.first_hz and precession.last_hz, or drive with more volts",
+        )
 
 
 def _points_done(rows: list[Row], sweep: tuple[float, ...]) -> int:

@@ -204,6 +204,15 @@ def test_a_beam_that_is_never_cut_ends_the_sweep_in_one_line(tmp_path):
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 
+def test_a_sweep_that_holds_the_top_nowhere_has_failed(tmp_path):
+    below = (18.0, 18.5, 19.0)  # the top of this world falls at 21.65 Hz
+    with pytest.raises(ExperimentFailed, match=r"held at no point of the sweep: choose points at which it floats"):
+        acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock()), frequencies_hz=below), Silent())
+    run = kept(tmp_path)
+    assert run.status == "failed"
+    assert len(events(run, "left out")) == 3
+
+
 class MissedAt31(Wobbling):
     """The stem misses the beam where the drive is at 31 Hz."""
 
