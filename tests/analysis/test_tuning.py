@@ -175,7 +175,7 @@ def test_owners_who_follow_the_proposals_float_and_learn_the_truth():
         pulls.append((values["mass_to_set"].value - owner.middle_at(21.0)) / values["mass_to_set"].u)
         slopes.append((values["relative_change"].value - owner.per_k) / values["relative_change"].u)
     second = np.array(days)[:, 1]
-    assert np.mean(second <= 2) > 0.74  # of 200 owners 0.92; 3 standard errors of 24 less
+    assert np.mean(second <= 2) > 0.68  # of 120 owners 0.88; 3 standard errors of 24 less
     for one in (pulls, slopes):
         # 3 standard errors of a mean and of a standard deviation of 24; coefficients are drawn 0.4 u off the prior's
         assert abs(np.mean(one) + 0.4 * (one is slopes)) < 0.6
