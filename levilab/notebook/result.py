@@ -27,6 +27,7 @@ from levilab.pipelines.suits import save as save_result
 from levilab.present.html import facts_as_html, fold, paragraphs, table_as_html
 from levilab.present.numbers import plain, without_unit
 from levilab.present.units import unit
+from levilab.report.export.contents import facts_of
 from levilab.report.page import render_part
 from levilab.report.tables.latex import to_latex
 
@@ -379,8 +380,17 @@ class AnalysisResult(Helpful):
         return levilab.report(self, output, **options)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the readings with their residuals as a Dataset with units; needs xarray.  Raises MissingXarray."""
-        return as_dataset(self.to_dataframe("readings"), "reading")
+        """Return the readings with their residuals as a Dataset with units, and where they come from; needs xarray.
+
+        Raises:
+            MissingXarray: it is not installed.
+        """
+        first, *others = sources = self.found.sources
+        about = facts_of(first.run, first.path, [(self.analysis, self.found)])
+        if others:
+            synthetic = any(source.synthetic for source in sources)
+            about = {"source": "; ".join(source.name for source in sources), "synthetic": str(synthetic).lower()}
+        return as_dataset(self.to_dataframe("readings"), "reading").assign_attrs(about)
 
     @property
     def residuals(self) -> np.ndarray:

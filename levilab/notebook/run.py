@@ -120,8 +120,15 @@ class RecordedRun(Helpful, Run):
         )
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the readings as a Dataset with units; needs xarray.  Raises DataError, MissingXarray."""
-        return as_dataset(self.df, "reading")
+        """Return the readings as a Dataset with units and the attributes of the run's export; needs xarray.
+
+        Raises:
+            DataError: the readings cannot be read.
+            MissingXarray: it is not installed.
+        """
+        from levilab.report.export.contents import facts_of  # with the catalogue of analyses
+
+        return as_dataset(self.df, "reading").assign_attrs(facts_of(self, self.folder))
 
     @bare
     def analyze(self, kind: str | None = None, **options: Any) -> AnalysisResult:

@@ -172,7 +172,7 @@ def contents_of_results(path: Path, run: Run | None, results: Results) -> Conten
         name=path.name if run else path.stem,
         title=f"levilab {run.record.experiment} run {path.name}" if run else f"readings of {path.name}",
         tables=tuple(table for table in tables if len(table.columns[0].values)),
-        about=_facts(run, path, results),
+        about=facts_of(run, path, results),
         values=tuple(value for one in written for value in _values(one)),
         files=files,
     )
@@ -231,15 +231,16 @@ def _values(written: Result) -> Iterator[Value]:
             yield Value(written.analysis, model, name, one.value, one.u, one.unit)
 
 
-def _facts(run: Run | None, path: Path, results: Results) -> dict[str, str]:
-    """Return where readings and result come from."""
+def facts_of(run: Run | None, path: Path, results: Results = ()) -> dict[str, str]:
+    """Return where readings and result come from, by names of CF and ACDD; without what is not known."""
     warnings = dict.fromkeys(unquote(text) for _, found in results for text in found.all_warnings)
     facts = {"warnings": "; ".join(warnings)}
     if run is None:
-        return facts | {"source": f"the file {path.name}", "history": f"read by levilab {version('levilab')}"}
+        facts |= {"source": f"the file {path.name}", "history": f"read by levilab {version('levilab')}"}
+        return {name: text for name, text in facts.items() if text}
     record = run.record
     models = [str(about.get("identity", "")) for about in record.instruments.values()]
-    return facts | {
+    facts |= {
         "source": record.synthetic_how or "synthetic" if record.synthetic else "; ".join(filter(None, models)),
         "synthetic": str(record.synthetic).lower(),
         "history": f"{record.started_utc or ''} {' '.join(record.command_line)}".strip(),
@@ -249,6 +250,7 @@ def _facts(run: Run | None, path: Path, results: Results) -> dict[str, str]:
         "time_zero_utc": record.time_zero_utc or "",
         "run": record.as_json(),
     }
+    return {name: text for name, text in facts.items() if text}
 
 
 def _of_sweep(store: Store) -> Contents:

@@ -59,6 +59,7 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "result.predict(0.0)": lambda f: f == pytest.approx(39.941, abs=0.001),
     "result.plot()": lambda figure: len(figure.axes) > 5,
     "result.plot('residuals')": lambda figure: len(figure.axes) == 2,
+    "run.to_xarray().attrs['synthetic'] + result.to_xarray().attrs['synthetic']": lambda said: said == "truetrue",
     "result.to_xarray()": lambda data: data["residual_hz"].attrs == {"units": "Hz"},
     "pickle.loads(pickle.dumps(result)).values == result.values": bool,
     "help(levilab.analyze)": lambda _: True,
