@@ -345,6 +345,7 @@ class PracticeProcess:
         if seed is None or seed == self.top.seed:
             return
         self._leave_task()
+        self.drive.lose()  # the other top was never held
         self.top.take_seed(seed)
         self._voice.message(Text("seed {seed} has drawn another top and another base: the top floats", seed=seed))
 

@@ -159,6 +159,13 @@ def test_what_is_asked_for_while_time_stands_still_is_done_at_once(tmp_path: Pat
     assert script.states[-1].drive.frequency_hz == pytest.approx(31.5, abs=0.2)
 
 
+def test_a_top_that_a_seed_has_drawn_anew_was_not_lost_by_the_drive(tmp_path: Path) -> None:
+    commands = (20.0, MatchDrive()), (25.0, SwitchDrive(on=True)), (60.0, TakeSeed(seed=5)), (80.0, None)
+    script = carry_out(tmp_path, *commands)
+    assert "the top follows the drive at" in " ".join(script.said("message"))
+    assert not [text for text in script.said("message") if text.startswith("the drive has lost the top")]
+
+
 class Patient(Script):
     """Closes the pipe when a run is over."""
 
