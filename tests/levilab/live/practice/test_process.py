@@ -135,7 +135,7 @@ class OneALook(Script):
 
 
 class Impatient(PacedClock):
-    """Fails where nobody ends a pause."""
+    """Fails where a pause does not end."""
 
     looks = 0
 
