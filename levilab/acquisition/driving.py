@@ -108,6 +108,18 @@ class DriveSettings(CounterSettings):
         if self.drive == "triggered":
             self._check_triggered(table, limits)
         check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
+        lowest, highest = _USUAL_WINDOW_HZ
+        if not lowest / 2 <= self.drive_frequency_hz <= 2 * highest:  # a slip of the unit would cost the top
+            raise ConfigError(
+                Text(
+                    "{table}.drive_frequency_hz = {drive_frequency_hz:g} Hz: no top floats there; a Levitron of the"
+                    " usual kind does between {lowest:.2f} and {highest:.2f} Hz",
+                    table=table,
+                    drive_frequency_hz=self.drive_frequency_hz,
+                    lowest=lowest,
+                    highest=highest,
+                )
+            )
         slowest = self.drive_frequency_hz / _LONGEST_RAMP_S
         if self.ramp_hz_per_s < slowest:
             raise ConfigError(

@@ -11,6 +11,7 @@ from levilab.notebook.labels import as_dataset
 from levilab.notebook.names import Helpful, bare, meant
 from levilab.notebook.quantity import NoSuchName
 from levilab.present.html import facts_as_html, table_as_html
+from levilab.report.export.contents import facts_of
 from levilab.runs.listing import Listed, list_runs
 from levilab.runs.run import Run
 
@@ -126,8 +127,6 @@ class RecordedRun(Helpful, Run):
             DataError: the readings cannot be read.
             MissingXarray: it is not installed.
         """
-        from levilab.report.export.contents import facts_of  # with the catalogue of analyses
-
         return as_dataset(self.df, "reading").assign_attrs(facts_of(self, self.folder))
 
     @bare

@@ -321,6 +321,7 @@ def test_a_series_ends_when_its_time_is_over(tmp_path):
         ("gate_s=fast", "limit.gate_s=fast: a number above 0 [s] is expected; levilab acquire limit --settings"),
         ("gate_s=0,5", "limit.gate_s=0,5: a number above 0 [s] is expected; write a decimal point, not a comma"),
         ("drive_frequency_hz=500", "limit.drive_frequency_hz = 500 is more than this bench allows"),
+        ("drive_frequency_hz=20rpm", "0.333333 Hz: no top floats there; a Levitron of the usual kind does between"),
         ("wich=upper", "limit.wich: there is no such setting, did you mean limit.which?"),
         ("which", "limit.KEY=VALUE is expected"),
         ("=3", "the key is missing: limit.KEY=VALUE is expected"),
