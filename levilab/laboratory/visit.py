@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import shutil
+import signal
 import sys
 import tempfile
 import traceback
@@ -288,6 +289,7 @@ def visit(plan: Plan, status_of: Callable[[Exception], int | None]) -> Told:
     here = Path.cwd()
     place = Path(tempfile.mkdtemp(prefix="levilab-laboratory-", dir=_memory()))
     os.chdir(place)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a worker ignores Ctrl-C, and so do its children
     try:
         _BENCH.write_text(_bench_file(plan), encoding="utf-8")
         laboratory = Visit(plan, status_of)
@@ -301,6 +303,7 @@ def visit(plan: Plan, status_of: Callable[[Exception], int | None]) -> Told:
             found += judge.same_rows(rows, unbroken.last_rows())
         return Told(plan, tuple(found), tuple(laboratory.fate.trace), tuple(_story(laboratory)))
     finally:
+        signal.signal(signal.SIGINT, before)
         os.chdir(here)
         shutil.rmtree(place, ignore_errors=True)
 

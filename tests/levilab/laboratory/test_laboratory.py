@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -135,6 +136,16 @@ def test_a_mistake_in_the_program_is_noticed(
     assert visit(plan, exit_status).findings == ()
     mistake(monkeypatch)
     assert oracle in oracles(visit(plan, exit_status))
+
+
+def test_ctrl_c_is_pressed_in_a_worker_too_which_ignores_its_own() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        told = visit(spin_down(Event("ctrl-c", 0, 154)), exit_status)
+        assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert "interrupted, status 130" in " ".join(told.story)
 
 
 def test_a_failure_is_shrunk_to_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
