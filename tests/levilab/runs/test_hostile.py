@@ -209,7 +209,7 @@ TIME, SPIN, U = ({"name": name, "unit": "", "source": ""} for name in CANONICAL[
         (["configuration", "scene"], [], "configuration.scene"),
         (["configuration", "spin", "ramp_hz_per_s"], 5e-324, "spin.ramp_hz_per_s"),
         (["configuration", "spin", "ramp_hz_per_s"], 1e-4, "spin.ramp_hz_per_s"),
-        (["configuration", "limits", "drive_frequency_hz"], 1e308, "spin.ramp_hz_per_s"),
+        (["configuration", "limits", "drive_frequency_hz"], 1e308, "spin.drive_frequency_hz"),
         (["configuration", "spin", "longest_s"], 50.0, "spin.longest_s"),
         (["channels"], [TIME, U], "channels"),
         (["channels"], [SPIN, U], "channels"),
