@@ -153,7 +153,7 @@ def _zip(contents: Contents, out: Path) -> dict[Path, bytes]:
         creator=about.get("creator_name", ""),
         licence=about.get("license", ""),
         description=about.get("comment", ""),
-        sources=[{"title": about["source"]}],
+        sources=[{"title": about.get("source", contents.title)}],
         synthetic=about.get("synthetic", ""),
     )
     files = {"datapackage.json": text.encode(), **{name: text for name, (_, text) in tables.items()}, **contents.files}
