@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 EXPERIMENT = "field"
 #: The parameters that have a budget.
 SHOWN = ("strength", "origin", "thickness", "background")
-#: Name of a part → what it is, and what would make it smaller.
+#: Name of a part → its description, and what would make it smaller.
 _WORDS = {
     "readings": ("readings of the probe", "more readings at each height"),
     "heights": ("setting of the heights", "a stand that sets heights better, or more heights"),

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
 
 
-#: Name of a part → what it is, where it comes from, what would make it smaller.
+#: Name of a part → its description, where it comes from, what would make it smaller.
 _ROWS = {
     "gain": ("gain at the full amplitude", "scatter of the counts about their lines", "more measurements of the gain"),
     "drift": ("change of the spin meanwhile", "u of the first and of the last reading", "a longer hold"),

@@ -137,7 +137,7 @@ def points_table(
     Args:
         run: the sweep.
         name: of the run, for the title.
-        most: so many points at most.
+        most: greatest number of points.
         clock: heads and, of each point, cells that go before the others.
     """
     fit = run.fit

@@ -156,7 +156,7 @@ def _of_model(parts: Parts, estimate: Estimate) -> Iterator[Component]:
 
 
 def _by_clocks(fit: LawFit, name: str) -> tuple[float, float]:
-    """Return the relative change of a parameter with the rates of the counter's clock and of that of the times.
+    """Return the relative change of a parameter with the rates of the counter's clock and of the clock of the times.
 
     Where all frequencies are multiplied by 1 + ε and all times by 1 + η, C of ω̇ = −Cωⁿ is by (1 + ε)^(1 − n)/(1 + η).
     """

@@ -74,9 +74,9 @@ _DRAGS = {"stokes": "ω", "disc": "ω^(3/2)", "newton": "ω²"}
 KARMAN = 2.235e-4
 #: Power of the laminar layer of air on a disc.
 _LAMINAR = 1.5
-#: A difference of so many u is one.
+#: The least difference [u].
 _DIFFERS = 2.0
-#: Runs that scatter by so many times what their readings explain differ.
+#: Runs differ whose scatter is this multiple of the scatter that their readings explain.
 _SCATTERS = 1.5
 
 
@@ -137,7 +137,7 @@ def answer(analysis: SpinDownAnalysis) -> str:
 
 
 def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
-    """Yield the constants of the best law, and the meaning of that of a law of one power."""
+    """Yield the constants of the best law, and the meaning of the constant of a law of one power."""
     if not (named := answer(analysis)):
         return
     yield named
@@ -233,7 +233,7 @@ def _constants(analysis: SpinDownAnalysis) -> Mapping[str, Estimate]:
 _PARTS = (_constant, _law, _loss, _exponent, _tilt, _runs)
 
 
-#: How well a law fits: heads for 80 columns, and in words.
+#: How well a law fits: heads for 80 columns, and spelled out.
 QUALITY = ("constants", "rms [Hz]", "χ²/dof", "ΔAICc", "weight", "order p", "DW")
 QUALITY_IN_WORDS = (*QUALITY[:5], "order test p", "Durbin–Watson")
 #: Below it ΔAICc has a digit behind the point: only there does it decide anything.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from levilab.pipelines.sway.readings import SwayReadings
 
 
-#: Name of a part → what it is, whether it was seen to scatter, where it comes from, what would make it smaller.
+#: Name of a part → its description, whether it was seen to scatter, where it comes from, what would make it smaller.
 _ROWS = {
     "lines": ("frequencies of the swings", "A", "noise of the places, and scatter of the windows",
               "a longer spin-down, or a sharper picture"),

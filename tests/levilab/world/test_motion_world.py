@@ -2,6 +2,9 @@
 
 import gc
 import math
+import os
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -15,14 +18,12 @@ from instruments.virtual.generator.voltage import fundamental
 from levilab.acquisition.triggering import response
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator import SceneError, preset, simulate
-from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.field import flux_density
 from levilab.simulator.kernels.motion import L, N, R
 from levilab.simulator.model import base_field
 from levilab.simulator.parts import Top
 from levilab.simulator.scene import presets
 from levilab.simulator.start import start_of
-from levilab.world.__main__ import compile_kernels
 from levilab.world.base import Base
 from levilab.world.bursts import TriggerWire, mean_pull
 from levilab.world.flight import RATE, SAMPLED, Flight, _cubic
@@ -60,14 +61,33 @@ def expected_turns(motion):
     return np.angle(along + 1j * across) / TURN
 
 
-def test_an_installer_compiles_the_kernels_that_the_bench_and_simulations_need():
-    compile_kernels()  # each shipped scene, also one whose drive has a ramp, which the bench's generator replaces
-    compiled = []
-    with announce_compilation(compiled.append):
-        for scene in map(preset, presets()):
-            simulate(scene, 0.05)
-            MotionWorld(scene, VirtualClock()).light(0.0, 1e-3, 10)
-    assert compiled == []
+#: Two programs: the first compiles, the second says what it had to compile.
+INSTALLED = "from levilab.world.__main__ import compile_kernels; compile_kernels(['undriven'])"
+USED = """
+from instruments.clock import VirtualClock
+from levilab.simulator import preset, simulate
+from levilab.simulator.compilation import announce_compilation
+from levilab.world.motion_world import MotionWorld
+
+with announce_compilation(print):
+    simulate(preset("undriven"), 0.05)
+    MotionWorld(preset("undriven"), VirtualClock()).light(0.0, 1e-3, 10)
+"""
+
+
+def test_an_installer_compiles_the_kernels_that_the_bench_and_simulations_need(tmp_path):
+    said = []
+    for program in (INSTALLED, USED):
+        kept = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+        run = subprocess.run([sys.executable, "-c", program], env=kept, capture_output=True, text=True, check=True)
+        said.append(run.stdout)
+    assert said == ["", ""]
+
+
+def test_the_top_of_each_scene_flies_on_the_bench():
+    for scene in map(preset, presets()):
+        world = MotionWorld(scene.changed({"observed": "motion"}), VirtualClock())
+        assert world.light(0.0, 1e-3, 10).size == 10
 
 
 # --- the flight ---

@@ -52,7 +52,7 @@ def is_unchanged(device):
 
 
 def took(messages):
-    """The bench's time is that of so many messages."""
+    """The bench's time is that of this number of messages."""
     return lambda device: device.clock.now() == pytest.approx(messages * device.pace, abs=1e-12)
 
 

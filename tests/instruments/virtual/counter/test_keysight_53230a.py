@@ -165,7 +165,7 @@ FIXED = (of(FIXED_LEVEL),)
 PLAIN = (of(),)
 FIVE = (of(FIXED_LEVEL, "SAMP:COUN 5", "SYST:TIM 2"),)
 LACKING = (lambda _: hostile.instrument("53210A"),)
-#: Function → what it is of pulses of 40 Hz.
+#: Function → its value for pulses of 40 Hz.
 FUNCTIONS = {
     "FREQ": 40.0, "PER": 0.025, "SPER": 0.025, "PWID": 0.025 * DUTY, "NWID": 0.025 * (1 - DUTY), "PDUT": DUTY,
     "NDUT": 1 - DUTY, "TOT:TIM": 4.0,
@@ -232,7 +232,7 @@ MEMORY = {
         *(FIVE, "INIT", ("R?", "#10"), 0.3, lambda device: ask(device, "R?").startswith("#245+"), 1.0),
         *(lambda device: len(numbers(ask(device, "R? 2")[4:])) == 2, ("DATA:POIN?", "+1")),
     ),
-    "DATA:REMove takes so many, and waits with the word WAIT": (  # opronningen/53230A-Toolkit reads so
+    "DATA:REMove takes a number of readings, and waits with the word WAIT": (  # opronningen/53230A-Toolkit reads so
         *(FIVE, "INIT", ("DATA:REM? 2", None), [-230], gives(2, "DATA:REM? 2,WAIT"), gives(3, "DATA:REM? 3, WAIT")),
         *(("DATA:REM? 1,WAIT", None), [-230]),
     ),

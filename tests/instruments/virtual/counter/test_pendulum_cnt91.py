@@ -55,7 +55,7 @@ def of(*messages, signal=LIGHT, native=False):
 
 
 def gives(least, question, most=None):
-    """A question is answered with so many numbers."""
+    """A question is answered with this number of numbers."""
     return lambda device: least <= len(numbers(ask(device, question))) <= (most or least)
 
 
@@ -103,7 +103,7 @@ ROWS = {
         ("INIT:CONT 0;CONT?", "0"),
     ),
     "READ? ends the free run": (READY, "INIT:CONT 1", 0.3, ("READ?", CLOSE), ("INIT:CONT?", "0")),
-    "READ:ARRay? brings as many as are measured": (  # QCoDeS's FCA3100
+    "READ:ARRay? brings all readings that are measured": (  # QCoDeS's FCA3100
         *(READY, gives(7, "CALC:AVER:STAT 0;:ARM:COUN 7;:READ:ARR? 7"), ("READ:ARR? 8", None), [-221]),
     ),
     "arming waits for the bus": (

@@ -46,7 +46,7 @@ def HEADS(data):
 
 
 def has_points(count):
-    """The record that is read has so many bytes."""
+    """The record that is read has this number of bytes."""
     return lambda device: len(block(device, ":WAV:DATA?")[1]) == count
 
 
