@@ -37,12 +37,14 @@ def as_dataset(frame: pd.DataFrame, dimension: str) -> xarray.Dataset:
 
     Args:
         frame: columns with the unit in their names.
-        dimension: of its rows; a column of that name is its coordinate, and time_s is one in any case.
+        dimension: of its rows, where no times that increase are; a column of that name is its coordinate.
 
     Raises:
         MissingXarray: xarray is not installed.
     """
     columns = {str(name): frame[name].to_numpy() for name in frame}
+    if "time_s" in frame and frame["time_s"].is_monotonic_increasing and frame["time_s"].is_unique:
+        dimension = "time_s"
     return dataset_of(columns, (dimension,)).set_coords({"time_s", "input", dimension} & set(columns))
 
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -27,7 +28,12 @@ def test_netcdf_keeps_the_cf_conventions(source, tmp_path):
     from compliance_checker.runner import CheckSuite, ComplianceChecker
 
     file, report = tmp_path / "out.nc", tmp_path / "report.json"
-    export(lambda: contents_of(SAMPLE_DATA / source), file)
+    contents = contents_of(SAMPLE_DATA / source)
+    if source == "trace-tape":  # and once as a ragged array
+        first, *others = contents.traces
+        cut = tuple(replace(one, values=one.values[:100]) for one in first.columns)
+        contents = replace(contents, traces=(replace(first, columns=cut), *others))
+    export(lambda: contents, file)
     CheckSuite.load_all_available_checkers()
     ComplianceChecker.run_checker(str(file), ["cf:1.8"], 0, "strict", output_filename=str(report), output_format="json")
     found = json.loads(report.read_text(encoding="utf-8"))["cf:1.8"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from itertools import chain, count
 from pathlib import Path
@@ -24,7 +24,7 @@ from levilab.runs.waveforms import run_waveforms
 from levilab.sweeps.plan import unit_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -69,6 +69,11 @@ class Table:
     columns: tuple[Column, ...]
     about: str
 
+    @property
+    def length(self) -> int:
+        """Number of rows."""
+        return len(self.columns[0].values)
+
 
 class Value(NamedTuple):
     """A quantity of a result; of no model where the model is empty."""
@@ -89,6 +94,7 @@ class Contents:
         name: of the run, the file or the sweep.
         title: for people.
         tables: the readings first.
+        traces: records of an oscilloscope, a table each: time_s, and the channels.
         about: facts by their names in the conventions CF and ACDD.
         values: of the results.
         files: that go into a package as they are, by their names.
@@ -100,6 +106,7 @@ class Contents:
     title: str
     tables: tuple[Table, ...]
     about: Mapping[str, str]
+    traces: tuple[Table, ...] = ()
     values: tuple[Value, ...] = ()
     files: Mapping[str, bytes] = field(default_factory=dict)
     axes: tuple[Column, ...] = ()
@@ -158,7 +165,8 @@ def contents_of_results(path: Path, run: Run | None, results: Results) -> Conten
     if inputs:  # also those of a folder that was searched
         path, run = next((path, source.run) for path, source in inputs.items())
     waveforms = run_waveforms(run) if run else _waveforms_of(results)
-    tables = [*_readings(run), *map(_of_analysis, results), *map(_of_waveform, enumerate(waveforms, 1))]
+    tables = [table for table in (*_readings(run), *map(_of_analysis, results)) if table.length]
+    traces = [table for table in map(_of_waveform, enumerate(waveforms, 1)) if table.length]
     written = [analysis.result_of(found, Place(Path())) for analysis, found in results]
     files = {
         f"result{f'.{one.analysis}' * (k > 0)}.json": f"{as_json(one.as_dict())}\n".encode(errors="replace")
@@ -166,13 +174,14 @@ def contents_of_results(path: Path, run: Run | None, results: Results) -> Conten
     }
     names = (RECORD, EVENTS) if run else ()
     files |= {name: (path / name).read_bytes() for name in names if (path / name).exists()}
-    if not any(len(table.columns[0].values) for table in tables):
+    if not (tables or traces):
         raise DataError(f"{path}: holds no reading and no record, so nothing can be exported")
     return Contents(
         name=path.name if run else path.stem,
         title=f"levilab {run.record.experiment} run {path.name}" if run else f"readings of {path.name}",
-        tables=tuple(table for table in tables if len(table.columns[0].values)),
+        tables=tuple(tables),
         about=facts_of(run, path, results),
+        traces=tuple(traces),
         values=tuple(value for one in written for value in _values(one)),
         files=files,
     )
@@ -332,7 +341,7 @@ class Variable:
 
 
 def variables_of(contents: Contents) -> list[Variable]:
-    """Return the variables of what is exported: a map's over its axes, else the columns of its tables and the result.
+    """Return the variables of what is exported: a map's over its axes, else readings, traces and the result.
 
     Variables of all tables but the first begin with the table's name, those of a result with it and the analysis.
     """
@@ -341,8 +350,7 @@ def variables_of(contents: Contents) -> list[Variable]:
         axes = [_variable(axis, key, (key,)) for axis, key in zip(contents.axes, keys, strict=True)]
         return [*axes, *(_variable(one, plain_name(one.name), keys) for one in contents.arrays)]
     taken: set[str] = set()
-    tables = enumerate(contents.tables)
-    found = [one for k, table in tables for one in _of_table(table, f"{table.name}_" if k else "", taken)]
+    found = [*_of_tables(contents.tables, taken), *_of_traces(contents.traces, taken)]
     return [*found, *(one for value in contents.values for one in _of_value(value, taken))]
 
 
@@ -374,24 +382,139 @@ def units_of(si: str) -> dict[str, str]:
     return {"units": {"Vpp": "V", "turns": "turn"}.get(si, si)}
 
 
-def _of_table(table: Table, prefix: str, taken: set[str]) -> Iterator[Variable]:
-    """Yield the columns of a table over the first one where that increases, else over the number of the row."""
-    first, names = table.columns[0], {column.name for column in table.columns}
-    increases = first.values.dtype.kind == "f" and bool(np.isfinite(first.values).all())
-    increases &= bool((np.diff(first.values) > 0).all())
-    dimension = plain_name(f"{prefix}{first.name if increases else 'row'}")
-    if not increases:
-        rows = np.arange(1, len(first.values) + 1, dtype=np.int32)
-        taken.add(dimension)
-        yield Variable(dimension, (dimension,), rows, {"long_name": f"number of {table.about}", "units": "1"})
-    for column in table.columns:
-        more = {}
-        if "time_s" in names and column.name != "time_s" and not increases:
-            more["coordinates"] = plain_name(f"{prefix}time_s")
-        quantity, unit = split(column.name)
-        if unit and (of_u := f"{quantity}_u_{unit.ending}") in names:
-            more["ancillary_variables"] = plain_name(f"{prefix}{of_u}")
-        yield _variable(column, free_name(plain_name(f"{prefix}{column.name}"), taken), (dimension,), more)
+def _of_tables(tables: Sequence[Table], taken: set[str]) -> Iterator[Variable]:
+    """Yield the columns of the readings, the first table, and over their dimension what analyses say of each reading.
+
+    A table whose rows are no readings has a dimension of its own.  A dimension is the table's first column where that
+    increases, else the number of the row.
+    """
+    readings: dict[str, Column] = {}
+    over, length = "", 0
+    for table in tables:
+        prefix = f"{table.name}_" if readings else ""
+        rows = _rows_in(readings, table)
+        names: dict[str, str] = {}
+        for column in table.columns:
+            given = readings.get(column.name) if rows is not None else None
+            known = given is not None and _are_equal(given.values[rows], column.values)
+            names[column.name] = plain_name(column.name if known else f"{prefix}{column.name}")
+        columns = [column for column in table.columns if names[column.name] not in taken]
+        taken |= {*names.values()}
+        dimension = over
+        if rows is None:
+            dimension, length = names[table.columns[0].name], table.length
+            if not _increases(table.columns[0].values):
+                dimension = free_name(plain_name(f"{prefix}reading"), taken)
+                yield _numbers(dimension, length, table.about)
+        if not readings:
+            over, readings = dimension, {column.name: column for column in columns}
+        for column in columns:
+            made = _variable(column, names[column.name], (dimension,), _beside(column.name, names, dimension))
+            yield made if rows is None or len(rows) == length else _spread(made, rows, length)
+
+
+def _beside(column: str, names: Mapping[str, str], dimension: str) -> dict[str, str]:
+    """Return the attributes that name a column's places, the first column and the time, and its u."""
+    places = dict.fromkeys(names[name] for name in (next(iter(names)), "time_s") if name in names)
+    places.pop(dimension, None)
+    quantity, unit = split(column)
+    of_u = names.get(f"{quantity}_u_{unit.ending}") if unit else None
+    is_place = names[column] in {dimension, *places}
+    more = {"coordinates": "" if is_place else " ".join(places), "ancillary_variables": of_u}
+    return {name: text for name, text in more.items() if text}
+
+
+def _rows_in(readings: Mapping[str, Column], table: Table) -> list[int] | None:
+    """Return the number of the reading that each row belongs to; None: the rows are no readings.
+
+    They have the readings' values of time or, without it, of the first common column.  The pulses of a record that a
+    reading is made of lie before the reading's time.
+    """
+    columns = {column.name: column.values for column in table.columns}
+    common = [name for name in columns if name in readings and "_u_" not in name]
+    if not common:
+        return None
+    key = "time_s" if "time_s" in common else common[0]
+    own, all_of_them = columns[key], readings[key].values
+    if len(own) == len(all_of_them) or len(np.unique(all_of_them)) == len(all_of_them):
+        left = enumerate(all_of_them)
+        rows = [next((number for number, value in left if value == one), -1) for one in own]
+        if -1 not in rows:
+            return rows
+    every = [*range(len(all_of_them))]
+    return every if key == "time_s" and [*np.searchsorted(all_of_them, own)] == every else None
+
+
+def _are_equal(one: NDArray[Any], other: NDArray[Any]) -> bool:
+    return np.array_equal(one, other, equal_nan=one.dtype.kind == other.dtype.kind == "f")
+
+
+def _increases(values: NDArray[Any]) -> bool:
+    return values.dtype.kind == "f" and bool(np.isfinite(values).all() and (np.diff(values) > 0).all())
+
+
+def _numbers(name: str, length: int, of: str) -> Variable:
+    """Return the coordinates of a dimension that only counts."""
+    return Variable(
+        name, (name,), np.arange(1, length + 1, dtype=np.int32), {"long_name": f"number of {of}", "units": "1"}
+    )
+
+
+def _spread(variable: Variable, rows: list[int], length: int) -> Variable:
+    """Return a variable over all readings: those that it has no row of are missing."""
+    missing = {"_FillValue": variable.attributes.get("_FillValue", variable.values.dtype.type(-1))}
+    values = np.full(length, missing["_FillValue"])
+    values[rows] = variable.values
+    return replace(variable, values=values, attributes={**variable.attributes, **missing})
+
+
+def _of_traces(traces: Sequence[Table], taken: set[str]) -> Iterator[Variable]:
+    """Yield the traces, a variable for each channel; channels that were sampled together share their dimensions."""
+    channels: dict[str, list[tuple[NDArray[Any], Column]]] = {}
+    for trace in traces:
+        for column in trace.columns[1:]:
+            channels.setdefault(column.name, []).append((trace.columns[0].values, column))
+    together: dict[tuple[Any, ...], list[str]] = {}
+    for name, records in channels.items():
+        together.setdefault(tuple((len(times), times[0], times[-1]) for times, _ in records), []).append(name)
+    for number, names in enumerate(together.values()):
+        prefix, times = f"{names[0]}_" * (number > 0), [times for times, _ in channels[names[0]]]
+        dimensions, place = yield from _of_samples(prefix, times, taken)
+        for name in names:
+            first, values = channels[name][0][1], [column.values for _, column in channels[name]]
+            stacked = np.stack(values) if len(dimensions) > 1 else np.concatenate(values)
+            yield _variable(
+                replace(first, values=stacked),
+                free_name(plain_name(name), taken),
+                dimensions,
+                {"coordinates": place},
+            )
+
+
+def _of_samples(
+    prefix: str, times: Sequence[NDArray[Any]], taken: set[str]
+) -> Generator[Variable, None, tuple[tuple[str, ...], str]]:
+    """Yield what places the samples of some traces in time; return the dimensions, and the name of the times.
+
+    Traces of one length and rate are over (trace, sample), others one behind the other: contiguous and ragged (§9.3).
+    """
+
+    def name_of(name: str) -> str:
+        return free_name(plain_name(f"{prefix}{name}"), taken)
+
+    trace, sample, since = name_of("trace"), name_of("sample"), times[0] - times[0][0]
+    yield _numbers(trace, len(times), "the trace")
+    start, about = name_of("trace_time_s"), {"long_name": "time of the trace's first sample", "units": "s"}
+    yield Variable(start, (trace,), np.array([one[0] for one in times]), about)
+    if all(one.shape == since.shape and np.allclose(one - one[0], since, rtol=1e-6, atol=0) for one in times):
+        yield Variable(sample, (sample,), since, {"long_name": "time since the trace's first sample", "units": "s"})
+        return (trace, sample), start
+    yield _numbers(sample, sum(map(len, times)), "the sample")
+    about = {"long_name": "number of samples of the trace", "units": "1", "sample_dimension": sample}
+    yield Variable(name_of("trace_row_size"), (trace,), np.array([*map(len, times)], dtype=np.int32), about)
+    place = name_of("sample_time_s")
+    yield Variable(place, (sample,), np.concatenate(times), {"long_name": "time of the sample", "units": "s"})
+    return (sample,), place
 
 
 def _variable(

@@ -165,7 +165,7 @@ def _zip(contents: Contents, out: Path) -> dict[Path, bytes]:
 
 
 def _tables(contents: Contents) -> list[Table]:
-    return [*contents.tables, *([contents.result] if contents.values else [])]
+    return [*contents.tables, *contents.traces, *([contents.result] if contents.values else [])]
 
 
 def _field(column: Column) -> dict[str, str]:

@@ -13,7 +13,7 @@ import xarray
 
 import levilab as door
 from levilab.errors import LevilabError
-from levilab.report.export.contents import contents_of, variables_of
+from levilab.report.export.contents import Column, Contents, Table, contents_of, variables_of
 from levilab.report.export.write import FORMATS, export
 from support.paths import SAMPLE_DATA
 
@@ -35,7 +35,10 @@ def test_netcdf_has_readings_and_result_with_units_and_uncertainties(tmp_path):
         assert (spin.dims, spin.units, spin.ancillary_variables) == (("time_s",), "Hz", "spin_frequency_u_hz")
         assert np.array_equal(spin, readings["spin_frequency_hz"])
         assert np.array_equal(data["time_s"], readings["time_s"])
+        assert np.array_equal(spin.sel(time_s=190.0), readings["spin_frequency_hz"][-1])
+        assert data["spindown_residual_hz"].dims == ("time_s",)  # of each reading
         assert np.array_equal(data["spindown_residual_hz"], found.residuals)
+        assert "spindown_spin_frequency_hz" not in data  # the readings themselves
         c, u = data["result_spindown_disc_c32"], data["result_spindown_disc_c32_u"]
         assert (float(c), float(u)) == (found["c32"].value, found["c32"].u)
         assert (c.attrs["unit"], "units" in c.attrs) == ("(rad/s)^-1/2/s", False)  # no unit of UDUNITS
@@ -47,11 +50,11 @@ def test_traces_are_in_volts_and_seconds(tmp_path):
     volts = np.load(TRACES / head["path"]) * head["volts_per_code"] + head["offset_v"]
     written(TRACES, tmp_path / "run.nc")
     with xarray.open_dataset(tmp_path / "run.nc") as data:
-        trace = data["trace_000002_tape_v"]
-        assert (trace.units, data["trace_000002_time_s"].units) == ("V", "s")
+        trace = data["tape_v"].sel(trace=2)
+        assert (data["tape_v"].dims, trace.units, trace["sample"].units) == (("trace", "sample"), "V", "s")
         assert np.abs(trace - volts).max() < 1e-6  # a code is 8 mV, and a float of 32 bits has 24
-        assert np.diff(data["trace_000002_time_s"]) == pytest.approx(head["dt_s"], rel=1e-6)
-        assert float(data["trace_000002_time_s"][-1]) == pytest.approx(head["time_s"], abs=2 * head["dt_s"])
+        assert np.diff(trace["sample"]) == pytest.approx(head["dt_s"], rel=1e-6)
+        assert float(trace["trace_time_s"] + trace["sample"][-1]) == pytest.approx(head["time_s"], abs=2 * head["dt_s"])
 
 
 def test_hdf5_has_the_same_variables_over_scales(tmp_path):
@@ -102,7 +105,60 @@ def test_a_file_without_a_run_is_exported_with_its_samples(tmp_path):
     with xarray.open_dataset(tmp_path / "sound.nc") as data:
         assert data["result_spin_frequency"].units == "Hz"
         assert float(data["result_spin_frequency"]) == pytest.approx(30.0, abs=0.01)  # sample_data/README.md
-        assert any(name.startswith("trace_000001_") and one.size > 1000 for name, one in data.variables.items())
+        assert data["mono_full_scale"].sizes == {"trace": 1, "sample": 2000}
+
+
+#: Columns of a dimension of its own → the dimensions of sample runs: heights and drives stand beside the times.
+DIMENSIONS = {
+    "field-scan": ("height_m", {"time_s": 17}),
+    "precession-sweep": ("drive_frequency_hz", {"time_s": 9, "trace": 9, "sample": 6000}),
+    "lower-limits": ("limit_top", {"reading": 10}),
+}
+
+
+@pytest.mark.parametrize("source", DIMENSIONS)
+def test_what_an_analysis_says_of_each_reading_is_over_the_readings(source, tmp_path):
+    written(SAMPLE_DATA / source, tmp_path / "run.nc")
+    place, sizes = DIMENSIONS[source]
+    with xarray.open_dataset(tmp_path / "run.nc") as data:
+        assert dict(data.sizes) == sizes
+        assert place in data.coords
+        assert {"time_s", "trace", "reading"} & {*data[place].dims}
+
+
+def table(name, **columns):
+    return Table(name, tuple(Column(of, np.array(values), "1", of) for of, values in columns.items()), "a row")
+
+
+def dataset_of(tables, tmp_path, traces=()):
+    export(lambda: Contents("made", "made", tuple(tables), {}, traces=tuple(traces)), tmp_path / "made.nc")
+    return xarray.open_dataset(tmp_path / "made.nc")
+
+
+def test_an_analysis_of_some_readings_leaves_the_others_empty(tmp_path):
+    readings = table("readings", time_s=[0.0, 1.0, 2.0], spin_frequency_hz=[30.0, 29.0, 28.0])
+    found = table("spin", time_s=[0.0, 2.0], residual_hz=[0.1, 0.2], used=[True, False])
+    with dataset_of([readings, found], tmp_path) as data:
+        assert dict(data.sizes) == {"time_s": 3}
+        assert data["spin_residual_hz"].values == pytest.approx([0.1, np.nan, 0.2], nan_ok=True)
+        assert data["spin_used"].values == pytest.approx([1, np.nan, 0], nan_ok=True)
+
+
+def test_rows_that_are_no_readings_have_a_dimension_of_their_own(tmp_path):
+    """Nothing says which reading a row with a value between them belongs to."""
+    readings = table("readings", time_s=[0.0, 1.0, 2.0], spin_frequency_hz=[30.0, 29.0, 28.0])
+    found = table("sway", time_s=[0.5, 1.5], spin_frequency_hz=[29.5, 28.5])
+    with dataset_of([readings, found], tmp_path) as data:
+        assert data["sway_spin_frequency_hz"].dims == ("sway_time_s",)
+
+
+def test_traces_of_unlike_lengths_are_one_behind_the_other_as_cf_has_it(tmp_path):
+    short, long = [table(f"trace-{n}", time_s=np.arange(n) * 0.1 + n, tape_v=np.full(n, n)) for n in (2, 3)]
+    with dataset_of([], tmp_path, [short, long]) as data:
+        assert data["trace_row_size"].values.tolist() == [2, 3]
+        assert data["trace_row_size"].sample_dimension == data["tape_v"].dims[0] == "sample"
+        assert data["tape_v"].values.tolist() == [2, 2, 3, 3, 3]
+        assert data["sample_time_s"].values == pytest.approx([2.0, 2.1, 3.0, 3.1, 3.2])
 
 
 @pytest.mark.parametrize(
