@@ -28,6 +28,7 @@ from levilab.notebook.result import AnalysisResult
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.document import refuse_columns_of_runs
 from levilab.pipelines.options import read_options
+from levilab.pipelines.sources import reword
 from levilab.pipelines.suits import suiting
 from levilab.present.numbers import list_in_words
 from levilab.runs.find import find_run
@@ -218,7 +219,10 @@ def _in_rows(text: str, folder: Path, titles: int) -> str:
 
 def _translate_warnings(found: Any, in_words: Callable[[str], str]) -> Any:
     """Replace the warnings about inputs by the caller's words."""
-    sources = [replace(source, warnings=tuple(map(in_words, source.warnings))) for source in found.sources]
+    sources = [
+        replace(source, warnings=tuple(reword(text, in_words(text)) for text in source.warnings))
+        for source in found.sources
+    ]
     return replace(found, sources=tuple(sources), warnings=tuple(map(in_words, found.warnings)))
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from levilab.pipelines.options import InputOptions
-from levilab.pipelines.sources import NotTaken, Readings, Source
+from levilab.pipelines.sources import Doubt, NotTaken, Readings, Source, reword
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -100,25 +100,20 @@ class Analyzed(Generic[S, R, T, Opt]):
 
     @property
     def doubts(self) -> list[str]:
-        """Warnings that make the numbers worthless where they are right, as of a wrong unit."""
-        return [
-            text if len(self.sources) == 1 else _with_name(source, text)
-            for source in self.sources
-            for text in source.warnings[: getattr(source.readings, "doubts", 0)]
-        ]
+        """Warnings that make the numbers worthless where they are right."""
+        return [text for text in self.all_warnings if isinstance(text, Doubt)]
 
     @property
     def all_warnings(self) -> list[str]:
         """Every warning once, doubts first; an input's with its name, unless it says it or is of every input."""
-        texts = [*self.doubts, *self.warnings, *self.about_all()]
+        texts = [*self.warnings, *self.about_all()]
         of_runs = [
             [*source.warnings, *self.about_run(run)] for source, run in zip(self.sources, self.runs, strict=True)
         ]
         of_every = set.intersection(*map(set, of_runs))
         for source, said in zip(self.sources, of_runs, strict=True):
-            own = said[getattr(source.readings, "doubts", 0) :]
-            texts += [text if text in of_every else _with_name(source, text) for text in own]
-        return list(dict.fromkeys(texts))
+            texts += [text if text in of_every else _with_name(source, text) for text in said]
+        return sorted(dict.fromkeys(texts), key=lambda text: not isinstance(text, Doubt))
 
     @property
     def grouped_warnings(self) -> list[list[str]]:
@@ -170,4 +165,4 @@ A = TypeVar("A", bound=Analyzed[Any, Any, Any, Any])
 
 def _with_name(source: Source[Any], text: str) -> str:
     """Put the name of the input before a text, unless it begins with the name or the path."""
-    return text if source.path.name in text.partition(": ")[0] else f"{source.name}: {text}"
+    return text if source.path.name in text.partition(": ")[0] else reword(text, f"{source.name}: {text}")

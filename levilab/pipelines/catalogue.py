@@ -45,7 +45,7 @@ def print_analysis(
     *,
     tables: bool = True,
 ) -> None:
-    """Print the tables, what the data say, and the warnings.
+    """Print what the data say, doubts about it, the tables, and notes.
 
     Args:
         analysis: the row of the catalogue.
@@ -59,15 +59,17 @@ def print_analysis(
     from levilab.present.terminal import draw, terminal  # with rich
 
     console = console or terminal()
+    console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
     for doubt in found.doubts:
         console.print(f"[bold yellow]Before you use the numbers.[/bold yellow] {escape(in_words(doubt))}")
-    for table in analysis.tables(found) if tables else ():
-        console.print(draw(table))
+    if tables:
+        console.print()
+        for table in analysis.tables(found):
+            console.print(draw(table))
     starts = [f"{short_name(one.name)} {moment(one.start)}" for one in found.sources if one.start]
     if starts:
         more = f"; and {len(starts) - MOST_STARTS} more" if len(starts) > MOST_STARTS else ""
         console.print(f"[bold]Start, local time.[/bold] {escape('; '.join(starts[:MOST_STARTS]))}{more}")
-    console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
     for first, *others in (group for group in found.grouped_warnings if group[0] not in found.doubts):
         many = len(others) >= MANY_ALIKE
         more = f" (and {len(others)} more like this one)" if many else ""

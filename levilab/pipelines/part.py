@@ -70,7 +70,6 @@ class ReportPart:
         runs_title: of the section with `runs`.
         runs: what belongs to each run rather than to all.
         inputs: one by one.
-        answer: the numbers that stand before the verdict; empty where the verdict has them.
     """
 
     subject: str
@@ -81,7 +80,6 @@ class ReportPart:
     runs_title: str
     runs: tuple[Block, ...]
     inputs: tuple[InputPart, ...]
-    answer: str = ""
 
 
 def first_of(shown: int, count: int) -> str:

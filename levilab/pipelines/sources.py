@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
     from datetime import datetime
 
+    from analysis.remarks import Remark
     from levilab.pipelines.options import InputOptions
 
 
@@ -42,6 +43,26 @@ SKIP = ".levilab-skip"
 
 #: Relative: a file rounds to 1 mHz and 10 ms, but no two runs agree so far in all readings.
 SAME = 5e-5
+
+
+class Doubt(str):
+    """A warning that makes the numbers worthless where it is right, as of a wrong unit or of loose washers."""
+
+    __slots__ = ()
+
+
+#: Kinds of remarks that are doubts.
+_DOUBTFUL = frozenset({"calculated", "changed", "many miscounts", "spin off", "no strength"})
+
+
+def warning(of: Remark, text: str) -> str:
+    """Return the text of a remark, of some kinds as a doubt."""
+    return Doubt(text) if of.kind in _DOUBTFUL else text
+
+
+def reword(text: str, new: str) -> str:
+    """Return a text in the place of another one, as a doubt if that is one."""
+    return Doubt(new) if isinstance(text, Doubt) else new
 
 
 class Readings:
@@ -432,7 +453,7 @@ def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
     if not data.exists():  # as after a kill before the first record
         raise DataError(f"{run.folder}: holds no {data.name}, so nothing was recorded; analyze another run")
     readings = needs.read_run(run, options)
-    warnings = (*readings.warnings, *run.warnings())
+    warnings = (*map(Doubt, run.warnings()), *readings.warnings)
     return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, warnings)
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from html import escape
 from typing import TYPE_CHECKING
+
+from levilab.present.document.typesetting import typeset
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -12,8 +13,8 @@ if TYPE_CHECKING:
 #: Texts stand on the left and numbers on the right, with room between columns, whatever a page does with tables.
 _LEFT, _RIGHT = "text-align: left; padding: 0 1em 0 0", "text-align: right; padding: 0 1em 0 0"
 
-#: The power in the units of drag laws, (rad/s)^−½/s, for which there are no raised characters.
-_POWER = re.compile(r"(?<=\(rad/s\))\^([−-]?[\d½]+(?:/\d+)?|\([^)]*\))")
+#: Level of a run of text → its element.
+_LEVELS = {"high": "sup", "low": "sub"}
 
 
 def facts_as_html(title: str, facts: Iterable[tuple[str, str]], after: str = "") -> str:
@@ -48,9 +49,7 @@ def table_as_html(heads: Sequence[str], rows: Iterable[Sequence[str]], texts: in
     """
 
     def line(cells: Iterable[str], tag: str) -> str:
-        styled = (
-            (_LEFT if k < texts else _RIGHT, _POWER.sub(r"<sup>\1</sup>", escape(cell))) for k, cell in enumerate(cells)
-        )
+        styled = ((_LEFT if k < texts else _RIGHT, _set(cell)) for k, cell in enumerate(cells))
         return "<tr>" + "".join(f'<{tag} style="{style}">{cell}</{tag}>' for style, cell in styled) + "</tr>"
 
     head = f"<thead>{line(heads, 'th')}</thead>" if heads else ""
@@ -69,4 +68,10 @@ def fold(summary: str, inside: str, *, opened: bool = False) -> str:
 
 def paragraphs(texts: Iterable[str]) -> str:
     """Return a paragraph for each text, escaped."""
-    return "".join(f"<p>{escape(text)}</p>" for text in texts)
+    return "".join(f"<p>{_set(text)}</p>" for text in texts)
+
+
+def _set(text: str) -> str:
+    """Return a text, escaped, with its powers raised and its indices lowered."""
+    runs = ((_LEVELS.get(run.level), escape(run.text)) for run in typeset(text))
+    return "".join(f"<{tag}>{run}</{tag}>" if tag else run for tag, run in runs)

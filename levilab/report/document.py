@@ -107,7 +107,7 @@ def blocks_of_part(
     groups = tuple(tuple(map(unquote, alike)) for alike in found.grouped_warnings)
     notes = [section("Notes", "notes", Warnings(groups))] if groups else []
     blocks = [
-        section("Result", "result", Verdict(_verdict(found, part)), *part.result),
+        section("Result", "result", Verdict(_verdict(found)), *part.result),
         section("Figure", "figure", picture_of(analysis, found, part)),
         *notes,
     ]
@@ -142,13 +142,12 @@ def _trials(analysis: Analysis[Any], found: Any, *, made: bool) -> Iterable[Sect
         yield Section("Cross-check with these parameters", tuple(blocks), anchor="crosscheck", lead=lead)
 
 
-def _verdict(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
-    """Return the answer and the verdict; it is read alone, and says itself that real and synthetic inputs are mixed."""
-    text = f"{part.answer} {found.text}".lstrip()
+def _verdict(found: Analyzed[Any, Any, Any, Any]) -> str:
+    """Return what the data say; it is read alone, and says itself that real and synthetic inputs are mixed."""
     if not _mixes(found):
-        return text
+        return found.text
     made_up = sum(source.synthetic for source in found.sources)
-    return f"MIXED, and so no measurement ({made_up} of {len(found.sources)} inputs are SYNTHETIC): {text}"
+    return f"MIXED, and so no measurement ({made_up} of {len(found.sources)} inputs are SYNTHETIC): {found.text}"
 
 
 def picture_of(analysis: Analysis[A], found: A, part: ReportPart) -> Picture:

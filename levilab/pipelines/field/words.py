@@ -11,6 +11,7 @@ from analysis.field.floating import FERRITE_PER_K
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, statistic
+from levilab.pipelines.sources import warning
 from levilab.present.numbers import enumeration, with_uncertainty
 
 if TYPE_CHECKING:
@@ -163,7 +164,7 @@ _SHOWN = {"m": ("mm", 1e3), "T": ("µT", 1e6)}
 def remark(of: Remark) -> str:
     """Return a remark as a sentence, without its full stop."""
     text = _REMARKS[of.kind]
-    return text if isinstance(text, str) else text(*of.values, **({"name": of.name} if of.name else {}))
+    return warning(of, text if isinstance(text, str) else text(*of.values, **({"name": of.name} if of.name else {})))
 
 
 def _contradicts(found: float, stated: float, u: float, name: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -71,7 +72,7 @@ class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
         """What the data say, in a few sentences."""
         spins = [run.spin.value or 0.0 for run in self.runs]
         several = f"One top was held at {len(spins)} spins, {min(spins):.1f} Hz to {max(spins):.1f} Hz."
-        return " ".join([several if len(spins) > 1 else text_of(self.runs[0]), *_of_laws(self.combined)])
+        return " ".join([*_of_laws(self.combined), several if len(spins) > 1 else text_of(self.runs[0])])
 
     def about_run(self, run: Hold) -> Iterable[str]:
         """Return what to know of one held spin."""
@@ -92,8 +93,8 @@ def _of_laws(found: HeldTogether) -> Iterable[str]:
     if best := found.best:
         constants = [f"{SYMBOLS[name]} = {with_uncertainty(one)}" for name, one in best.constants.items()]
         chi = best.statistics.reduced_chi_square
-        fits = "" if chi is None else f", χ² per degree of freedom {plain(chi, 2)}"
-        yield f"Of the drag laws {best.name} is the best: {list_in_words(constants)}{fits}."
+        off = "" if chi is None else f"; the held spins scatter about it by {plain(math.sqrt(chi), 2)} of their u"
+        yield f"The {best.name} law fits best: {list_in_words(constants)}{off}."
     for law in found.laws[: 1 if best else None]:  # a single drag lies on each
         if law.name in found.beside:
             (name,) = law.constants

@@ -465,18 +465,29 @@ def _sentences(limits: Limits) -> Iterable[str]:
     if limits.causes:
         told = ", ".join(f"{cause} {_times(n)}" if found.n > 1 else cause for cause, n in sorted(limits.causes.items()))
         yield f"{'Causes' if limits.conditions.triggered else 'The phase before each loss tells why'}: {told}."
-    yield from map(_compare, limits.theory)
+    yield from _beside_theory(limits)
 
 
 def _times(n: int) -> str:
     return {1: "once", 2: "twice"}.get(n, f"{n} times")
 
 
-def _compare(one: Comparison) -> str:
-    off = one.difference.value or 0.0
-    where = f"{abs(off):.2f} Hz {'above' if off > 0 else 'below'} the {one.name}, {one.expected:.2f} Hz"
-    if one.p is None:
-        return f"That is {where}."
-    verdict = "which chance explains" if one.agrees else "more than chance makes"
-    chance = f"p = {digits(one.p)}" if one.p >= 1e-6 else "p < 10⁻⁶"
-    return f"The mean lies {where}, {verdict} ({chance})."
+def _beside_theory(limits: Limits) -> Iterable[str]:
+    """Yield with which limit of theory the mean is compared, how far it lies from it, and why tops are lost sooner."""
+    theory = {one.name: one for one in limits.comparisons}
+    edge = theory.get(LOWER_EDGE) or theory.get(UPPER_EDGE)
+    if edge is None:
+        return
+    off = edge.difference.value or 0.0
+    lower, mean = limits.which == "lower", "that" if limits.statistics.n == 1 else "the mean"
+    p = "" if edge.p is None else f"p = {digits(edge.p)}" if edge.p >= 1e-6 else "p < 10⁻⁶"
+    chance = p and (f", which chance explains ({p})" if edge.agrees else f", more than chance makes ({p})")
+    yield (
+        f"In theory an upright top at rest floats {'down' if lower else 'up'} to {edge.expected:.2f} Hz "
+        f"(the {edge.name}); {mean} lies {abs(off):.2f} Hz {'above' if off > 0 else 'below'} it{chance}."
+    )
+    if (off > 0) == lower:
+        one = theory.get(RESONANCE)
+        leans = f", and leans ever more towards {one.expected:.2f} Hz, the {one.name}" if one else ""
+        real = f"is tilted and moves{leans}: it falls" if lower else "is tilted, moves and needs a drive: it is lost"
+        yield f"A real top {real} sooner."

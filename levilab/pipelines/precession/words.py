@@ -10,6 +10,7 @@ from analysis.numbers import digits
 from analysis.precession.sweep import EXCLUDED_P
 from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Quantity, columns_of, entry, statistic
+from levilab.pipelines.sources import warning
 from levilab.present.numbers import plain, pulses_too_many, with_uncertainty
 
 if TYPE_CHECKING:
@@ -62,8 +63,7 @@ def _about_power(power: Power) -> str:
     if power.enough:
         return (
             f"These points distinguish {aim} with a probability of {at_most(power.now)}; the smallest difference "
-            f"that they show in nine cases of ten is {plain(power.smallest_difference, 2)}. A range of "
-            f"{plain(power.range_needed_hz, 2)} Hz, or a u of {plain(power.u_needed_hz, 2)} Hz a point, would do."
+            f"that they show in nine cases of ten is {plain(power.smallest_difference, 2)}."
         )
     points = "more than a million points" if power.points_needed is None else f"{power.points_needed} points"
     return (
@@ -96,7 +96,8 @@ def miscount_as_text(of: Miscount) -> str:
 def remarks_of(fit: SweepFit) -> tuple[str, ...]:
     """Return the remarks on a sweep as sentences, without their full stops."""
     return tuple(
-        text if isinstance(text := _REMARKS[of.kind], str) else text(fit.points, *of.values) for of in fit.remarks
+        warning(of, text if isinstance(text := _REMARKS[of.kind], str) else text(fit.points, *of.values))
+        for of in fit.remarks
     )
 
 

@@ -20,7 +20,6 @@ from levilab.pipelines.row import find_all
 from levilab.pipelines.spindown.analysis import EXPERIMENT, SpinDownAnalysis, combine_sound, fit_source
 from levilab.pipelines.spindown.readings import read_run_readings, read_spin_file
 from levilab.pipelines.spindown.report import (
-    answer,
     spindown_columns,
     spindown_curve,
     spindown_curve_u,
@@ -256,7 +255,6 @@ def _entries(analysis: SpinDownAnalysis) -> dict[str, Any]:
     combined = analysis.combined
     several = len(analysis.runs) > 1
     return {
-        "text": f"{answer(analysis)} {analysis.text}".lstrip(),
         "values": _combined_values(combined),
         "models": [_combined_model(fit) for fit in combined.fits] if several else _models(analysis.runs[0]),
     } | _verdict(combined.best, combined.verdict, analysis.text)

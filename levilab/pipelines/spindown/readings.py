@@ -21,7 +21,7 @@ from levilab.formats.understanding import is_possible_spin, possible_spins
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes
-from levilab.pipelines.sources import Readings
+from levilab.pipelines.sources import Doubt, Readings
 from levilab.pipelines.spin.magnetometer import findings_of, read_field_record
 from levilab.pipelines.spin.readings import track_of_record
 from levilab.pipelines.spin.words import finding_text
@@ -54,7 +54,6 @@ class SpinReadings(Readings):
     driven: whether a drive is known to have brought the top to its spin.
     upright: whether the top is known to have no tilt: it stands on a virtual bench, and only spins there.
     doubtful: whether the unit is in doubt; means over several runs leave such a run out.
-    doubts: number of warnings, at the head, that make the numbers worthless where they are right.
     """
 
     time: "NDArray[np.float64]"
@@ -64,7 +63,6 @@ class SpinReadings(Readings):
     driven: bool = False
     upright: bool = False
     doubtful: bool = False
-    doubts: int = 0
 
     compared: ClassVar[tuple[str, ...]] = ("time", "frequency")
 
@@ -201,7 +199,7 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> SpinReadings:
     except AnalysisError as error:
         raise _in_the_file(table, error) from error
     doubts = _doubts(table, time, frequency)
-    return SpinReadings(time, frequency, u, (*doubts, *table.warnings), doubtful=bool(doubts), doubts=len(doubts))
+    return SpinReadings(time, frequency, u, (*map(Doubt, doubts), *table.warnings), doubtful=bool(doubts))
 
 
 #: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, times in ms

@@ -68,8 +68,6 @@ if TYPE_CHECKING:
 _POWERS: Mapping[str, float] = MappingProxyType(
     {law.name: n for law in sorted(LAWS.values(), key=lambda one: one.orders) if (n := law.exponent) is not None}
 )
-#: How the drag by such a law depends on the spin ω, in plain notation.
-_DRAGS = {"stokes": "ω", "disc": "ω^(3/2)", "newton": "ω²"}
 #: C₃/₂ of a bare disc as large as the thesis's top in laminar air, without a free parameter (PHYSICS.md §5) [SI].
 KARMAN = 2.235e-4
 #: Power of the laminar layer of air on a disc.
@@ -120,29 +118,10 @@ def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
     yield f"{which} top loses {first}, and {last}."
 
 
-def answer(analysis: SpinDownAnalysis) -> str:
-    """Return the constants of the best law with their u, as a sentence; empty where no law describes the readings."""
-    verdict = analysis.combined.verdict
-    known = [
-        f"{SYMBOLS[name]} = {with_uncertainty(value)}"
-        for name, value in _constants(analysis).items()
-        if value.value is not None and value.u
-    ]
-    if not verdict.describes or not known:
-        return ""
-    if not verdict.decided:
-        return f"{enumeration(known)} if the {verdict.best} law holds."
-    drag = _DRAGS.get(verdict.best, "")
-    return f"{drag and f'The drag of the air grows as {drag}: '}{enumeration(known)} by the {verdict.best} law."
-
-
 def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
-    """Yield the constants of the best law, and the meaning of the constant of a law of one power."""
-    if not (named := answer(analysis)):
-        return
-    yield named
+    """Yield the meaning of the constant of a law of one power."""
     combined = analysis.combined
-    if combined.best not in _POWERS:
+    if combined.best not in _POWERS or not combined.verdict.describes:
         return
     ((name, value),) = _constants(analysis).items()
     if value.value is None or not value.u or value.value <= 0:
@@ -462,7 +441,6 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
         subject="spin-down",
         heading="Spin-down of a levitated top",
         lead=f"{n} readings used",
-        answer=answer(analysis),
         result=(*_meaning(analysis), *_falls(analysis), *_laws(analysis), *_count(analysis)),
         figure=FigureText(
             title="Spin-down.",

@@ -15,7 +15,8 @@ from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from analysis.spindown.verdict import is_simple
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, estimate, statistic
-from levilab.present.numbers import enumeration
+from levilab.pipelines.sources import warning
+from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.units import name_with_unit
 
 if TYPE_CHECKING:
@@ -131,6 +132,8 @@ SPINDOWN_ROW = (
 )
 
 
+#: How the drag by such a law depends on the spin ω, in plain notation.
+_DRAGS = {"stokes": "ω", "disc": "ω^(3/2)", "newton": "ω²"}
 #: u of an exponent, or of an angle [rad], that no measurement has.
 TOO_SMALL = 5e-10
 #: A tilt of the moment is mentioned from this multiple of its u on.
@@ -139,17 +142,15 @@ SEEN = 3.0
 
 def verdict_of_run(run: SpinDown) -> str:
     """Return what one run says about the laws."""
-    power = {fit.name: fit.parameters for fit in run.fits}.get("power", {})
-    tilt = run.fit(run.best).parameters.get("moment_tilt")
-    return _verdict(run, run.fits, power.get("exponent"), tilt, [run])
+    constants = {fit.name: {name: fit.parameters[name] for name in fit.law.constants} for fit in run.fits}
+    return _verdict(run, run.fits, constants, run.fit(run.best).parameters.get("moment_tilt"), [run])
 
 
 def verdict_of_all(found: Combined, runs: Sequence[SpinDown]) -> str:
     """Return what all runs together say about the laws."""
     if len(runs) == 1:
         return verdict_of_run(runs[0])
-    power = {fit.name: fit.constants for fit in found.fits}.get("power", {})
-    return _verdict(found, found.fits, power.get("exponent"), found.tilt, runs)
+    return _verdict(found, found.fits, {fit.name: fit.constants for fit in found.fits}, found.tilt, runs)
 
 
 def is_seen(tilt: Estimate | None) -> bool:
@@ -183,7 +184,7 @@ def _simple(said: Verdict) -> list[str]:
 def _verdict(
     found: SpinDown | Combined,
     fits: Sequence[LawFit | CombinedLaw],
-    exponent: Estimate | None,
+    constants: Mapping[str, Mapping[str, Estimate]],
     tilt: Estimate | None,
     runs: Sequence[SpinDown],
 ) -> str:
@@ -191,36 +192,42 @@ def _verdict(
     best = stats[said.best]
 
     def names(laws: Sequence[str]) -> str:
+        exponent = constants.get("power", {}).get("exponent")
         return enumeration([f"power ({_exponent(exponent)})" if name == "power" else name for name in laws])
 
     simple = _simple(said)
+    grows = f"the drag of the air grows as {drag}" if (drag := _DRAGS.get(said.best)) else ""
+    how = ", with ".join(filter(None, (grows, _constants(constants[said.best]))))
+    others, advice = said.indistinguishable[1:], ""
     if not said.describes:
         first = _no_law(found, runs, digits(best.rms_residual))
-    elif said.decided and said.best == "power":
-        first = f"The power law, {_exponent(exponent)}, fits best" + _also(said.indistinguishable[1:], names)
     elif said.decided:
-        first = f"The {said.best} law fits best" + _also(said.indistinguishable[1:], names)
+        first = f"The {said.best} law fits best" + (f": {how}" if how else "")
+        first += f". {names(others)} cannot be distinguished from it" if others else ""
     elif len(simple) == 1:
         first = (
-            f"The laws {names(said.indistinguishable)} cannot be distinguished: {said.best} has the fewest constants. "
-            "More runs, or a longer fall of the spin, can decide"
+            f"The laws {names(said.indistinguishable)} cannot be distinguished: {said.best} has the fewest constants"
         )
+        advice = "More runs, or a longer fall of the spin, can decide"
     else:
         fall = max(float(1 - run.frequency[-1] / run.frequency[0]) for run in runs)
         first = (
             f"These {best.n} readings cannot distinguish {enumeration(simple) if len(simple) > 1 else 'the laws'}: "
             f"over a fall of the spin by {digits(100 * fall)} % they differ too little for readings of this number "
-            "and precision. Let the top fall further, or read it more often"
+            "and precision"
         )
-    reasons = [f"{n} (ΔAICc {stats[n].difference:.0f}: {digits(stats[n].rms_residual)} Hz rms)" for n in said.excluded]
-    weak = [f"{n} (ΔAICc {stats[n].difference:.1f})" for n in said.weak]
+        advice = "Let the top fall further, or read it more often"
+    misses = [f"{digits(stats[name].rms_residual)} Hz" for name in said.excluded]
     sentences = [
         first,
-        f"The readings exclude {enumeration(reasons)}; {said.best} leaves {digits(best.rms_residual)} Hz"
-        if reasons
+        f"If the {said.best} law holds, {how}" if how and said.describes and not said.decided else "",
+        advice,
+        f"The readings exclude {enumeration(said.excluded)}, which {'misses' if len(misses) == 1 else 'miss'} them by "
+        f"{enumeration(misses)} (rms); {said.best} misses them by {digits(best.rms_residual)} Hz"
+        if misses
         else "",
-        f"They speak against {enumeration(weak)}, without excluding {'them' if len(weak) > 1 else 'it'}"
-        if weak
+        f"They speak against {enumeration(said.weak)}, without excluding {'them' if len(said.weak) > 1 else 'it'}"
+        if said.weak
         else "",
         _needless(said, names(said.needless))
         if said.needless and (said.decided or len(simple) == 1) and said.describes
@@ -228,6 +235,16 @@ def _verdict(
         _wobble(tilt),
     ]
     return " ".join(f"{text}." for text in sentences if text)
+
+
+def _constants(of: Mapping[str, Estimate]) -> str:
+    """Return the constants of a law with their u, of a single one also its relative u; empty where none has a u."""
+    known = {name: one for name, one in of.items() if one.value is not None and one.u}
+    texts = [f"{SYMBOLS[name]} = {with_uncertainty(one)}" for name, one in known.items()]
+    if len(known) != 1 or len(of) != 1:
+        return enumeration(texts) if texts else ""
+    (one,) = known.values()
+    return f"{texts[0]}, known to {digits(100 * (one.u or 0.0) / abs(one.value or 1.0), 2)} %"
 
 
 def _wobble(tilt: Estimate | None) -> str:
@@ -243,11 +260,6 @@ def _wobble(tilt: Estimate | None) -> str:
 def _needless(said: Verdict, names: str) -> str:
     fit, need = ("fit", "need") if len(said.needless) > 1 else ("fits", "needs")
     return f"{names} {fit} as well as {said.best}, but {need} more constants"
-
-
-def _also(others: Sequence[str], names: Callable[[Sequence[str]], str]) -> str:
-    """Return the laws that fit as well as the best one, as the end of a sentence."""
-    return f"; {names(others)} cannot be distinguished from it" if others else ""
 
 
 def _no_law(found: SpinDown | Combined, runs: Sequence[SpinDown], rms: str) -> str:
@@ -288,7 +300,7 @@ def remark(of: Remark) -> str:
     """Return a remark as a sentence, without its full stop."""
     text = _REMARKS[of.kind]
     said = text(of) if callable(text) else text
-    return f"{of.law}: {said}" if of.law and of.kind in _OF_A_LAW else said
+    return warning(of, f"{of.law}: {said}" if of.law and of.kind in _OF_A_LAW else said)
 
 
 _OF_A_LAW = frozenset({

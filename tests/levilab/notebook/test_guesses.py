@@ -178,7 +178,7 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "levilab.analyze(levilab.runs(folder), 'limit').inputs": lambda names: "lower-limits" in names,
     "repr(levilab.analyze((1000 * t, f))).splitlines()[1]": lambda line: "if the times are not in seconds" in line,
     "levilab.analyze((1000 * t, f)).warnings[0]": lambda text: "if the times are not in seconds" in text,
-    "levilab.analyze((1000 * t, f)).summary()": lambda text: text.startswith("Before you use the numbers."),
+    "levilab.analyze((1000 * t, f)).summary()": lambda text: "\nBefore you use the numbers. " in text,
     # the other commands
     "levilab.__version__": lambda text: text[0].isdigit(),
     "levilab.runs(folder)": lambda runs: len(runs) > 10 and "spin-down-1" in runs._repr_html_(),

@@ -49,7 +49,8 @@ def test_theory_beside_them_is_that_of_the_thesis_top(sample_data, tmp_path):
     assert expected == pytest.approx({LOWER_EDGE: 21.65, RESONANCE: 22.1, UPPER_EDGE: 80.6} | reached, abs=0.06)
     (highest,) = (one for one in upper.comparisons if one.name == THESIS_HIGHEST)
     assert highest.difference.u > 0.28  # 61 is printed without decimals, 0.5/√3
-    assert "0.21 Hz above the lower edge of the linear window" in lower.text
+    assert "21.65 Hz (the lower edge of the linear window); the mean lies 0.21 Hz above it" in lower.text
+    assert "towards 22.15 Hz, the resonance of the wobble: it falls sooner." in lower.text
 
 
 def test_both_kinds_together_have_values_of_both(sample_data, tmp_path):

@@ -10,7 +10,7 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.figure import spindown_figure
-from levilab.pipelines.spindown.report import answer, meaning, spindown_part, spindown_tables
+from levilab.pipelines.spindown.report import meaning, spindown_part, spindown_tables
 from levilab.pipelines.spindown.words import SYMBOLS
 from levilab.present.document.blocks import Section, Verdict
 from levilab.present.numbers import with_uncertainty
@@ -34,7 +34,7 @@ def test_text_figure_and_tables_have_one_verdict(tmp_path):
     assert len(LAWS[first.name].constants) > 1
     assert analysis.combined.best == "disc"
     assert "cannot be distinguished: disc has the fewest constants" in analysis.text
-    assert "disc leaves" in analysis.text
+    assert "disc misses them by" in analysis.text
     figure = spindown_figure(analysis)
     written = [text.get_text() for text in figure.findobj(Text)]
     assert any("cannot be distinguished; disc has the fewest constants" in " ".join(one.split()) for one in written)
@@ -47,15 +47,17 @@ def test_text_figure_and_tables_have_one_verdict(tmp_path):
 def test_the_report_begins_with_the_constant_and_its_u(tmp_path):
     analysis = undecided(tmp_path)
     c32 = analysis.combined.fit("disc").constants["c32"]
-    assert answer(analysis) == f"{SYMBOLS['c32']} = {with_uncertainty(c32)} if the disc law holds."
-    assert meaning(analysis)[0] == answer(analysis)
+    value = f"the drag of the air grows as ω^(3/2), with {SYMBOLS['c32']} = {with_uncertainty(c32)}, known to 1"
+    assert f"If the disc law holds, {value}" in analysis.text
     decided = replace(analysis.combined, verdict=replace(analysis.combined.verdict, decided=True))
     found = replace(analysis, combined=decided)
-    assert answer(found).endswith(" by the disc law.")
+    assert found.text.startswith(f"The disc law fits best: {value}")
     (box,) = [one for one in result_of(found) if isinstance(one, Verdict)]
-    assert box.text == f"{answer(found)} {found.text}"
-    none = replace(decided, verdict=replace(decided.verdict, describes=False))
-    assert answer(replace(analysis, combined=none)) == ""
+    assert box.text == found.text
+    changed = replace(decided, verdict=replace(decided.verdict, describes=False, changed=(0,)))
+    none = replace(analysis, combined=changed).text
+    assert none.startswith("No law describes")
+    assert SYMBOLS["c32"] not in none
 
 
 def result_of(analysis):
