@@ -17,6 +17,7 @@ from levilab.present.document.blocks import (
     Paragraph,
     Picture,
     Points,
+    Question,
     Section,
     Tabular,
     Verdict,
@@ -43,7 +44,8 @@ def all_blocks(text: str) -> tuple[Any, ...]:
     picture = Picture("figure", text, text, text, drawn, (Points("readings-0", (text, text)),))
     return (
         Verdict(text), Banner(text, text), Warnings(((text,), (text,) * 5)), Paragraph(text, text), Note(text),
-        Bullets((text,)), Code(f"{text}\n{text}"), Facts((Fact(text, (text, text)), Fact(text, (text,), code=True))),
+        Bullets((text,)), Code(f"{text}\n{text}"), Question(text, text),
+        Facts((Fact(text, (text, text)), Fact(text, (text,), code=True))),
         Tabular("t", shown, text, wraps=(text,), narrow="stack"), Listing("l", shown, text), picture,
         Details(text, (Paragraph(text),), text), Details(text, (Paragraph("left out"),), on_paper="out"),
     )  # fmt: skip

@@ -94,6 +94,21 @@ class Code:
 
 
 @dataclass(frozen=True)
+class Question:
+    """A question, and below it lines as wide as the text to write the answer on; on one page.
+
+    Attributes:
+        lead: its number, in bold before it.
+        text: the question.
+        lines: how many.
+    """
+
+    lead: str
+    text: str
+    lines: int = 2
+
+
+@dataclass(frozen=True)
 class Fact:
     """A name and what is said about it.
 
@@ -252,6 +267,7 @@ Block: TypeAlias = (
     | Warnings
     | Bullets
     | Code
+    | Question
     | Facts
     | Tabular
     | Listing

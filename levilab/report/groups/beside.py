@@ -56,6 +56,7 @@ class Compared:
         estimates: of each group; None where it has no value with u.
         truths: of each group; None where it is not known.
         together: of those with a value; None where there are none.
+        widths: by which u of each group grows in comparisons, as it is known from few repetitions alone.
     """
 
     name: str
@@ -64,6 +65,7 @@ class Compared:
     estimates: tuple[Estimate | None, ...]
     truths: tuple[float | None, ...]
     together: Comparison | None
+    widths: tuple[float, ...]
 
     @property
     def shown_unit(self) -> str:
@@ -90,8 +92,8 @@ class Compared:
     def from_truth(self) -> tuple[float | None, ...]:
         """The distance of each group from its truth, in its u."""
         return tuple(
-            None if one is None or truth is None else (one.value - truth) / one.u  # type: ignore[operator]
-            for one, truth in zip(self.estimates, self.truths, strict=True)
+            None if one is None or truth is None else (one.value - truth) / one.u / width  # type: ignore[operator]
+            for one, truth, width in zip(self.estimates, self.truths, self.widths, strict=True)
         )
 
 
@@ -119,8 +121,8 @@ class Class:
         return any(truth is not None for one in self.quantities for truth in one.truths)
 
 
-def class_of(analysis: Analysis[Any], found: Any) -> Class:
-    """Put the groups of a class beside each other."""
+def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> Class:
+    """Put the groups of a class beside each other; more: names of quantities beside those that a class compares."""
     document = analysis.document(found, Path())
     truths = [truth_of(source.run, analysis.name) for source in found.sources]
     laws = Counter(one.model for one in truths if one.model)
@@ -131,7 +133,7 @@ def class_of(analysis: Analysis[Any], found: Any) -> Class:
         for source, part in zip(found.sources, parts, strict=True)
     )
     names = analysis.compared or (_constants(document, model) if parts[0]["models"] else []) or _common(parts)
-    quantities = (_quantity(name, analysis, model, parts, truths) for name in names)
+    quantities = (_quantity(name, analysis, model, parts, truths) for name in (*names, *more))
     others = {
         group.source.name: truth.model
         for group, truth in zip(groups, truths, strict=True)
@@ -175,15 +177,26 @@ def _quantity(
     found = [_model(part, model).get("parameters", {}).get(name) or part["values"].get(name) for part in parts]
     good = [one if one and _has_u(one) else None for one in found]
     estimates = tuple(Estimate(one["value"], one["u"], one["unit"]) if one else None for one in good)
+    widths = tuple(_width((part.get("result", {}).get("statistics") or {}).get("freedom")) for part in parts)
     known = [one for one in good if one]
+    u = [one["u"] * width for one, width in zip(good, widths, strict=True) if one]
     return Compared(
         name,
         analysis.symbols.get(name, name.replace("_", " ")),
         known[0]["unit"] if known else "1",
         estimates,
         tuple(truth.values.get(name) if truth.model in {"", model} else None for truth in truths),
-        compare([one["value"] for one in known], [one["u"] for one in known]) if known else None,
+        compare([one["value"] for one in known], u) if known else None,
+        widths,
     )
+
+
+def _width(freedom: float | None) -> float:
+    """Return the standard deviation of Student's t: what u from a scatter is worth (GUM supplement 1, 6.4.9.4).
+
+    It is infinite below three degrees of freedom, and then that of three.
+    """
+    return 1.0 if freedom is None else math.sqrt(max(freedom, 3.0) / (max(freedom, 3.0) - 2.0))
 
 
 #: Below it chance does not make groups differ so much.

@@ -20,6 +20,7 @@ from levilab.present.document.blocks import (
     Note,
     Paragraph,
     Picture,
+    Question,
     Section,
     Tabular,
     Verdict,
@@ -167,6 +168,11 @@ def _code(_: Writer, block: Code, __: int) -> Html:
     return element("pre", element("code", block.text))
 
 
+def _question(_: Writer, block: Question, __: int) -> Html:
+    lines = [element("div", class_="line")] * block.lines
+    return element("div", element("p", element("strong", block.lead), " ", words(block.text)), lines, class_="question")
+
+
 def _warnings(_: Writer, block: Warnings, __: int) -> Html:
     if not block.groups:
         return element("p", "None.", class_="none")
@@ -297,6 +303,6 @@ def _details(writer: Writer, block: Details, level: int) -> Html:
 
 _RENDERERS: Mapping[type, Callable[[Writer, Any, int], Html]] = MappingProxyType({
     Paragraph: _paragraph, Note: _note, Verdict: _verdict, Banner: _banner, Bullets: _bullets, Code: _code,
-    Warnings: _warnings, Facts: _facts, Tabular: _tabular, Listing: _listing, Picture: _picture, Section: _section,
-    Details: _details,
+    Question: _question, Warnings: _warnings, Facts: _facts, Tabular: _tabular, Listing: _listing, Picture: _picture,
+    Section: _section, Details: _details,
 })  # fmt: skip

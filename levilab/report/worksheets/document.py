@@ -14,7 +14,18 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.errors import UsageError
 from levilab.files import parse_toml, replace_atomically, writing
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.present.document.blocks import Banner, Code, Document, Fact, Facts, Listing, Paragraph, Section, Tabular
+from levilab.present.document.blocks import (
+    Banner,
+    Code,
+    Document,
+    Fact,
+    Facts,
+    Listing,
+    Paragraph,
+    Question,
+    Section,
+    Tabular,
+)
 from levilab.present.numbers import column
 from levilab.present.progress import Display
 from levilab.present.tables import table
@@ -24,7 +35,7 @@ from levilab.report.page import FORMATS
 from levilab.texts.text import ENGLISH, in_language, language_of
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from levilab.report.groups.beside import Class
 
@@ -39,13 +50,15 @@ class Sheet:
     Attributes:
         experiment, analysis: their names.
         settings: of the experiment, as one types them: a class has an hour.
-        has_clicks: whether the bench in the browser gives the numbers that the questions ask for.
+        asked: quantities of the key beside those that a class compares.
+        clicks: what is said of the bench in the browser, in the texts of all worksheets.
     """
 
     experiment: str
     analysis: str
     settings: tuple[str, ...] = ()
-    has_clicks: bool = True
+    asked: tuple[str, ...] = ()
+    clicks: str = "with_clicks"
 
     def commands(self, group: str, seed: int) -> tuple[str, ...]:
         """Return what a group types."""
@@ -63,9 +76,8 @@ SHEETS = MappingProxyType({
     sheet.experiment: sheet
     for sheet in (
         Sheet("spin", "spindown"),
-        # in the browser the moment is tilted, and tops fall sooner
-        Sheet("limit", "limit", (f"limit.repetitions={TOPS}",), has_clicks=False),
-        Sheet("field", "field"),
+        Sheet("limit", "limit", (f"limit.repetitions={TOPS}",), ("scatter",), clicks="without_clicks"),
+        Sheet("field", "field", asked=("mass_to_set", "lightest_mass", "heaviest_mass")),
         Sheet("precession", "precession"),
     )
 })  # fmt: skip
@@ -108,8 +120,8 @@ def read_language(code: str) -> Language:
     return Language(code, {key: in_language(text, code) for key, text in table["words"].items()}, sheets)
 
 
-#: Where a student writes, and how many such lines an answer has.
-_BLANK, _LINES = "…" * 20, 3
+#: Where a student writes the name.
+_BLANK = "…" * 12
 
 
 def worksheet(sheet: Sheet, language: Language, seeds: Mapping[str, int]) -> Document:
@@ -124,22 +136,18 @@ def worksheet(sheet: Sheet, language: Language, seeds: Mapping[str, int]) -> Doc
     group, seed = next(iter(seeds.items()))
     told = words["each_seed"].replace("{group}", group).replace("{seed}", str(seed))
     listed = table("", (words["group"], words["seed"]), [(name, str(k)) for name, k in seeds.items()])
-    questions = [
-        (f"{number}.  {task}", "\n".join([_BLANK] * _LINES)) for number, task in enumerate(texts.tasks, start=1)
-    ]
-    asked = table("", (words["question"], words["answer"]), questions)
     spoken = "" if language.code == ENGLISH else f" --language {language.code}"
-    live = f"levilab live --mock --seed {seed}{spoken} --out class"
+    live = (Code(f"levilab live --mock --seed {seed}{spoken} --out class"),) * (sheet.clicks == "with_clicks")
     return Document(
         title=texts.title,
         lead=words["worksheet"],
-        byline=f"{words['name']} {_BLANK}  {words['date']} {_BLANK[:12]}",
+        byline=f"{words['name']} {_BLANK}  {words['date']} {_BLANK[:7]}",
         blocks=(
             Section(words["aim"], (Paragraph(texts.aim),)),
             Section(words["commands"], (Code("\n".join(sheet.commands(group, seed))),)),
-            *([Section(words["clicks"], (Code(live), Paragraph(words["with_clicks"])))] if sheet.has_clicks else []),
+            Section(words["clicks"], (*live, Paragraph(words[sheet.clicks]))),
             Section(words["seeds"], (Paragraph(told), Listing("seeds", listed, rows_in_a_piece=5))),
-            Section(words["tasks"], (Tabular("tasks", asked, wraps=asked.heads, first_column_wraps=True),)),
+            Section(words["tasks"], tuple(Question(f"{k}.", task) for k, task in enumerate(texts.tasks, start=1))),
         ),
         language=language.code,
     )
@@ -163,25 +171,31 @@ def key(sheet: Sheet, language: Language, seeds: Mapping[str, int], found: Class
         banner=Banner("SYNTHETIC.", f"{words['numbers']} {words['synthetic']}"),
         blocks=(
             Section(words["answers"], (Facts(facts),)),
-            Section(words["numbers"], (_numbers(language, seeds, found),)),
+            Section(words["numbers"], tuple(_numbers(language, seeds, found))),
         ),
         language=language.code,
     )
 
 
-def _numbers(language: Language, seeds: Mapping[str, int], found: Class) -> Tabular:
-    """Return each group's values with u, and the truths of its seed."""
+def _numbers(language: Language, seeds: Mapping[str, int], found: Class) -> Iterator[Tabular]:
+    """Yield each group's values with u: first those with the truths of its seed beside them, then those without."""
     words = language.words
-    heads = [words["group"], words["seed"]]
-    columns = [[*seeds], [*map(str, seeds.values())]]
-    for one in found.quantities:
-        estimates = [one.show(each.value, each.u) if each else None for each in one.estimates]
-        columns += [column(estimates), [*map(truth_text, map(one.show, one.truths), estimates)]]
-        heads += [one.head, f"{words['truth']}, {one.symbol}"]
-    rows = [tuple(row) for row in zip(*columns, strict=True)]
-    return Tabular(
-        "numbers", table("", heads, rows, numbers=heads[1:]), words["about_numbers"], first_column_wraps=True
-    )
+    known = [one for one in found.quantities if any(truth is not None for truth in one.truths)]
+    others = [one for one in found.quantities if one not in known]
+    for part, about in ((known, "about_numbers"), (others, "about_others")):
+        heads = [words["group"], words["seed"]]
+        columns = [[*seeds], [*map(str, seeds.values())]]
+        for one in part:
+            estimates = [one.show(each.value, each.u) if each else None for each in one.estimates]
+            columns.append(column(estimates))
+            heads.append(one.head.replace(one.symbol, in_language(one.symbol, language.code)))
+            if part is known:
+                columns.append([*map(truth_text, map(one.show, one.truths), estimates)])
+                heads.append(words["truth"])
+        if part:
+            rows = [tuple(row) for row in zip(*columns, strict=True)]
+            shown = table("", heads, rows, numbers=heads[1:])
+            yield Tabular(about.replace("_", "-"), shown, words[about], first_column_wraps=True)
 
 
 def write_worksheets(
@@ -224,7 +238,7 @@ def write_worksheets(
     for sheet in (SHEETS[name] for name in experiments or SHEETS):
         contents = {sheet.experiment: worksheet(sheet, texts, seeds)}
         if keys:
-            tell(f"the key of {sheet.experiment}: {len(seeds)} runs on the virtual bench")
+            tell(f"the key of {sheet.experiment}: {len(seeds)} run{'s' * (len(seeds) > 1)} on the virtual bench")
             contents[f"{sheet.experiment}-key"] = key(sheet, texts, seeds, measure(sheet, seeds))
         with writing(f"{out}: could not be written"):
             out.mkdir(parents=True, exist_ok=True)
@@ -242,4 +256,4 @@ def measure(sheet: Sheet, seeds: Mapping[str, int]) -> Class:
         for group, seed in seeds.items():
             options = AcquisitionOptions(mock=True, seed=seed, group=group, out=Path(folder), settings=sheet.settings)
             runs.append(acquire(request_for(sheet.experiment, options), Display()).folder)
-        return class_of(analysis, analysis.analyze(runs, analysis.options_from({})))
+        return class_of(analysis, analysis.analyze(runs, analysis.options_from({})), sheet.asked)

@@ -4,13 +4,15 @@ import json
 import re
 import shlex
 
+import numpy as np
 import pytest
 
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.report.groups.beside import class_of
-from levilab.report.worksheets.document import SHEETS, measure, read_language, write_worksheets
+from levilab.report.worksheets.document import SHEETS, TOPS, measure, read_language, write_worksheets
 from levilab.texts.text import languages
+from levilab.world.spin_world import random_scene
 from support.pages import Page
 
 LANGUAGES = languages()
@@ -26,6 +28,7 @@ def test_each_question_has_an_answer(code):
 @pytest.mark.parametrize("code", LANGUAGES)
 def test_every_text_is_used(code, tmp_path):
     files = write_worksheets(["field"], tmp_path, {"A": 1}, language=code)
+    files += write_worksheets(["limit"], tmp_path, {"A": 1}, language=code, keys=False)
     page = " ".join(Page(file.read_text(encoding="utf-8")).text for file in files)
     language = read_language(code)
     filled = [text.replace("{group}", "A").replace("{seed}", "1") for text in language.words.values()]
@@ -45,12 +48,25 @@ def test_the_commands_of_a_worksheet_find_the_numbers_of_its_key(experiment, tmp
     for command in commands:
         levilab(*shlex.split(command.replace("&quot;", '"'))[1:])
     analysis = ANALYSES[sheet.analysis]
-    students = class_of(analysis, analysis.recall([tmp_path / "class"], analysis.options_from({})))
+    students = class_of(analysis, analysis.recall([tmp_path / "class"], analysis.options_from({})), sheet.asked)
     key = measure(sheet, seeds)
     assert [one.estimates for one in students.quantities] == [one.estimates for one in key.quantities]
     assert [one.truths for one in students.quantities] == [one.truths for one in key.quantities]
-    assert all(None not in one.truths for one in key.quantities)
+    assert all(None not in one.truths for one in key.quantities if one.name not in sheet.asked)
+    assert {*sheet.asked} <= {one.name for one in key.quantities}
     assert json.loads(next((tmp_path / "class").glob("2*/run.json")).read_text(encoding="utf-8"))["seed"] == 41
+
+
+@pytest.mark.slow
+def test_the_limits_of_a_key_are_those_of_the_tops_that_its_seeds_draw():
+    """Each within the u of a line through ten falls, 0.05 Hz a fall; and of the mean of all tops within 2 u."""
+    sheet, seeds = SHEETS["limit"], {f"Group {k}": k for k in range(1, 5)}
+    mean, scatter = measure(sheet, seeds).quantities
+    for seed, found, spread in zip(seeds.values(), mean.estimates, scatter.estimates, strict=True):
+        falls = [random_scene(seed).fall_of(k) for k in range(TOPS)]
+        assert found.value == pytest.approx(np.mean(falls), abs=4 * 0.05 / TOPS**0.5)
+        assert spread.value == pytest.approx(np.std(falls, ddof=1), abs=4 * 0.05 / TOPS**0.5)
+    assert sum(abs(one) <= 2 for one in mean.from_truth) >= 3  # fewer in one class of 70
 
 
 def test_a_key_has_the_values_and_truths_of_each_seed_and_the_worksheet_none(tmp_path):
