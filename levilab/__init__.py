@@ -51,7 +51,10 @@ __all__ = [
 
 
 #: What other libraries call the functions → our names.
-_INSTEAD = {"read": "load", "open": "load", "load_run": "load", "fit": "analyze", "run": "runs", "save": "export"}
+_INSTEAD = {
+    "read": "load", "open": "load", "load_run": "load", "fit": "analyze", "read_csv": "analyze", "run": "runs",
+    "save": "export", "plot": "load(…).plot() or analyze(…).plot()", "version": "__version__",
+}  # fmt: skip
 
 
 class _FrontDoor(ModuleType):
@@ -65,7 +68,8 @@ class _FrontDoor(ModuleType):
             raise AttributeError(f"module 'levilab' has no attribute {name!r}")
         if name != "__version__":
             with border:
-                raise NoSuchAttribute(f"levilab has no {name!r}: {meant(_INSTEAD.get(name, name), __all__)}")
+                instead = f"did you mean {_INSTEAD[name]}?" if name in _INSTEAD else meant(name, __all__)
+                raise NoSuchAttribute(f"levilab has no {name!r}: {instead}")
         from importlib.metadata import version
 
         return version("levilab")
@@ -469,14 +473,14 @@ def report(
 
 @bare
 def export(
-    data: Run | AnalysisResult | SimulatedMap | str | PathLike[str],
+    data: Run | AnalysisResult | SimulatedMotion | SimulatedMap | str | PathLike[str],
     output: str | PathLike[str],
     *,
     creator: str = "",
     licence: str = "",
     force: bool = False,
 ) -> list[Path]:
-    """Write a run, a data file, a result or a map for other programs.
+    """Write a run, a data file, a result, a motion or a map for other programs.
 
     Args:
         data: one of them; readings, traces in volts and seconds, and the result with its uncertainties are written.

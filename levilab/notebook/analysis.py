@@ -46,19 +46,21 @@ if TYPE_CHECKING:
 _FRAME = "DataFrame"
 
 
-def analyze_data(data: Any, kind: str | None, given: Mapping[str, Any]) -> AnalysisResult:
+def analyze_data(data: Any, kind: Any, given: Mapping[str, Any]) -> AnalysisResult:
     """Analyze data by one analysis.
 
     Args:
         data: a run, a path, a DataFrame, or several of them; or arrays, see `frame_of_arrays`; or a dictionary of
             columns.
-        kind: of the analysis; None for the one that is made for the data.
+        kind: of the analysis; None for the one that is made for the data; or the second of two arrays.
         given: options by their names; None, or what an analysis has by itself, is not given.
 
     Raises:
         UsageError: an option or `kind` is wrong, or the data suit several analyses equally.
         DataError: the data suit none, or cannot be used.
     """
+    if kind is not None and not isinstance(kind, str) and are_arrays(kind):  # analyze(t, f)
+        data, kind = (data, kind), None
     _check_kind(kind)
     options = read_options(given)
     if data is None or (isinstance(data, tuple) and any(item is None for item in data)):
@@ -66,7 +68,7 @@ def analyze_data(data: Any, kind: str | None, given: Mapping[str, Any]) -> Analy
     called = _name_type(data)
     data = frame_of(data, kind)
     kind = kind_of(data, kind)
-    items: list[Any] = [data] if _is_one(data) else list(data)
+    items: list[Any] = [data] if _is_one(data) else [frame_of(item, kind) for item in data]
     items = [path for item in items for path in _expand(item)]
     if kind and all(isinstance(item, Run) for item in items):  # as of a folder
         items = [run for run in items if ANALYSES[kind].take(run)] or items
@@ -134,6 +136,11 @@ def _check_kind(kind: object) -> None:
 
 
 def _is_one(data: object) -> bool:
+    if isinstance(data, AnalysisResult) or hasattr(data, "read"):
+        seen, instead = (
+            ("a result", "what it was made of") if isinstance(data, AnalysisResult) else ("an open file", "its path")
+        )
+        raise UsageError("data", f"a run, a path, a DataFrame or arrays are expected: give {instead}", value=seen)
     return isinstance(data, str | PathLike | Run) or not hasattr(data, "__iter__") or is_frame(data)
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import UsageError, unquote
+from levilab.notebook.motion import SimulatedMotion
 from levilab.notebook.result import AnalysisResult
 from levilab.notebook.sweep import SimulatedMap
 from levilab.report.export.contents import contents_of, contents_of_results
@@ -28,10 +29,14 @@ def _contents(data: Any) -> Contents:
     """Return what is exported.  Raises UsageError, DataError."""
     if isinstance(data, AnalysisResult):
         return contents_of_results(data.found.sources[0].path, None, [(data.analysis, data.found)])
+    if isinstance(data, SimulatedMotion):
+        return data.contents
     if isinstance(data, SimulatedMap):
         return contents_of(data.store)
     try:
         path = data.folder if isinstance(data, Run) else Path(data)
     except TypeError:
-        raise UsageError("data", "a run, a result, a map or a path is expected", value=type(data).__name__) from None
+        raise UsageError(
+            "data", "a run, a result, a motion, a map or a path is expected", value=type(data).__name__
+        ) from None
     return contents_of(path, lambda text: print(unquote(text), file=sys.stderr))  # noqa: T201 - as warnings are

@@ -75,6 +75,7 @@ FIT: Mapping[str, tuple[str, Callable[[FittedModel], Any]]] = MappingProxyType({
     "var_names": ("names of the parameters", lambda of: [*of]),
     "params": ("parameter → quantity", lambda of: of),
     "best_values": ("parameter → number", lambda of: {name: one.n for name, one in of.items()}),
+    "valuesdict": ("a function that returns the same", lambda of: lambda: {name: one.n for name, one in of.items()}),
     "best_fit": ("the curve at the readings, in SI", lambda of: of.eval()),
     "residual": ("reading less curve, in SI; NaN: not used.  lmfit's is divided by u, with the other sign", _residual),
 })  # fmt: skip
@@ -102,6 +103,13 @@ class FittedModel(Named[Quantity]):
     also: ClassVar[Mapping[str, Any]] = {
         **{name: find for name, (_, find) in FIT.items()},
         **{name: _statistic(name) for name in _OWN},
+    }
+
+    instead: ClassVar[Mapping[str, str]] = {
+        "fit_report": "fit_report() of the result",
+        "plot": "plot('fit', model=…) of the result",
+        "pretty_print": "print(….ci_report())",
+        "rsquared": "redchi",
     }
 
     def __init__(self, values: Mapping[str, Quantity], entry: Any, of: Any, number: int | None) -> None:

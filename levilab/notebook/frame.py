@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.errors import UsageError
+from levilab.formats.titles import read_title
 from levilab.present.units import split
 
 if TYPE_CHECKING:
@@ -27,29 +28,33 @@ ARRAYS: dict[str, tuple[str, ...]] = {
 }
 
 
-#: A spin of less than this is none [Hz]: a record of light was meant.
-_LEAST_SPIN_HZ = 1e-3
-#: From this number of tuples on they are readings, (time, frequency) each, and not arrays.
-_FEWEST_PAIRS = 4
+#: A reading of less than this is no spin [Hz], nor are readings that are all below the second: no top floats so slowly.
+_LEAST_HZ, _SLOWEST_HZ = 1e-3, 1.0
+#: Arrays that a table of numbers may have: times, readings and their u.
+_MOST_COLUMNS = 3
 
 
 def frame_of(data: Any, kind: str | None) -> Any:
     """Return numbers in any form as a DataFrame, and all else (runs, paths, several DataFrames) as it is.
 
     Args:
-        data: arrays, alone or in a tuple, also of `uncertainties`; a Series with its index in seconds; an object of
-            xarray; a dictionary of columns; a list of (time, frequency).
+        data: arrays, alone or in a tuple, also of `uncertainties`; a Series or a DataFrame with its index in seconds or
+            dates; an object of xarray; a dictionary of columns; a list of (time, frequency).
         kind: of the analysis, which decides the columns; None: not chosen.
 
     Raises:
         UsageError: they are no numbers, or of unlike lengths.
     """
     names = ARRAYS.get(kind or "", ARRAYS[""])
+    if getattr(getattr(data, "dtype", None), "names", None):  # an array of records
+        data = {name: data[name] for name in data.dtype.names}
     if isinstance(data, Mapping) and not hasattr(data, "coords"):
         return _frame_of_mapping(data)
     if hasattr(data, "coords") and hasattr(data, "to_dataframe"):
         return _frame_of_xarray(data, names)
-    if hasattr(data, "to_frame") and not is_frame(data):
+    if is_frame(data):
+        return _with_index(data, names)
+    if hasattr(data, "to_frame"):
         return _frame_of_series(data, names)
     return frame_of_arrays(data, kind) if are_arrays(data) else data
 
@@ -74,7 +79,7 @@ def kind_of(frame: Any, kind: str | None) -> str | None:
     """Return the analysis of numbers: limits alone say it themselves.
 
     Raises:
-        UsageError: no analysis was chosen, and the frequencies cannot be any.
+        UsageError: no analysis was chosen, and the numbers cannot be times and frequencies.
     """
     if kind is not None or not is_frame(frame) or not len(frame):
         return kind
@@ -82,19 +87,28 @@ def kind_of(frame: Any, kind: str | None) -> str | None:
     if names == [*ARRAYS["limit"][: len(names)]]:
         return "limit"
     if names == [*ARRAYS[""][: len(names)]]:
-        least, most = frame[names[1]].min(), frame[names[1]].max()
-        if least < _LEAST_SPIN_HZ:
-            expected = "spin frequencies above 0 Hz are expected; of a detector's light say so: kind='spin', or light=…"
-            raise UsageError("data", expected, value=f"numbers from {least:.3g} to {most:.3g}")
+        _refuse_what_is_no_spin(*(frame[name] for name in names[:2]))
     return kind
+
+
+def _refuse_what_is_no_spin(time: pd.Series[Any], spin: pd.Series[Any]) -> None:
+    """Raise UsageError where times and frequencies seem to be exchanged, or other quantities."""
+    seen = f"{{}} from {spin.min():.3g} to {spin.max():.3g}"
+    if spin.is_monotonic_increasing and time.is_monotonic_decreasing and len(time) > 2:
+        raise UsageError("data", "times come first: analyze((t, f))", value=seen.format("a second array that rises"))
+    if spin.min() >= _LEAST_HZ and spin.max() >= _SLOWEST_HZ:
+        return
+    of_turns = "times of a turn are inverted first, analyze((t, 1 / T)); " if spin.min() > 0 else ""
+    expected = f"spin frequencies in Hz are expected; {of_turns}of a detector's light say so: kind='spin', or light=…"
+    raise UsageError("data", expected, value=seen.format("numbers"))
 
 
 def frame_of_arrays(data: Any, kind: str | None) -> pd.DataFrame:
     """Return arrays as a DataFrame with the columns of data files.
 
     Args:
-        data: one array or list, shape (n,) or (n, columns); several of one length, as (t, f) or (t, f, u), u a number,
-            too: see `ARRAYS`; or a list of (t, f).
+        data: one array or list, shape (n,), (n, columns) or (columns, n); several of one length, as (t, f) or
+            (t, f, u), u a number, too: see `ARRAYS`; or a list of (t, f).
         kind: of the analysis, which decides what they are.
 
     Raises:
@@ -103,14 +117,8 @@ def frame_of_arrays(data: Any, kind: str | None) -> pd.DataFrame:
     import pandas as pd
 
     names = ARRAYS.get(kind or "", ARRAYS[""])
-    alone = np.ndim(data) == 1 if hasattr(data, "dtype") else all(np.ndim(item) == 0 for item in data)
-    are_many = isinstance(data, list) and len(data) >= _FEWEST_PAIRS
-    are_rows = are_many and all(np.shape(item) in {(2,), (3,)} for item in data)
-    if are_rows or alone:
-        data = _as_array(data)  # a row a reading, or numbers alone
-    if hasattr(data, "dtype"):
-        data = [data] if data.ndim == 1 else data.T  # an array of two dimensions has a row a reading
-    columns = [*map(_as_array, data)]
+    columns = [*map(_as_array, _split_columns(data))]
+    alone = np.ndim(data) == 1 if hasattr(data, "dtype") else not any(map(np.ndim, data))
     long = [one for one in columns if one.ndim]
     columns = [one if one.ndim else np.full(len(long[0]), one) for one in columns]  # one u of all readings
     if {one.ndim for one in columns} != {1} or len({len(one) for one in columns}) > 1:
@@ -125,9 +133,24 @@ def frame_of_arrays(data: Any, kind: str | None) -> pd.DataFrame:
     return pd.DataFrame(dict(zip(names, columns, strict=False)))
 
 
+def _split_columns(data: Any) -> Any:
+    """Return the columns of an array or a list: it may have a row a reading, too, or be one itself."""
+    if not hasattr(data, "dtype"):
+        shapes = {np.shape(item) for item in data}
+        pairs = len(data) > _MOST_COLUMNS or all(isinstance(item, tuple) for item in data) or shapes == {(2,)}
+        if shapes != {()} and not (len(data) >= _MOST_COLUMNS and shapes <= {(2,), (3,)} and pairs):
+            return data
+        data = _as_array(data)
+    if data.ndim != 2:
+        return [data]
+    return data if len(data) <= _MOST_COLUMNS < data.shape[1] else data.T
+
+
 def _as_array(item: Any) -> np.ndarray:
     """Return numbers, or numbers with u, as an array.  Raises UsageError."""
     array = np.asarray(item, dtype=object if _has_u(item) else None)
+    if array.dtype.kind in "mM" and array.size:  # dates, or spans of time
+        array = (array - array.flat[0] if array.dtype.kind == "M" else array) / np.timedelta64(1, "s")
     if not array.size:
         raise UsageError("data", "at least 3 readings are expected", value="an empty array")
     if array.dtype.kind not in "iufbO" or (array.dtype == object and not _has_u(array)):
@@ -166,13 +189,21 @@ def _frame_of_mapping(data: Mapping[Any, Any]) -> pd.DataFrame:
 
 
 def _frame_of_series(data: Any, names: tuple[str, ...]) -> pd.DataFrame:
-    """Return a Series: its index [s], and its values; values alone where the index only counts."""
+    """Return a Series: its index, and its values; values alone where the index only counts."""
     if type(data.index).__name__ == "RangeIndex":
         return frame_of_arrays(data.to_numpy(), None if names == ARRAYS[""] else "limit")
-    index = data.index - data.index[0] if data.index.dtype.kind == "M" else data.index
-    seconds = index.total_seconds() if index.dtype.kind == "m" else index
     titles = data.index.name or names[0], data.name or names[1]
-    return frame_of_arrays((seconds.to_numpy(), data.to_numpy()), "").set_axis([*titles], axis=1)
+    return frame_of_arrays((data.index, data.to_numpy()), "").set_axis([*titles], axis=1)
+
+
+def _with_index(frame: pd.DataFrame, names: tuple[str, ...]) -> pd.DataFrame:
+    """Return a DataFrame whose index is a column: with a name, or where it alone can be the times; else it counts."""
+    if any(name is not None for name in frame.index.names):
+        return frame.reset_index()
+    known = any(read_title(str(title)).column == names[0] for title in frame.columns)
+    if known or frame.index.dtype.kind not in "mMf" or not len(frame):
+        return frame
+    return frame.assign(**{names[0]: _as_array(frame.index)})[[names[0], *frame.columns]]
 
 
 def _frame_of_xarray(data: Any, names: tuple[str, ...]) -> pd.DataFrame:
@@ -191,7 +222,7 @@ def _frame_of_xarray(data: Any, names: tuple[str, ...]) -> pd.DataFrame:
 
 
 def write_frame(frame: pd.DataFrame, path: Path) -> None:
-    """Write a DataFrame as CSV, every number to its last bit; an index with names becomes columns.
+    """Write a DataFrame as CSV, every number to its last bit.
 
     Columns that are numbered, as those of a bare array, are written without titles: a row of numbers would pass for a
     reading.
@@ -203,8 +234,6 @@ def write_frame(frame: pd.DataFrame, path: Path) -> None:
     Raises:
         UsageError: it has no column.
     """
-    if any(name is not None for name in frame.index.names):
-        frame = frame.reset_index()
     if not len(frame.columns):
         raise UsageError("data", "columns as time_s and spin_frequency_hz are expected", value="an empty table")
     numbered = has_numbers_for_titles(frame)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import LevilabError
 from levilab.present.html import table_as_html
 from levilab.present.units import split
+from levilab.report.export.contents import attributes_of, variables_of
 from levilab.software import how_to_install
 
 if TYPE_CHECKING:
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
 
     import pandas as pd
     import xarray
+
+    from levilab.report.export.contents import Contents
 
 
 def head_as_html(frame: pd.DataFrame, rows: int, texts: int = 1) -> str:
@@ -48,16 +51,28 @@ def as_dataset(frame: pd.DataFrame, dimension: str) -> xarray.Dataset:
     return dataset_of(columns, (dimension,)).set_coords({"time_s", "input", dimension} & set(columns))
 
 
-def dataset_of(variables: Mapping[str, Any], dimensions: Sequence[str]) -> xarray.Dataset:
-    """Return arrays over the same dimensions as a Dataset with units.  Raises MissingXarray."""
+def dataset_of_contents(contents: Contents) -> xarray.Dataset:
+    """Return what is exported as xarray reads it from the file.  Raises MissingXarray."""
+    written = {one.name: (one.dimensions, one.values, dict(one.attributes)) for one in variables_of(contents)}
+    data: xarray.Dataset = _import_xarray().decode_cf(_import_xarray().Dataset(written, attrs=attributes_of(contents)))
+    return data
+
+
+def _import_xarray() -> Any:
     try:
         import xarray
     except ImportError:
         advice = f"{how_to_install('xarray')}; to_dataframe() does without"
         raise MissingXarray(f"xarray is not installed: {advice}") from None
+    return xarray
+
+
+def dataset_of(variables: Mapping[str, Any], dimensions: Sequence[str]) -> xarray.Dataset:
+    """Return arrays over the same dimensions as a Dataset with units.  Raises MissingXarray."""
     units = {name: unit.si for name in variables if (unit := split(name.rstrip(".0123456789"))[1])}
     described = {
         name: (tuple(dimensions), values, {"units": units[name]} if name in units else {})
         for name, values in variables.items()
     }
-    return xarray.Dataset(described)
+    data: xarray.Dataset = _import_xarray().Dataset(described)
+    return data

@@ -13,15 +13,17 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+import levilab
 from levilab.animation.request import AnimationRequest, animate, check_request
 from levilab.errors import UsageError
 from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation
 from levilab.motion.summary import as_document
 from levilab.motion.table import headline, print_motion
-from levilab.notebook.labels import as_dataset
+from levilab.notebook.labels import dataset_of_contents
 from levilab.notebook.names import Helpful, bare, meant
 from levilab.notebook.quantity import Named
 from levilab.present.html import facts_as_html
+from levilab.report.export.contents import Contents, table_of
 from levilab.simulator.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -140,7 +142,17 @@ class SimulatedMotion(Helpful, Trajectory):
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the states as a Dataset over time_s, with units; needs xarray.  Raises MissingXarray."""
-        return as_dataset(self.to_dataframe(), "time_s")
+        return dataset_of_contents(self.contents)
+
+    @property
+    def contents(self) -> Contents:
+        """What is exported of it."""
+        name, about = self.scene.name, {"source": "levilab simulate, simulated", "synthetic": "true"}
+        return Contents(name, headline(self._found), (table_of(self.to_dataframe(), "states", "a state"),), about)
+
+    def export(self, output: str | PathLike[str], **options: Any) -> list[Path]:
+        """Write it for other programs; the same as `levilab.export(motion, output, …)`."""
+        return levilab.export(self, output, **options)
 
     @bare
     def plot(

@@ -18,6 +18,8 @@ F = TypeVar("F", bound="Callable[..., Any]")
 _TAKES_ANY = 0x08
 #: Names less alike than this are not what was meant.
 _ALIKE = 0.55
+#: Names that a message lists.
+_MOST_NAMES = 15
 
 
 class NoSuchAttribute(LevilabError, AttributeError):
@@ -32,7 +34,10 @@ def meant(name: str, known: Iterable[str]) -> str:
     """
     names = [*known]
     near = [one for one in names if name in one.split("_")] or get_close_matches(name, names, n=3, cutoff=_ALIKE)
-    return f"did you mean {' or '.join(near)}?" if near else f"known are {', '.join(names)}"
+    if near:
+        return f"did you mean {' or '.join(near)}?"
+    more = f" and {len(names) - _MOST_NAMES} more, which dir() lists" * (len(names) > _MOST_NAMES)
+    return f"known are {', '.join(names[:_MOST_NAMES])}{more}"
 
 
 class _Border:

@@ -81,11 +81,15 @@ class AnalysisResult(Helpful):
     also: ClassVar[Mapping[str, str]] = {
         **{name: f"fit.{name}" for name in (*FIT, *METHODS)},
         "df": "to_dataframe()",
+        "message": "verdict",
         "notes": "warnings",
     }
     instead: ClassVar[Mapping[str, str]] = {
+        "to_csv": "to_dataframe().to_csv(path), or export('result.csv')",
+        "to_netcdf": "export('result.nc')",
         "plot_fit": "plot('fit')",
         "plot_residuals": "plot('residuals')",
+        "rsquared": "redchi",
         "success": "warnings, which has it where a fit did not converge",
     }
 
@@ -378,6 +382,10 @@ class AnalysisResult(Helpful):
     def report(self, output: str | PathLike[str] = "report.html", **options: Any) -> Path:
         """Write its report; the same as `levilab.report(result, output, …)`."""
         return levilab.report(self, output, **options)
+
+    def export(self, output: str | PathLike[str], **options: Any) -> list[Path]:
+        """Write it for other programs; the same as `levilab.export(result, output, …)`."""
+        return levilab.export(self, output, **options)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the readings with their residuals as a Dataset with units, and where they come from; needs xarray.

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
+import levilab
 from levilab.notebook.analysis import analyze_data
-from levilab.notebook.labels import as_dataset
+from levilab.notebook.labels import dataset_of_contents
 from levilab.notebook.names import Helpful, bare, meant
 from levilab.notebook.quantity import NoSuchName
 from levilab.present.html import facts_as_html, table_as_html
-from levilab.report.export.contents import facts_of
+from levilab.report.export.contents import contents_of_results
 from levilab.runs.listing import Listed, list_runs
 from levilab.runs.run import Run
 
@@ -36,9 +37,7 @@ class RecordedRun(Helpful, Run):
         "data": "df",
         "columns": "df.columns",
         "keys": "df.keys",
-        "head": "df.head",
-        "describe": "df.describe",
-        "iloc": "df.iloc",
+        **{name: f"df.{name}" for name in ("head", "tail", "describe", "info", "dtypes", "shape", "loc", "iloc")},
         "metadata": "record",
         "experiment": "record.experiment",
         "note": "record.note",
@@ -65,16 +64,22 @@ class RecordedRun(Helpful, Run):
         """Its readings, as `to_dataframe` returns them."""
         return self.to_dataframe()
 
+    instead: ClassVar[Mapping[str, str]] = {
+        "to_csv": "df.to_csv(path), or export('run.csv')",
+        "to_netcdf": "export('run.nc')",
+    }
+
     @bare
-    def __getitem__(self, column: object) -> pd.Series[Any]:
+    def __getitem__(self, column: object) -> Any:
         frame = self.df
+        if isinstance(column, list | slice):
+            return frame[column]
         if column not in frame:
             advice = (
                 meant(column, map(str, frame.columns)) if isinstance(column, str) else "df.iloc[0] is the first reading"
             )
             raise NoSuchName(str(column), f"is no column of {self.folder.name}; {advice}")
-        series: pd.Series[Any] = frame[column]
-        return series
+        return frame[column]
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.df.columns)
@@ -121,18 +126,26 @@ class RecordedRun(Helpful, Run):
         )
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the readings as a Dataset with units and the attributes of the run's export; needs xarray.
+        """Return readings and traces as a Dataset, as `export` writes them to netCDF; needs xarray.
 
         Raises:
             DataError: the readings cannot be read.
             MissingXarray: it is not installed.
         """
-        return as_dataset(self.df, "reading").assign_attrs(facts_of(self, self.folder))
+        return dataset_of_contents(contents_of_results(self.folder, self, []))
 
     @bare
     def analyze(self, kind: str | None = None, **options: Any) -> AnalysisResult:
         """Analyze it; the same as `levilab.analyze(run, kind, …)`."""
         return analyze_data(self, kind, options)
+
+    def report(self, output: str | PathLike[str] = "report.html", **options: Any) -> Path:
+        """Write its report; the same as `levilab.report(run, output, …)`."""
+        return levilab.report(self, output, **options)
+
+    def export(self, output: str | PathLike[str], **options: Any) -> list[Path]:
+        """Write it for other programs; the same as `levilab.export(run, output, …)`."""
+        return levilab.export(self, output, **options)
 
 
 #: Columns that a notebook's cell shows.
@@ -155,6 +168,8 @@ class RunList(list[RecordedRun]):
         import pandas as pd
 
         return pd.DataFrame([vars(one) for one in self.listed], columns=[*Listed.__dataclass_fields__])
+
+    df = property(to_dataframe)
 
     def _repr_html_(self) -> str:
         """Return the HTML that a notebook shows."""

@@ -88,6 +88,21 @@ class StoredTrace:
     announced: int | None = None
 
     @property
+    def start_s(self) -> float:
+        """Time of its first point, on the clock of the readings: one that was cut short lacks its end."""
+        return self.time_s - (self.announced or self.trace.codes.size) * self.trace.dt_s
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """Times of its points [s], on the clock of the readings."""
+        return np.asarray(self.start_s + self.trace.dt_s * np.arange(self.trace.codes.size), dtype=np.float64)
+
+    @property
+    def volts(self) -> NDArray[np.float64]:
+        """Its points [V]."""
+        return np.asarray(self.trace.volts, dtype=np.float64)
+
+    @property
     def how_short(self) -> str:
         """The part of an incomplete record that there is, as text; empty where it is whole."""
         if self.announced is None:

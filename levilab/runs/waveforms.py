@@ -44,14 +44,12 @@ def _waveform(run: Run, stored: StoredTrace) -> Waveform:
     def read(_: int) -> Iterator[Array]:
         yield np.asarray(trace.volts, dtype=np.float64)
 
-    count = len(trace.codes)
     return Waveform(
         path=run.folder / INDEX,
         format=f"record {stored.number}",
-        start=stored.time_s
-        - (stored.announced or count) * trace.dt_s,  # one that was cut short on its way lacks its end
+        start=stored.start_s,
         step=trace.dt_s,
-        count=count,
+        count=len(trace.codes),
         signals=(Signal(stored.channel),),
         read=read,
         warnings=(f"{run.folder.name}: record {stored.number} {stored.how_short}",) if stored.announced else (),

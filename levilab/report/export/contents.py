@@ -196,12 +196,23 @@ def _readings(run: Run | None) -> Iterator[Table]:
     if run is None or not any((run.folder / name).exists() for name in (READINGS, STATES)):
         return
     described = {one["name"]: one for one in run.record.channels if "name" in one}
-    frame = run.to_dataframe()
+    yield table_of(run.to_dataframe(), "readings", "a reading", described)
+
+
+def table_of(frame: Any, name: str, about: str, described: Mapping[str, Mapping[str, str]] | None = None) -> Table:
+    """Return a DataFrame as a table.
+
+    Args:
+        frame: columns with the unit in their names.
+        name: of the table.
+        about: what a row is.
+        described: unit and source of columns by their names.
+    """
     columns = []
-    for name in map(str, frame):
-        unit, source = (described.get(name, {}).get(key, "") for key in ("unit", "source"))
-        columns.append(Column(name, frame[name].to_numpy(), unit or unit_of_name(name), _meaning(name), source))
-    yield Table("readings", tuple(columns), "a reading")
+    for title in map(str, frame):
+        unit, source = ((described or {}).get(title, {}).get(key, "") for key in ("unit", "source"))
+        columns.append(Column(title, frame[title].to_numpy(), unit or unit_of_name(title), _meaning(title), source))
+    return Table(name, tuple(columns), about)
 
 
 def _of_analysis(result: tuple[Analysis[Any], Any]) -> Table:

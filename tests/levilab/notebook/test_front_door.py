@@ -266,11 +266,45 @@ def test_numbered_columns_lose_no_row(tmp_path: Path) -> None:
     assert len((tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()) == 8
 
 
-def test_an_index_with_a_name_and_odd_titles_become_columns(tmp_path: Path) -> None:
-    write_frame(spin_down().set_index("time_s").rename(columns=lambda _: 'ν,\n"x"'), tmp_path / "a.csv")
-    back = pd.read_csv(tmp_path / "a.csv")
-    assert list(back.columns) == ["time_s", 'ν, "x"']
-    assert back["time_s"].tolist() == spin_down()["time_s"].tolist()
+def test_odd_titles_become_columns(tmp_path: Path) -> None:
+    write_frame(spin_down().rename(columns={"spin_frequency_hz": 'ν,\n"x"'}), tmp_path / "a.csv")
+    assert list(pd.read_csv(tmp_path / "a.csv").columns) == ["time_s", 'ν, "x"']
+
+
+def dates(frame: pd.DataFrame) -> Any:
+    return pd.Timestamp("2026-11-28 10:00") + pd.to_timedelta(frame["time_s"], unit="s")
+
+
+#: Forms that numbers come in.
+FORMS: dict[str, Callable[[pd.DataFrame], Any]] = {
+    "index with a name": lambda frame: frame.set_index("time_s"),
+    "dates": lambda frame: frame.drop(columns="time_s").set_axis(pd.DatetimeIndex(dates(frame))),
+    "spans of time": lambda frame: frame.drop(columns="time_s").set_axis(pd.to_timedelta(frame["time_s"].array, "s")),
+    "seconds": lambda frame: frame.drop(columns="time_s").set_axis(frame["time_s"].array),
+    "dates that only label": lambda frame: frame.set_axis(pd.date_range("2026-01-01", periods=len(frame))),
+    "rows that were left out": lambda frame: frame.set_axis([*range(10, 10 + len(frame))]),
+    "arrays": lambda frame: (frame["time_s"].to_numpy(), frame["spin_frequency_hz"].to_numpy()),
+    "dates and an array": lambda frame: (dates(frame).to_numpy(), frame["spin_frequency_hz"].to_numpy()),
+    "rows of readings": lambda frame: frame.to_numpy(),
+    "a row a quantity": lambda frame: frame.to_numpy().T,
+    "pairs": lambda frame: list(frame.itertuples(index=False, name=None)),
+    "records": lambda frame: frame.to_records(index=False),
+    "a Series over dates": lambda frame: frame.set_index(pd.DatetimeIndex(dates(frame)))["spin_frequency_hz"],
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_numbers_in_any_form_are_the_same_readings(form: str) -> None:
+    expected = levilab.analyze(spin_down()).data
+    found = levilab.analyze(FORMS[form](spin_down())).data
+    assert found["time_s"].to_numpy() == pytest.approx(expected["time_s"].to_numpy(), abs=1e-6)  # dates have 1 µs
+    assert found["spin_frequency_hz"].tolist() == expected["spin_frequency_hz"].tolist()
+
+
+def test_two_arrays_need_no_brackets() -> None:
+    frame = spin_down()
+    found = levilab.analyze(frame["time_s"].tolist(), frame["spin_frequency_hz"].tolist())
+    assert found.values == levilab.analyze((frame["time_s"], frame["spin_frequency_hz"])).values
 
 
 # --- wrong calls ---
@@ -285,7 +319,10 @@ WRONG: dict[str, tuple[Callable[[], Any], str | type[levilab.LevilabError]]] = {
     "several suit": (lambda: levilab.analyze(SAMPLE_DATA), "kind"),
     "no such kind": (lambda: levilab.analyze(spin_down(), "spin-down"), "kind"),
     "no such data": (lambda: levilab.analyze(5), "data"),
-    "two lists": (lambda: levilab.analyze([0, 1, 2], [3, 4, 5]), "kind"),  # type: ignore[arg-type]
+    "frequencies before times": (lambda: levilab.analyze(([9.0, 7.0, 6.0], [1, 2, 3])), "data"),
+    "times of a turn": (lambda: levilab.analyze(([1, 2, 3], [0.02, 0.03, 0.04])), "data"),
+    "a result": (lambda: levilab.analyze(levilab.analyze(spin_down())), "data"),
+    "a kind that is no text": (lambda: levilab.analyze(spin_down(), 5), "kind"),  # type: ignore[arg-type]
     "no equal columns": (lambda: levilab.analyze({"time_s": [0.0, 1.0], "spin_frequency_hz": [40.0]}), "data"),
     "nothing": (lambda: levilab.analyze([]), "data"),
     "no columns": (lambda: levilab.analyze(pd.DataFrame()), "data"),
@@ -322,7 +359,9 @@ def test_a_wrong_call_names_the_argument_or_the_kind_of_failure(case: str) -> No
 
 
 @pytest.mark.parametrize(("call", "said"), [
-    (lambda: levilab.analyze([0, 1, 2], [3, 4, 5]), r"^kind = \[3, 4, 5\]: .*analyze\(\(\[…\], \[…\]\)\)"),
+    (lambda: levilab.analyze(([9.0, 7.0, 6.0], [1, 2, 3])), r"from 1 to 3: times come first: analyze\(\(t, f\)\)"),
+    (lambda: levilab.analyze(([1, 2, 3], [0.02, 0.03, 0.04])), r"inverted first, analyze\(\(t, 1 / T\)\)"),
+    (lambda: levilab.analyze(levilab.analyze(spin_down())), "^data = a result: .* give what it was made of"),
     (lambda: levilab.analyze(([0, 1], [40, 39])), "^the data: holds 2 readings, at least 3"),
     (lambda: levilab.load("nowhere"), "^nowhere: there is no such file or folder in .*levilab runs lists"),
     (lambda: levilab.analyze(levilab), "^data = the module levilab: a run,"),
