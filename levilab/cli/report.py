@@ -48,6 +48,7 @@ def report(
 
     app, heading = context.find_root().command, Heading(**{one.name: given.pop(one.name) for one in HEADING})
     place = place_of_report(out)
+    message("making the report; what has no result yet is analyzed for it")
     with interruptible("no report is written"):
         written = write_report(
             paths or (),

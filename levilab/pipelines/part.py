@@ -67,9 +67,9 @@ class ReportPart:
         lead: how much was used.
         result: what follows its text: numbers with their uncertainties, what they mean, the models compared.
         figure: its words.
-        runs_title: of the section with `runs`.
-        runs: what belongs to each run rather than to all.
         inputs: one by one.
+        runs_title: of the section with `runs`.
+        runs: what belongs to each run rather than to all; none: there is no such section.
     """
 
     subject: str
@@ -77,9 +77,9 @@ class ReportPart:
     lead: str
     result: tuple[Block, ...]
     figure: FigureText
-    runs_title: str
-    runs: tuple[Block, ...]
     inputs: tuple[InputPart, ...]
+    runs_title: str = ""
+    runs: tuple[Block, ...] = ()
 
 
 def first_of(shown: int, count: int) -> str:

@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 
     Results = Sequence[tuple[Analysis[Any], Any]]
 
-#: With more inputs the report is an overview: facts that all share stand there once, the section of each can be opened,
-#: and the figure is a PNG, a tenth as large as an SVG of so many lines.
+#: With more inputs the report is an overview: the section of each can be opened, and the figure is a PNG, a tenth as
+#: large as an SVG of so many lines.
 MOST_IN_FULL = 12
 
 
@@ -113,7 +113,7 @@ def blocks_of_part(
     ]
     if not asked.short:
         blocks += [_budget(analysis, found), *_trials(analysis, found, made=asked.crosscheck)]
-        blocks.append(section(part.runs_title, "runs", *part.runs))
+        blocks += [section(part.runs_title, "runs", *part.runs)] if part.runs else []
     return with_marks(blocks, mark_of(found.sources))
 
 
@@ -200,18 +200,18 @@ def _measurements(results: Results, parts: Sequence[ReportPart]) -> Section:
         for source, of_input in zip(found.sources, part.inputs, strict=True):
             abouts.setdefault(source.path.resolve(), []).append(About(source, part, of_input, several))
     inputs = [describe(of_input) for of_input in abouts.values()]
-    title, anchor = "What was measured, and with what", "inputs"
-    if len(inputs) <= MOST_IN_FULL:
-        return Section(title, tuple(one.section() for one in inputs), anchor=anchor)
-    return Section(title, tuple(_overview(inputs)), anchor=anchor)
+    return Section("What was measured, and with what", tuple(_overview(inputs)), anchor="inputs")
 
 
 def _overview(inputs: Sequence[Input]) -> Iterable[Block]:
-    """Return many inputs: what they share once, and the rest folded away."""
-    common = in_common(inputs)
+    """Return the inputs: what several share once, and the rest of each, of many folded away."""
+    common = in_common(inputs) if len(inputs) > 1 else ()
     if common:
         yield Section("All of them alike", (Facts(common),))
-    yield Section("Each by itself", tuple(one.without(common).fold() for one in inputs))
+    if len(inputs) > MOST_IN_FULL:
+        yield Section("Each by itself", tuple(one.without(common).fold() for one in inputs))
+    else:
+        yield from (one.without(common).section() for one in inputs)
 
 
 # --- what is synthetic ---------------------------------------------------------------------------------

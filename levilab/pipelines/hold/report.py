@@ -89,8 +89,6 @@ def hold_part(analysis: HoldAnalysis) -> ReportPart:
             alt="Drag against spin, with the drag laws",
             points=points_of(analysis, _points, "readings", *(["ratios"] if analysis.combined.best else [])),
         ),
-        runs_title="",
-        runs=(),
         inputs=input_parts(analysis, _in_words, lambda *_: (), text_of),
     )  # fmt: skip
 

@@ -530,8 +530,8 @@ def _run_by_run(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
     combined = analysis.combined
     best = combined.best + " law" + (", the best" if combined.verdict.decided else "")
     paper = (
-        "Unweighted straight lines as one draws them on paper (ln ω, 1/ω, ω^−½ against time), and beside them the fit "
-        f"of the {best}."
+        f"The fit of the {best}, and beside it unweighted straight lines as one draws them on paper (ln ω, 1/ω, ω^−½ "
+        "against time)."
     )
     several = " s: standard deviation of one run's constant from another's; the uncertainty of the mean is s/√N."
     note = f"ν₀: the spin at the first reading.{several if len(analysis.runs) > 1 else ''}"
@@ -591,18 +591,18 @@ def _by_run_table(analysis: SpinDownAnalysis) -> Table:
 
 
 def _columns(analysis: SpinDownAnalysis) -> list[_Column]:
-    """Return the straight lines' constants and those of the best law's fit."""
+    """Return the constants of the best law's fit, those of the straight lines, and when each run was."""
     combined = analysis.combined
-    columns = [_Column(one.head, one.show_all(analysis.runs)) for one in OF_RUN]
+    best = combined.fit(combined.best)
+    fits = [run.fit(best.name).parameters for run in analysis.runs]
+    starts = tuple(fit["start_frequency"] for fit in fits)
+    columns = _of_law(f"{best.name} fit", best.constants, fits)
+    columns.append(_Column(_head_of(f"{best.name} fit", "start_frequency", starts[0].unit), starts))
     for law in combined.fits:
         if law.linearised:
             lines = [run.fit(law.name).linearised or {} for run in analysis.runs]
             columns += _of_law(f"{STRAIGHT_LINES[law.name].quantity} against t", law.linearised, lines)
-    best = combined.fit(combined.best)
-    fits = [run.fit(best.name).parameters for run in analysis.runs]
-    starts = tuple(fit["start_frequency"] for fit in fits)
-    columns.append(_Column(_head_of(f"{best.name} fit", "start_frequency", starts[0].unit), starts))
-    return columns + _of_law(f"{best.name} fit", best.constants, fits)
+    return columns + [_Column(one.head, one.show_all(analysis.runs)) for one in OF_RUN]
 
 
 def _of_law(of: str, means: Mapping[str, Mean], runs: Sequence[Mapping[str, Estimate]]) -> list[_Column]:

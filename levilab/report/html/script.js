@@ -87,14 +87,12 @@
     }
   }
 
-  // Whole at first, then as wide as its texts can be read, where that is wider than the page, and moved sideways; then
-  // a part of it as large as the whole, by the box of the drawing that is seen.
+  // A part of it as large as the whole, by the box of the drawing that is seen.
   function allowZoom(figure, svg) {
     const whole = svg.viewBox.baseVal;
     const [left, top, width, height] = [whole.x, whole.y, whole.width, whole.height];
     const view = { x: left, y: top, scale: 1 };
     const card = figure.querySelector(".card");
-    card.classList.add("whole");
     const set = (x, y, scale) => {
       view.scale = Math.max(1, Math.min(scale, 16));
       const [w, h] = [width / view.scale, height / view.scale];
@@ -104,17 +102,10 @@
       card.classList.toggle("zoomed", view.scale > 1);
     };
     const times = (factor) => {
-      if (card.classList.contains("whole") && factor > 1) {
-        card.classList.remove("whole");
-        if (card.scrollWidth > card.clientWidth) return;
-      } else if (view.scale === 1 && factor < 1) card.classList.add("whole");
       const [w, h] = [width / view.scale, height / view.scale];
       set(view.x + (w - w / factor) / 2, view.y + (h - h / factor) / 2, view.scale * factor);
     };
-    const showWhole = () => {
-      card.classList.add("whole");
-      set(left, top, 1);
-    };
+    const showWhole = () => set(left, top, 1);
     const bar = document.createElement("div");
     bar.className = "zoom";
     const buttons = [["+", "Enlarge", () => times(2)], ["−", "Reduce", () => times(0.5)], ["⟲", "Whole", showWhole]];

@@ -178,7 +178,7 @@ def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levila
 def test_a_result_that_is_damaged_ends_the_report_with_one_line(levilab, tmp_path):
     path = spin_down_csv(tmp_path / "my.csv")
     (tmp_path / "my.csv.result.json").write_text("{", encoding="utf-8")
-    (line,) = levilab("report", path, check=1).stderr.splitlines()
+    *_, line = levilab("report", path, check=1).stderr.splitlines()
     assert line.startswith(f"levilab: {tmp_path / 'my.csv.result.json'}: is cut off")
 
 
