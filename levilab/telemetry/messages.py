@@ -128,6 +128,7 @@ class State:
         probe_m: height of the magnetometer's probe above the base; None: in its chamber, or not known [m].
         busy: on a bench for practice, whether a run is being recorded.
         took_hold, tuned_up: there, whether a top was seen to follow the drive yet, and to follow it up.
+        goal_hz: there, the frequency at which the drive is, or to which it goes [Hz].
         what_if: there, name → value of what a person can change of the top and its surroundings.
         task, task_share: there, the task under way, and the part of the way to its goal.
         seed: there, which draws the top, the base and the noise of the light.
@@ -158,6 +159,7 @@ class State:
     busy: bool = False
     took_hold: bool = False
     tuned_up: bool = False
+    goal_hz: float | None = None
     what_if: dict[str, float] = field(default_factory=dict)
     task: str = ""
     task_share: float = 0.0

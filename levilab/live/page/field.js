@@ -22,8 +22,8 @@ export function numberField(id, take, mayBeEmpty = false) {
       refuse("");
       if (mayBeEmpty) take(NaN);
     } else if (!Number.isFinite(value) || (whole !== undefined && !Number.isInteger(value))) {
-      refuse(phrase(whole === undefined ? "a number from {min} to {max}, not {seen}" : "a whole number from {min} to {max}, not {seen}", {min, max, seen}));
-    } else if (value < Number(min) || value > Number(max)) refuse(phrase("from {min} to {max}, not {seen}", {min, max, seen}));
+      refuse(phrase(whole === undefined ? "a number from {min} to {max}, not {seen}" : "a whole number from {min} to {max}, not {seen}", {min: local(min), max: local(max), seen}));
+    } else if (value < Number(min) || value > Number(max)) refuse(phrase("from {min} to {max}, not {seen}", {min: local(min), max: local(max), seen}));
     else {
       refuse("");
       field.value = local(String(value));
@@ -48,7 +48,7 @@ export function numberField(id, take, mayBeEmpty = false) {
     });
   }
   return {
-    stepBy,
+    stepBy, refuse,
     /** Show a number that comes from elsewhere; what is refused stays until a person corrects it. */
     show(value) {
       if (field.getAttribute("aria-invalid") === "true" || document.activeElement === field) return;

@@ -4,6 +4,8 @@ import {numberField} from "./field.js";
 import {showResult} from "./result.js";
 import {by, fixed, lapse, local, make, option, phrase, put, short, write} from "./words.js";
 
+/** What the fields of the drive set. */
+const KEYS = {frequency: "frequency_hz", amplitude: "amplitude_vpp"};
 /** Least time between two messages of a slider [ms]. */
 const SENDS_EVERY_MS = 120;
 
@@ -28,17 +30,21 @@ export function openPractice(about, command, run, isOwn, allowed) {
   put(by("controls"), {disabled: true});  // until the bench is there
   if (!allowed) write("said", phrase("This page may only look: open the address that the terminal shows."));
 
-  async function send(what, values = {}) {
+  /** @param field {refuse} that has the values: what is wrong stands beside it; without one below the controls. */
+  async function send(what, values = {}, field = null) {
     if (allowed) write("said", "");  // and not later: what the bench says may come before the answer
     const wrong = await command({do: what, ...values});
-    if (allowed && wrong) write("said", wrong);
+    if (!allowed || !wrong) return;
+    write("said", field ? "" : wrong);
+    field?.refuse(wrong);
   }
 
   /** What the bench says: a refusal, or a line for the person at it. */
   function hear({kind, text, status}) {
     now.ended ||= kind === "ended";
     if (allowed && (kind === "done" || kind === "recording")) write("said", "");
-    if (allowed && (kind === "refused" || kind === "ended" || (kind === "recorded" && status === "failed"))) write("said", text);
+    const stands = [...document.querySelectorAll(".wrong")].some(({textContent}) => textContent === text);
+    if (allowed && !stands && (kind === "refused" || kind === "ended" || (kind === "recorded" && status === "failed"))) write("said", text);
   }
 
   let timer = 0, latest = null;
@@ -50,9 +56,10 @@ export function openPractice(about, command, run, isOwn, allowed) {
     const values = latest;
     clearTimeout(timer);
     [timer, latest] = [0, null];
-    return values && !now.busy ? send("tune the drive", values) : undefined;
+    if (!values || now.busy) return undefined;
+    return send("tune the drive", values, fields[Object.keys(KEYS).find((id) => KEYS[id] in values)]);
   }
-  const fields = Object.fromEntries([["frequency", "frequency_hz"], ["amplitude", "amplitude_vpp"]].map(([id, key]) => {
+  const fields = Object.fromEntries(Object.entries(KEYS).map(([id, key]) => {
     const slider = by(`${id}-slider`);
     const field = numberField(id, (value) => {  // a value between the steps of the slider is as good: the drive takes any
       slider.value = String(value);
@@ -72,7 +79,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
       },
     }];
   }));
-  const seed = numberField("seed", (value) => send("take a seed", {seed: Number.isFinite(value) ? value : null}), true);
+  const seed = numberField("seed", (value) => send("take a seed", {seed: Number.isFinite(value) ? value : null}, seed), true);
 
   const does = {
     drive: () => send("switch the drive", {on: !now.drive}),
@@ -196,13 +203,14 @@ export function openPractice(about, command, run, isOwn, allowed) {
     shownTask = bench.task;
     if (!row) return;
     reached = "";
+    write("answers-wrong", "");
     write("task-title", phrase(row.title));
     write("task-does", phrase(row.does));
     const answers = Object.entries(row.answers);
     put(by("task-share"), {hidden: answers.length > 0});
     by("answers").replaceChildren(...answers.map(([text, value]) => {
       const button = make("button", text);
-      button.addEventListener("click", () => send("answer", {value}));
+      button.addEventListener("click", () => send("answer", {value}, {refuse: (why) => write("answers-wrong", why)}));
       return button;
     }));
   }
@@ -255,8 +263,10 @@ export function openPractice(about, command, run, isOwn, allowed) {
     for (const part of ["what-if", "tasks", "offer"]) put(by(part), {inert: now.busy || !allowed});
     put(by("analyze"), {disabled: now.busy || !readings || about_run?.status === "running"});
     if (drive) {
-      fields.frequency.follow(drive.frequency_hz);
+      const goal = bench.goal_hz ?? drive.frequency_hz, moves = drive.output && Math.abs(goal - drive.frequency_hz) >= 0.01;
+      fields.frequency.follow(goal);
       fields.amplitude.follow(drive.amplitude_vpp);
+      write("frequency-now", moves ? phrase("now {value}", {value: fixed(drive.frequency_hz, 2)}) : "");
     }
     if (bench.speed && bench.speed !== now.speed) {
       choose(by("speed"), now.speed = bench.speed);

@@ -100,6 +100,11 @@ class PracticeDrive:
         return float(self.generator.last_set.get("frequency_hz", 0.0))
 
     @property
+    def goal_hz(self) -> float:
+        """The frequency as a person set it: where it is, or goes [Hz]."""
+        return self._set.frequency_hz
+
+    @property
     def output_hz(self) -> float | None:
         """The frequency on the terminals [Hz]; None while the output is off."""
         return self.frequency if self.bench and self._set.output else None

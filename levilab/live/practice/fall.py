@@ -68,16 +68,15 @@ def cause_of_fall(
         return Text("it fell{after}, before its spin was counted", after=after)
     fell = Text("it fell at {spin:.1f} Hz{after}", spin=spin_hz, after=after)
     if spin_hz < _NEAR_LOW * low:
-        held = ", held down there by its drive" if driven else ""
         across, along = scene.top.moment_tilt
         tilt = math.degrees(math.atan2(across, along))
-        leans = Text(", and this one, whose moment is tilted by {tilt:.1f}°, leans more and more before", tilt=tilt)
+        leans = Text(", but the moment of this one is tilted by {tilt:.1f}°, and it leans ever more before", tilt=tilt)
         return Text(
-            "below {low:.1f} Hz the spin cannot hold an upright top{leans}: {fell}{held}",
+            "{fell}{held}: the spin holds an upright top down to {low:.1f} Hz{leans}",
+            fell=fell,
+            held=", where its drive held it" if driven else "",
             low=low,
             leans=leans if tilt else "",
-            fell=fell,
-            held=held,
         )
     if spin_hz > _NEAR_HIGH * high:
         return Text(

@@ -49,9 +49,6 @@ if TYPE_CHECKING:
 
 #: Experiments for which a top has to be up when they begin; for `limit` the virtual person puts one back.
 NEED_A_TOP = frozenset({"spin", "precession", "trace"})
-#: How fast the bench's time passes once a run is over, if it was faster: while it is analyzed nothing moves that is
-#: worth a processor [seconds of the bench in one of the wall].
-AFTER_A_RUN = 1.0
 #: Commands that are carried out while a run is recorded, too.
 ALWAYS = (ask.SetSpeed, ask.Pause, ask.StopRun)
 #: Failures of a run after which a person can do this here: there is no bench file, and the settings are the page's.
@@ -144,7 +141,6 @@ class PracticeProcess:
         self._number: int | None = None  # of the command that wanted it
         self._stopped = ""  # why the run that is recorded is to end
         self._over = False
-        self._looking = False  # whether `look` is under way: its work may wait, too
         self._paused = False  # by a person
         self._is_ready = False  # whether the instruments have answered
         self._acts: dict[type[Any], Callable[[Any], None]] = {
@@ -244,10 +240,7 @@ class PracticeProcess:
 
     def look(self) -> None:
         """Carry out commands, move the drive, serve the views; the clock calls this while time passes."""
-        if self._looking:
-            return
-        self._looking = True
-        self.clock.paused = False  # an instrument that obeys takes its time, in which nothing would end a pause
+        self.clock.meanwhile = None  # an instrument that obeys takes its time, in a pause, too
         try:
             self._read_commands()
             self._look_meanwhile()
@@ -255,7 +248,7 @@ class PracticeProcess:
             self._publish()
             self._rest()
         finally:
-            self._looking = False
+            self.clock.meanwhile = self.look
 
     def _look_meanwhile(self) -> None:
         """See whether the top has fallen while a run is recorded."""
@@ -283,7 +276,7 @@ class PracticeProcess:
         """End all: a run is kept, and time passes at once."""
         self._over = True
         self._stop(why)
-        self.clock.speed, self.clock.paused = math.inf, False  # and `_rest` leaves it so
+        self.clock.speed = math.inf
 
     def _stop(self, why: str) -> None:
         """End the run that is recorded, also one that has not begun."""
@@ -324,7 +317,8 @@ class PracticeProcess:
         seen = {"spin_frequency_hz": self._spin, "flux_density_t": self._field}
         here |= {"last": {name: value for name, value in seen.items() if value is not None}, "count": self._count}
         counting = counting_of(drive.bench) if drive.bench else None
-        return State(self.clock.now(), text=self._voice.text, drive=drive.state(), counting=counting, **here)
+        here |= {"counting": counting, "goal_hz": drive.goal_hz}
+        return State(self.clock.now(), text=self._voice.text, drive=drive.state(), **here)
 
     # --- commands: each may raise CommandRefused or InstrumentError ---
 
@@ -354,12 +348,19 @@ class PracticeProcess:
         self.tasks.begin(command.task)
         if hides := self.tasks.hidden:
             self.top.hide(hides)
+        if command.task:
+            self.drive.switch(None, on=False)
         if hides or (command.task and not self.top.floats()):
             self.top.put_back()
 
     def _answer_task(self, command: ask.AnswerTask) -> None:
-        self.tasks.check(command.value)
-        self._look_at_task(command.value)
+        if self.tasks.is_right(command.value):
+            self._look_at_task(command.value)
+            return
+        self._begin_task(ask.BeginTask(task=self.tasks.name))  # else the third guess would be right
+        raise CommandRefused(
+            Text("n = {value:g} is not it: now a top floats in other air, so record once more", value=command.value)
+        )
 
     # --- runs ---
 
@@ -388,13 +389,11 @@ class PracticeProcess:
         else:
             text = Text("{status}: {count} readings", status=run.status, count=run.count())
             status, folder = run.status, str(run.folder)
+            self.tasks.take_run(run.record.experiment)
         scene = self.top.scene.as_table()
         self._voice.report("recorded", text, self._number, status=status, folder=folder, scene=scene)
         if self._fell and not self.top.floats():
             self._voice.say(self._fell)
-        if AFTER_A_RUN < self.clock.speed < math.inf:
-            self.clock.speed = AFTER_A_RUN
-            self._voice.message(Text("the run is over: speed {speed:g}\u00a0× again", speed=AFTER_A_RUN))
 
     @contextlib.contextmanager
     def _watching(self, session: Session[Any], wiring: Wiring) -> Iterator[Callable[[], None]]:

@@ -110,9 +110,9 @@ TASKS: dict[str, Task] = {
         "frequency", lambda look: look.is_held and (look.spin_hz or 0.0) >= 57.0,
     ),
     "guess": Task(
-        "Guess n", "The drag goes as ω to the n. Watch the top slow down in air of another kind, and say n.",
+        "Find n", "The drag goes as ω to the n. Record a spin-down in this air of another kind, analyze it, and say n.",
         "with n = 1 the spin halves in equal times; the higher n, the more the curve flattens; a fit tells best",
-        "answers", lambda look: look.answer is not None, hidden=_law,
+        "record", lambda look: look.answer is not None, hidden=_law,
         answers={"n = 1": 1.0, "n = 3/2": 1.5, "n = 2": 2.0},
     ),
 }  # fmt: skip
@@ -125,6 +125,7 @@ class Tasks:
         name: of the task under way, in TASKS; empty: none.
         share: the part of the way to its goal, from 0 to 1.
         done: names of those that were reached, in order.
+        is_measured: whether a spin-down was recorded since it began.
 
     Args:
         seed: of the random numbers that hide what is hidden.
@@ -132,7 +133,7 @@ class Tasks:
 
     def __init__(self, seed: int) -> None:
         self._random, self._chance = np.random.default_rng(seed), 0.0
-        self.name, self.share, self.done = "", 0.0, list[str]()
+        self.name, self.share, self.done, self.is_measured = "", 0.0, list[str](), False
         self._since: float | None = None  # when the goal was there first, without a break, bench time [s]
 
     @property
@@ -147,15 +148,19 @@ class Tasks:
                 Text("{name}: one of {known} is expected", name=f"task = {name}", known=", ".join(TASKS))
             )
         self.name, self.share, self._since, self._chance = name, 0.0, None, float(self._random.uniform())
+        self.is_measured = False
 
-    def check(self, answer: float) -> None:
-        """Raise CommandRefused where an answer is wrong, or none is asked."""
+    def take_run(self, experiment: str) -> None:
+        """Note that a run of an experiment was recorded."""
+        self.is_measured |= experiment == "spin"
+
+    def is_right(self, answer: float) -> bool:
+        """Return whether an answer is right.  Raises CommandRefused where none is asked, or it would be a guess."""
         if not self.name or not TASKS[self.name].answers:
             raise CommandRefused("no task asks for an answer: begin one that does")
-        if answer != exponent_of(self._chance):
-            raise CommandRefused(
-                Text("n = {value:g} is not it: put the top back, and watch it once more", value=answer)
-            )
+        if not self.is_measured:
+            raise CommandRefused("that would be a guess: first record a spin-down of this top, and analyze it")
+        return answer == exponent_of(self._chance)
 
     def look(self, look: Look) -> Task | None:
         """Return the task under way if its goal is reached at a moment."""
