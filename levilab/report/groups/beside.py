@@ -14,7 +14,8 @@ from analysis.spindown.drag import LAWS
 from analysis.uncertainty import Estimate
 from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import unquote
-from levilab.present.numbers import enumeration, plain, with_uncertainty
+from levilab.pipelines.sources import Doubt
+from levilab.present.numbers import enumeration, plain, with_sign, with_uncertainty
 from levilab.present.units import unit
 
 if TYPE_CHECKING:
@@ -37,12 +38,14 @@ class Group:
         statistics: of the model; empty where the analysis has none.
         best_model: the law that describes its readings best; empty where no laws compete.
         warnings: about it.
+        doubts: those of them that make its numbers worthless where they are right.
     """
 
     source: Source[Any]
     statistics: Mapping[str, Any]
     best_model: str
     warnings: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,15 @@ class Compared:
         """Return a number in the unit that people read."""
         text, factor = unit(self.unit).shown
         return None if value is None else Estimate(value * factor, None if u is None else u * factor, text)
+
+    @property
+    def truth(self) -> tuple[float, float] | None:
+        """The mean of the truths, and the distance of the class's mean from it in u; None where one is not known."""
+        known = [truth for one, truth in zip(self.estimates, self.truths, strict=True) if one]
+        if self.together is None or None in known:
+            return None
+        mean = sum(known) / len(known)  # type: ignore[arg-type]
+        return mean, (self.together.mean - mean) / self.together.u
 
     @property
     def from_class(self) -> tuple[float | None, ...]:
@@ -128,9 +140,16 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
     laws = Counter(one.model for one in truths if one.model)
     model = max(laws, key=lambda law: laws[law], default="") or document.get("best_model", "")
     parts = document["runs"]
+    said = [(*source.warnings, *found.about_run(run)) for source, run in zip(found.sources, found.runs, strict=True)]
     groups = tuple(
-        Group(source, _model(part, model).get("statistics", {}), part.get("best_model", ""), _warnings(part))
-        for source, part in zip(found.sources, parts, strict=True)
+        Group(
+            source,
+            _model(part, model).get("statistics", {}),
+            part.get("best_model", ""),
+            tuple(map(_plain, texts)),
+            tuple(_plain(text) for text in texts if isinstance(text, Doubt)),
+        )
+        for source, part, texts in zip(found.sources, parts, said, strict=True)
     )
     names = analysis.compared or (_constants(document, model) if parts[0]["models"] else []) or _common(parts)
     quantities = (_quantity(name, analysis, model, parts, truths) for name in (*names, *more))
@@ -160,8 +179,9 @@ def _common(parts: Sequence[Mapping[str, Any]]) -> list[str]:
     return [name for name in first if all(name in other for other in others)][:_MOST_QUANTITIES]
 
 
-def _warnings(part: Mapping[str, Any]) -> tuple[str, ...]:
-    return tuple(map(unquote, part["warnings"]))
+def _plain(text: str) -> str:
+    """Return a message without backquotes, which stand for a terminal's bold letters."""
+    return unquote(text).replace("`", "")
 
 
 def _has_u(value: Mapping[str, Any]) -> bool:
@@ -199,6 +219,54 @@ def _width(freedom: float | None) -> float:
     return 1.0 if freedom is None else math.sqrt(max(freedom, 3.0) / (max(freedom, 3.0) - 2.0))
 
 
+#: Distance in u beyond which a value is far off: one in four hundred is by chance.
+FAR = 3.0
+GOOD, LOOK, REPEAT = "good", "look", "repeat"
+
+
+@dataclass(frozen=True)
+class Mark:
+    """What a teacher does about a group.
+
+    Attributes:
+        word: GOOD; LOOK: there is something to know about it; REPEAT: its result is wrong or missing.
+        why: the reasons, the worst first.
+    """
+
+    word: str
+    why: tuple[str, ...]
+
+
+def marks(of: Class) -> tuple[Mark, ...]:
+    """Return the mark of each group."""
+    return tuple(_mark(of, k) for k in range(len(of.groups)))
+
+
+def _mark(of: Class, k: int) -> Mark:
+    group, wrong, odd = of.groups[k], [], []
+    for one in of.quantities:
+        truth, others = one.from_truth[k], one.from_class[k]
+        if one.estimates[k] is None:
+            wrong.append(f"{one.symbol}: no value with u")
+        elif truth is not None and abs(truth) > FAR:
+            wrong.append(f"{one.symbol}: {with_sign(truth, 1)} u from its truth")
+        elif truth is None and others is not None and abs(others) > FAR:
+            odd.append(f"{one.symbol}: {with_sign(others, 1)} u from the others")
+    wrong += group.doubts
+    odd += [text for text in group.warnings if text not in group.doubts]
+    return Mark(REPEAT if wrong else LOOK if odd else GOOD, (*wrong, *odd))
+
+
+def _count_marks(of: Class) -> str:
+    """Return how many groups have a good result, and which others have not."""
+    named: dict[str, list[str]] = {GOOD: [], LOOK: [], REPEAT: []}
+    for group, one in zip(of.groups, marks(of), strict=True):
+        named[one.word].append(group.source.name)
+    texts = [f"{len(named[GOOD])} of {len(of.groups)} results {'is' if len(named[GOOD]) == 1 else 'are'} good."]
+    texts += [f"To repeat: {enumeration(named[REPEAT])}."] if named[REPEAT] else []
+    return " ".join([*texts, *([f"To look at: {enumeration(named[LOOK])}."] if named[LOOK] else [])])
+
+
 #: Below it chance does not make groups differ so much.
 DIFFER = 0.01
 #: Degrees of freedom from which on a scatter is known well enough, to a third.
@@ -217,8 +285,14 @@ def finding(of: Class) -> str:
 
 def verdict(of: Class) -> str:
     """Return what the class found, quantity by quantity, and how well it met the truth."""
-    texts = [f"{_mean(one)} is the mean of {_count(of, one)}; {_chi_square(one)}." for one in of.quantities]
-    return "  ".join([*_scenes(of), *texts, *([_truth(of)] if of.knows_truth else [])]) or finding(of)
+    if len(of.groups) == 1:
+        return " ".join([f"{of.groups[0].source.name} alone measured this.", *([_truth(of)] if of.knows_truth else [])])
+    texts = [f"{_mean(one)} is the mean of {_count(of, one)}{_spread(one)}." for one in of.quantities]
+    return "  ".join([_count_marks(of), *_scenes(of), *texts, *([_truth(of)] if of.knows_truth else [])])
+
+
+def _spread(of: Compared) -> str:
+    return (f", {with_sign(of.truth[1], 1)} u from the truth" if of.truth else "") + f"; {_chi_square(of)}"
 
 
 def _scenes(of: Class) -> list[str]:
@@ -259,14 +333,22 @@ def _chi_square(of: Compared) -> str:
     if together is None or together.scatter is None:
         return "there is no other group to compare it with"
     p = "p < 10⁻⁶" if together.p < 1e-6 else f"p = {plain(together.p, 2)}"
-    scatter = f"{digits(100 * together.scatter / abs(together.mean), 2)} %" if together.mean else "—"
-    how = f"χ² = {plain(together.chi_square)} for {together.freedom} degrees of freedom ({p})"
+    freedom = f"{together.freedom} degree{'s' * (together.freedom > 1)} of freedom"
+    scatter, how = _scatter(of, together), f"χ² = {plain(together.chi_square)} for {freedom}, {p}"
     if together.p < DIFFER:
         return (
-            f"{how}: the groups differ by more than their u, by {scatter} (standard deviation), as different tops do; "
-            f"that is in u of the mean and in each distance from it{_known_to(together.freedom)}"
+            f"the groups differ by more than their u, by {scatter} (standard deviation), as different tops do; that is "
+            f"in u of the mean and in each distance from it ({how}){_known_to(together.freedom)}"
         )
-    return f"{how}: the groups agree within their u; their standard deviation is {scatter}"
+    return f"the groups agree within their u; their standard deviation is {scatter} ({how})"
+
+
+def _scatter(of: Compared, together: Comparison) -> str:
+    """Return the standard deviation of the groups: in per cent of the mean, unless that is near zero."""
+    scatter = together.scatter or 0.0
+    if scatter < abs(together.mean):
+        return f"{digits(100 * scatter / abs(together.mean), 2)} %"
+    return f"{digits(scatter * unit(of.unit).shown.factor, 2)} {of.shown_unit}".rstrip()
 
 
 def _known_to(freedom: int) -> str:
@@ -283,6 +365,7 @@ def _truth(of: Class) -> str:
     distances = [one for quantity in of.quantities for one in quantity.from_truth if one is not None]
     near = sum(abs(one) <= 2 for one in distances)
     return (
-        f"On the virtual bench the truth is known: {near} of {len(distances)} values lie within 2 u of it, "
+        f"On the virtual bench the truth is known: {near} of {len(distances)} value{'s' * (len(distances) > 1)} "
+        f"lie{'s' * (len(distances) == 1)} within 2 u of it, "
         f"{100 * _WITHIN_2_U:.0f} % are expected."
     )

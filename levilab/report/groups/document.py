@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import unquote
 from levilab.files import check_writable, replace_atomically
 from levilab.pipelines.suits import recall_suiting
-from levilab.present.document.blocks import Document, Fact, Facts, Note, Picture, Section, Tabular, Verdict
+from levilab.present.document.blocks import Document, Fact, Facts, Note, Picture, Section, Tabular, Verdict, Warnings
 from levilab.present.numbers import column, enumeration, plain, with_sign, without_unit
 from levilab.present.tables import Row, table
 from levilab.report.document import banner_of, count_inputs
-from levilab.report.groups.beside import class_of, finding, verdict
+from levilab.report.groups.beside import FAR, GOOD, LOOK, REPEAT, class_of, finding, marks, verdict
 from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, writing_report
 from levilab.report.reproduction import Heading
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from levilab.report.groups.beside import Class, Compared
 
 
-#: Distance from the truth, in u, beyond which a group is named in red: one in four hundred is by chance.
-_FAR = 3.0
+#: Rows of groups by their marks.
+_ROWS = {GOOD: "best", LOOK: "", REPEAT: "outlier"}
 _FROM_CLASS, _TRUTH, _FROM_TRUTH = "from the others [u]", "truth", "from the truth [u]"
 
 
@@ -45,7 +45,10 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], ending: str)
         ending: of the document's name.
     """
     sources = list({source.path.resolve(): source for of in classes for source in of.found.sources}.values())
+    classes = sorted(classes, key=lambda of: -len(of.groups))  # what one group alone measured comes last
     alone = len(classes) == 1
+    warnings = dict.fromkeys(unquote(text).replace("`", "") for of in classes for text in of.found.warnings)
+    of_all = [Warnings(tuple((text,) for text in warnings))] if warnings else []
     chapters: list[Block] = []
     for k, of in enumerate(classes):
         own = tuple(_blocks(of, deeper=not alone))
@@ -54,7 +57,7 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], ending: str)
     return Document(
         title=f"Class of {len(names)} group{'s' * (len(names) > 1)}",
         lead=f"{count_inputs(sources)}: {', '.join(map(_subject, classes))}",
-        blocks=(*chapters, _made_by(paths, ending)),
+        blocks=(*of_all, *chapters, _made_by(paths, ending)),
         banner=banner_of(sources),
         contents=True,
     )
@@ -69,11 +72,28 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
         return Section(title, blocks, anchor=f"{of.analysis.name}-{anchor}" if deeper else anchor)
 
     tables = (_values(of, one) for one in of.quantities)
-    yield section("Result", "result", Verdict(verdict(of)), *tables, _groups(of))
-    if of.quantities:
+    yield section("Result", "result", Verdict(verdict(of)), *_marks(of), *tables, _groups(of))
+    if of.quantities and len(of.groups) > 1:
         yield section("Figure", "figure", _picture(of))
-    if of.found.warnings or any(group.warnings or group.source.note for group in of.groups):
-        yield section("Notes", "notes", Facts(tuple(_notes(of))))
+    if any(group.source.note for group in of.groups):
+        notes = tuple(Fact(group.source.name, (group.source.note,)) for group in of.groups if group.source.note)
+        yield section("Notes of the groups", "notes", Facts(notes))
+
+
+def _marks(of: Class) -> Iterator[Tabular]:
+    """Yield a row for each group whose result is not good, and why; nothing where all are."""
+    rows = [
+        Row((group.source.name, mark.word, "\n".join(mark.why)), _ROWS[mark.word])
+        for group, mark in zip(of.groups, marks(of), strict=True)
+        if mark.word != GOOD
+    ]
+    note = (
+        f"repeat: no value, or one more than {FAR:.0f} u from its truth, or a doubt about the readings; look: a "
+        f"remark, or, where no truth is known, more than {FAR:.0f} u from the others."
+    )
+    if rows:
+        shown = table("", ["group", "result", "why"], rows)
+        yield Tabular(f"{of.analysis.name}-marks", shown, note, first_column_wraps=True, wraps=("why",))
 
 
 def _values(of: Class, quantity: Compared) -> Tabular:
@@ -84,20 +104,17 @@ def _values(of: Class, quantity: Compared) -> Tabular:
     columns = [column([*estimates, mean]), [*map(_distance, quantity.from_class), ""]]
     heads = ["group", quantity.head, _FROM_CLASS]
     if of.knows_truth:
+        truth, distance = quantity.truth or (None, None)
         columns += [
-            [*map(truth_text, map(quantity.show, quantity.truths), estimates), ""],
-            [*map(_distance, quantity.from_truth), ""],
+            [*map(truth_text, map(quantity.show, (*quantity.truths, truth)), (*estimates, mean))],
+            [*map(_distance, (*quantity.from_truth, distance))],
         ]
         heads += [_TRUTH, _FROM_TRUTH]
     names = [*(group.source.name for group in of.groups), "mean"]
-    far = [*(one is not None and abs(one) > _FAR for one in quantity.from_truth), False]
-    rows = [
-        Row(cells, "together" if k == len(of.groups) else "outlier" if far[k] else "")
-        for k, cells in enumerate(zip(names, *columns, strict=True))
-    ]
-    note = "value(u): the digits in parentheses are the standard uncertainty of the last digits."
-    if of.knows_truth:
-        note += f" Red: more than {_FAR:.0f} u from its truth."
+    kinds = [*(_ROWS[mark.word] for mark in marks(of)), "together"]
+    rows = [Row(cells, kind) for kind, cells in zip(kinds, zip(names, *columns, strict=True), strict=True)]
+    rows = rows if len(of.groups) > 1 else rows[:1]
+    note = "value(u): the digits in parentheses are u of the last digits. Green: good; red: to repeat."
     name = f"{of.analysis.name}-{quantity.name.replace('_', '-')}"
     return Tabular(name, table("", heads, rows, numbers=heads[1:]), note, first_column_wraps=True, narrow="turn")
 
@@ -114,18 +131,18 @@ def _distance(distance: float | None) -> str:
 
 
 def _groups(of: Class) -> Tabular:
-    """Return a row for each group: its readings, how well the law fits them, how many warnings it has."""
+    """Return a row for each group: its seed, its readings, how well the law fits them, its folder."""
     shown = f" [{unit}]" if (unit := unit_of_residuals(of.analysis)) else ""
-    heads = ["group", "run", "readings", f"rms residual{shown}", "χ²/dof", "warnings", "best law"]
+    heads = ["group", "seed", "readings", f"rms residual{shown}", "χ²/dof", "best law", "run"]
     rows = [
         (
             group.source.name,
-            group.source.path.name,
+            str(group.source.run.record.seed) if group.source.run and group.source.run.record.seed is not None else "",
             str(group.statistics.get("n") or len(group.source.readings)),
             plain(group.statistics.get("rms_residual")),
             plain(group.statistics.get("reduced_chi_square"), 2),
-            str(len(group.warnings)) if group.warnings else "",
             group.best_model,
+            group.source.path.name,
         )
         for group in of.groups
     ]
@@ -137,16 +154,6 @@ def _groups(of: Class) -> Tabular:
         note += f" The seeds of these groups have another law, and so no truth to compare with: {laws}."
     numbers = [head for head in heads if head not in {"group", "run", "best law"}]
     return Tabular(f"{of.analysis.name}-groups", table("", heads, rows, numbers=numbers), note, first_column_wraps=True)
-
-
-def _notes(of: Class) -> Iterator[Fact]:
-    """Yield what is to be known of all runs, as that one was given twice, and notes and warnings of each group."""
-    if of.found.warnings:
-        yield Fact("all", tuple(map(unquote, of.found.warnings)))
-    for group in of.groups:
-        note = [f"note: {group.source.note}"] if group.source.note else []
-        if note or group.warnings:
-            yield Fact(group.source.name, (*note, *group.warnings))
 
 
 def _picture(of: Class) -> Picture:

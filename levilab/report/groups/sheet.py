@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from levilab.present.units import name_with_unit
+from levilab.report.groups.beside import REPEAT, marks
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -37,6 +38,12 @@ def class_workbook(classes: Sequence[Class], date: datetime | None) -> bytes:
     with xlsxwriter.Workbook(buffer, {**never, "nan_inf_to_errors": True}) as book:
         book.set_properties({"created": (date or _NO_DATE).replace(tzinfo=None)})
         bold = book.add_format({"bold": True, "text_wrap": True, "valign": "top"})
+        red = {
+            "type": "cell",
+            "criteria": "==",
+            "value": f'"{REPEAT}"',
+            "format": book.add_format({"color": "#b00020"}),
+        }
         for of in classes:
             name = of.analysis.name
             for title, heads, rows in (
@@ -44,7 +51,9 @@ def class_workbook(classes: Sequence[Class], date: datetime | None) -> bytes:
                 (f"{name} class", *_means(of)),
                 (f"{name} readings", *_readings(of)),
             ):
-                _write(book.add_worksheet(title), bold, heads, rows)
+                sheet = book.add_worksheet(title)
+                _write(sheet, bold, heads, rows)
+                sheet.conditional_format(1, 1, len(of.groups), 1, red)
     return buffer.getvalue()
 
 
@@ -69,7 +78,7 @@ def _write(sheet: Any, bold: Any, heads: Sequence[str], rows: Iterable[Sequence[
 
 def _groups(of: Class) -> tuple[list[str], list[list[Cell]]]:
     """Return a row for each group, in SI with the unit in the name."""
-    heads = ["group", "run", "note", "started_utc", "seed", "synthetic"]
+    heads = ["group", "result", "why", "run", "note", "started_utc", "seed", "synthetic"]
     columns: list[list[Cell]] = []
     for one in of.quantities:
         value, u, truth = (name_with_unit(f"{one.name}{end}", one.unit) for end in ("", "_u", "_truth"))
@@ -82,12 +91,14 @@ def _groups(of: Class) -> tuple[list[str], list[list[Cell]]]:
         if of.knows_truth:
             heads += [truth, f"{one.name}_from_the_truth_in_u"]
             columns += [[*one.truths], [*one.from_truth]]
-    heads += ["readings", "rms_residual", "reduced_chi_square", "best_model", "warnings"]
+    heads += ["readings", "rms_residual", "reduced_chi_square", "best_model"]
     rows = []
-    for k, group in enumerate(of.groups):
+    for k, (group, mark) in enumerate(zip(of.groups, marks(of), strict=True)):
         source, record = group.source, group.source.run.record if group.source.run else None
         about: list[Cell] = [
             source.group or source.name,
+            mark.word,
+            "\n".join(mark.why),
             source.path.name,
             source.note,
             (record.started_utc if record else None) or "",
@@ -96,18 +107,19 @@ def _groups(of: Class) -> tuple[list[str], list[list[Cell]]]:
         ]
         fit = [group.statistics.get(name) for name in ("n", "rms_residual", "reduced_chi_square")]
         own = [column[k] for column in columns]
-        rows.append([*about, *own, *fit, group.best_model, "\n".join(group.warnings)])
+        rows.append([*about, *own, *fit, group.best_model])
     return heads, rows
 
 
 def _means(of: Class) -> tuple[list[str], list[list[Cell]]]:
     """Return a row for each quantity of the whole class."""
     heads = ["quantity", "unit", "weighted_mean", "u", "scatter", "groups", "chi_square", "degrees_of_freedom", "p"]
+    heads += ["mean_of_truths", "from_the_truth_in_u"]
     rows: list[list[Cell]] = []
     for one in of.quantities:
         if (found := one.together) is not None:
             mean = [found.mean, found.u, found.scatter, found.freedom + 1]
-            rows.append([one.name, one.unit, *mean, found.chi_square, found.freedom, found.p])
+            rows.append([one.name, one.unit, *mean, found.chi_square, found.freedom, found.p, *(one.truth or ())])
     return heads, rows
 
 
