@@ -202,6 +202,7 @@ def analyze(
     reading_u: float | None = None,
     keep_outliers: bool = False,
     tilt: Tilt = "auto",
+    between: tuple[float, float] | str | None = None,
     method: Method = "auto",
     orthogonal: bool = False,
     device: str | PathLike[str] | None = None,
@@ -249,6 +250,7 @@ def analyze(
         keep_outliers: fit readings that look like miscounts, too (spindown, precession).
         tilt: whether counts hold the tilt of the top's moment: "auto" as "fitted", but for a mock run whose top only
             spins; "none" for a top that only spins (spindown).
+        between: fit only the readings between two spins [Hz], as (30, 24) (spindown).
         method: how pulses are found: edges is the fastest, likelihood for weak ones (spin).
         orthogonal: let the uncertainty of the drive's frequency count, too (precession).
         device: file that describes base and top, as sample_data/device.toml (spindown, field, sway).

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 from levilab.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
     from os import PathLike
 
     from levilab.formats.device import Device
@@ -91,6 +91,17 @@ def _read_columns(given: Mapping[str, str | int] | str) -> dict[str, str] | None
     return (parse_columns(given) if isinstance(given, str) else {key: str(to) for key, to in given.items()}) or None
 
 
+def _read_between(given: str | Sequence[float]) -> tuple[float, float]:
+    """Return two spins [Hz], the lower one first.  Raises UsageError."""
+    try:
+        low, high = sorted(map(float, given.split(":") if isinstance(given, str) else given))
+    except (TypeError, ValueError):
+        low, high = math.nan, math.nan
+    if not 0 <= low < high < math.inf:
+        raise UsageError("between", "two spins [Hz] are expected, as 30:24", value=given)
+    return low, high
+
+
 def _read_device(path: str | PathLike[str]) -> Device:
     from levilab.formats.device import read_device
 
@@ -164,6 +175,9 @@ class SpinDownOptions(RecordOptions):
         "Whether counts hold the tilt of the top's moment.  auto: as fitted, but for a mock run whose top only spins.  "
         "none: a top that only spins.",
         choices=get_args(Tilt),
+    ))  # fmt: skip
+    between: tuple[float, float] | None = field(default=None, metadata=_about(
+        "Fit only the readings between two spins, as 30:24.", metavar="HZ:HZ", unit="Hz", read=_read_between,
     ))  # fmt: skip
     device: Device | None = field(default=None, metadata=_DEVICE)
     clock_u: float | None = field(default=None, metadata=_CLOCK_U)

@@ -189,12 +189,12 @@ def coherence_table(run: PrecessionRun, name: str = "") -> Table:
 
 # --- readings as columns of tables for programs ---
 
-#: Name of the column → attribute of a point.
+#: Name of the column → attribute of a point; its u on the line holds the swing, which that of a reading does not.
 _COLUMNS = {
     "drive_frequency_hz": "drive",
     "drive_frequency_u_hz": "u_drive",
     "precession_frequency_hz": "precession",
-    "precession_frequency_u_hz": "u",
+    "point_u_hz": "u",
     "spin_frequency_hz": "spin",
     "spin_frequency_u_hz": "u_spin",
     "residual_hz": "residual",

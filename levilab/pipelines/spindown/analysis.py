@@ -16,7 +16,7 @@ from levilab.pipelines.budget import gate_of
 from levilab.pipelines.field.device import THESIS, inertias
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.readings import SpinReadings
-from levilab.pipelines.spindown.words import remark, verdict_of_all
+from levilab.pipelines.spindown.words import TILT_ALLOWED, is_seen, remark, verdict_of_all
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -40,7 +40,9 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
 
     def about_all(self) -> Iterable[str]:
         """Return remarks on the means, and on the laws that are not excluded."""
-        return (*map(remark, self.combined.remarks), *self._left_out(), *self._of_laws(self.combined.fits))
+        remarks = (*map(remark, self.combined.remarks), *self._left_out(), *self._of_laws(self.combined.fits))
+        tilted = any(run.has_tilt for run in self.runs) and not is_seen(self.combined.tilt)
+        return (*remarks, TILT_ALLOWED) if tilted else remarks
 
     def _left_out(self) -> Iterable[str]:
         """Yield which runs the means leave out, since their unit is in doubt."""

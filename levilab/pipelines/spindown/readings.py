@@ -67,9 +67,10 @@ class SpinReadings(Readings):
     compared: ClassVar[tuple[str, ...]] = ("time", "frequency")
 
 
-def read_run_readings(run: "Run", _: "InputOptions") -> SpinReadings:
+def read_run_readings(run: "Run", options: "InputOptions") -> SpinReadings:
     """Return the readings of a run of the experiment `spin`, which drives the top up."""
-    return replace(spin_readings(run.readings()), driven=True, upright=run.record.world == "spin")
+    readings = replace(spin_readings(run.readings()), driven=True, upright=run.record.world == "spin")
+    return _between(readings, options, run.folder)
 
 
 def read_spin_file(path: "Path", options: "InputOptions") -> SpinReadings:
@@ -83,7 +84,27 @@ def read_spin_file(path: "Path", options: "InputOptions") -> SpinReadings:
     if field and field.duration < FEWEST * FIELD_WINDOW_S:  # beside it in a zip there may be a table of frequencies
         with suppress(DataError):
             return _read_pulses_or_table(path, options)
-    return field_readings(path, field, options) if field else _read_pulses_or_table(path, options)
+    readings = field_readings(path, field, options) if field else _read_pulses_or_table(path, options)
+    return _between(readings, options, path)
+
+
+def _between(readings: SpinReadings, options: "InputOptions", path: "Path") -> SpinReadings:
+    """Return the readings between the two spins of the option, with a note on the rest.  Raises DataError: too few."""
+    ends = getattr(options, "between", None)
+    if ends is None:
+        return readings
+    low, high = ends
+    inside = np.flatnonzero((readings.frequency >= low) & (readings.frequency <= high))
+    span = f"between {low:g} Hz and {high:g} Hz"
+    if inside.size < FEWEST:
+        seen = f"of {len(readings)} readings {inside.size} lie {span}, at least {FEWEST} are needed"
+        spins = f"{readings.frequency[0]:.4g} Hz to {readings.frequency[-1]:.4g} Hz"
+        raise DataError(f"{path}: {seen}: the spin goes from {spins}, choose `between` in it")
+    part = slice(inside[0], inside[-1] + 1)
+    u = None if readings.u is None else readings.u[part]
+    kept = replace(readings, time=readings.time[part], frequency=readings.frequency[part], u=u)
+    note = f"only the {len(kept)} of {len(readings)} readings {span} are fitted, as asked; the others are left out"
+    return replace(kept, warnings=(*readings.warnings, note))
 
 
 def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings:

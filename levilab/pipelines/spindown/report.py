@@ -494,13 +494,13 @@ def _laws(analysis: SpinDownAnalysis) -> tuple[Tabular, Tabular]:
     u = "Of a mean it comes from the scatter s of the runs, u = s/√N." if several else "ν₀: the spin at first."
     constants = f"{VALUE_U} {u}"
     quality = (
-        "constants: how many were fitted, beside the start of each run; the exponent is common to all runs."
-        " χ²/dof is near 1 where a law leaves nothing but the readings' own "
-        "uncertainty. ΔAICc counts against a law, more than 10 "
-        "excludes it; weight: the law's share of the evidence (Akaike). Order test p (Wald–Wolfowitz): how probable it "
-        "is that residuals in random order change their sign so seldom, or so often; below 0.01 they have a shape. "
-        f"Durbin–Watson is near 2 for noise: chance alone gives {low:.2f} to {high:.2f} (2 ± 4/√n, 2σ); less means a "
-        "shape."
+        "constants: how many were fitted, beside the start of each run; the exponent is common to all runs. χ²/dof is "
+        "near 1 where a law leaves nothing but the readings' own uncertainty. ΔAICc counts against a law, more than 10 "
+        "excludes it; the constants of such a law are the likeliest where neighbouring residuals may resemble each "
+        "other, so that its rms and χ² may lie above those of least squares. Weight: the law's share of the evidence "
+        "(Akaike). Order test p (Wald–Wolfowitz): how probable it is that residuals in random order change their sign "
+        "so seldom, or so often; below 0.01 they have a shape. Durbin–Watson is near 2 for noise: chance alone gives "
+        f"{low:.2f} to {high:.2f} (2 ± 4/√n, 2σ); less means a shape."
     )
     return (
         Tabular("spindown-laws", _constants_table(analysis), constants),

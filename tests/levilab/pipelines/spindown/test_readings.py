@@ -3,9 +3,14 @@
 import numpy as np
 import pytest
 
+from levilab.errors import DataError, UsageError
 from levilab.formats.columns import TableError
 from levilab.formats.table import read_run_readings, read_table
+from levilab.pipelines.options import SpinDownOptions, read_options
+from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.readings import spin_readings
+from levilab.pipelines.spindown.words import TILT_ALLOWED
+from support.spin_downs import spin_down_csv
 
 HEADER = "time_s,spin_frequency_hz,spin_frequency_u_hz\n"
 
@@ -82,3 +87,29 @@ def test_a_count_that_ends_at_twice_the_lower_limit_is_doubted(first, last, asks
     assert (readings.doubtful, "f=NAME [1/2s]" in " ".join(readings.warnings)) == (asks, asks)
     halved = read_table(tmp_path / "data.csv", columns={"f": "f [1/2s]"})
     assert halved.column("spin_frequency_hz")[-1] == last / 2
+
+
+def test_readings_between_two_spins_are_fitted_and_the_result_says_so(tmp_path):
+    path = spin_down_csv(tmp_path / "a.csv")
+    whole = SPINDOWN.analyze([path], SpinDownOptions(tilt="none"))
+    part = SPINDOWN.analyze([path], SpinDownOptions(tilt="none", **read_options({"between": "30:24"})))
+    (run,), (all_of_it,) = part.runs, whole.runs
+    inside = (all_of_it.frequency >= 24) & (all_of_it.frequency <= 30)
+    np.testing.assert_array_equal(run.frequency, all_of_it.frequency[inside])
+    assert run.time[0] > all_of_it.time[0]
+    count = f"only the {inside.sum()} of {inside.size} readings between 24 Hz and 30 Hz are fitted"
+    assert any(count in text for text in part.all_warnings)
+    with pytest.raises(DataError, match="choose `between` in it"):
+        SPINDOWN.analyze([path], SpinDownOptions(between=(2.0, 3.0)))
+    for wrong in ("30", "a:b", "30:30", (24.0, 30.0, 31.0)):
+        with pytest.raises(UsageError):
+            read_options({"between": wrong})
+
+
+def test_a_result_says_that_a_tilt_was_allowed_for_and_what_leaves_it_out(tmp_path):
+    path = spin_down_csv(tmp_path / "a.csv")
+    said = {
+        tilt: TILT_ALLOWED in SPINDOWN.analyze([path], SpinDownOptions(tilt=tilt)).all_warnings
+        for tilt in ("auto", "none")
+    }
+    assert said == {"auto": True, "none": False}
