@@ -215,13 +215,11 @@ class FreeTop(Generic[S]):
         if not self._warned:
             self._warned = True
             self.session.warn(
-                Text(
-                    "the counter sees {seen:.4g} Hz after {before:.4g} Hz, {times} times what follows: such "
-                    "counts are no readings; is there a second bright mark, or is the trigger level too low?",
-                    seen=seen,
-                    before=before,
-                    times=times,
-                )
+                "the counter sees {seen:.4g} Hz after {before:.4g} Hz, {times} times what follows: such "
+                "counts are no readings; is there a second bright mark, or is the trigger level too low?",
+                seen=seen,
+                before=before,
+                times=times,
             )
         return Missed.MULTIPLE
 
@@ -246,12 +244,9 @@ class FreeTop(Generic[S]):
                 self._in_doubt = True
                 others = " or ".join(f"{fold:.1f} Hz" for fold in found.folds)
                 session.warn(
-                    Text(
-                        "the spin of {spin:.2f} Hz may be {others}: samples at this rate cannot tell; a longer "
-                        "gate_s may",
-                        spin=spin,
-                        others=others,
-                    )
+                    "the spin of {spin:.2f} Hz may be {others}: samples at this rate cannot tell; a longer gate_s may",
+                    spin=spin,
+                    others=others,
                 )
         session.check_settings("counter")
         return {"time_s": time, "spin_frequency_hz": spin} | ({"spin_frequency_u_hz": u} if u else {})

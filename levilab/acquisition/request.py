@@ -60,10 +60,14 @@ NAMING = {"counter": "counter", "oscilloscope": "scope"}
 class CannotResume(LevilabError):
     """This run cannot be gone on with."""
 
+    def __init__(self, template: str, /, **values: object) -> None:
+        """Say why, in a template with its values."""
+        super().__init__(Text(template, **values))
+
 
 def _unfit(template: str, **values: object) -> CannotResume:
     """Return the error for a run that does not fit the experiment."""
-    return CannotResume(Text("{said}; {advice}", said=Text(template, **values), advice=_ADVICE))
+    return CannotResume("{said}; {advice}", said=Text(template, **values), advice=_ADVICE)
 
 
 @dataclass(frozen=True)
@@ -339,7 +343,7 @@ def _original_configuration(run: Run) -> BenchConfig:
         return Configuration.model_validate(bench)
     except ValidationError as error:
         raise ConfigError(
-            Text("{folder}/run.json: configuration: {why}", folder=run.folder, why=in_one_line(error))
+            "{folder}/run.json: configuration: {why}", folder=run.folder, why=in_one_line(error)
         ) from error
 
 
@@ -347,32 +351,24 @@ def _resumable(folder: Path, experiment: str) -> Run:
     run = Run.load(folder)
     if run.record.experiment != experiment:
         raise CannotResume(
-            Text(
-                "{folder}: holds a {its} run, levilab acquire {experiment} resumes {experiment} runs",
-                folder=folder,
-                its=run.record.experiment,
-                experiment=experiment,
-            )
+            "{folder}: holds a {its} run, levilab acquire {experiment} resumes {experiment} runs",
+            folder=folder,
+            its=run.record.experiment,
+            experiment=experiment,
         )
     if run.status in {"running", "finished"}:
         raise CannotResume(
-            Text(
-                "{folder}: is {status}, only an interrupted or failed run can be resumed",
-                folder=folder,
-                status=run.status,
-            )
+            "{folder}: is {status}, only an interrupted or failed run can be resumed", folder=folder, status=run.status
         )
     if not run.count():
         raise CannotResume(
-            Text("{folder}: ended before its first reading, there is nothing to go on with: start again", folder=folder)
+            "{folder}: ended before its first reading, there is nothing to go on with: start again", folder=folder
         )
     if run.record.time_zero_utc is None:
         raise CannotResume(
-            Text(
-                "{folder}/run.json: has no time_zero_utc, so it is not known at which time its readings "
-                "go on; they are kept and can be analyzed",
-                folder=folder,
-            )
+            "{folder}/run.json: has no time_zero_utc, so it is not known at which time its readings "
+            "go on; they are kept and can be analyzed",
+            folder=folder,
         )
     return run
 
@@ -395,14 +391,12 @@ def _check_readings(run: Run, request: AcquisitionRequest) -> None:
     last = float(readings.column("time_s")[-1])
     if isinstance(settings, CounterSettings) and settings.one_top and last > settings.longest_s:
         raise CannotResume(
-            Text(
-                "{folder}: its last reading is of {last:g} s, and it was to end after {longest_s:g} s "
-                "({name}.longest_s): there is nothing to go on with; start again",
-                folder=run.folder,
-                last=last,
-                longest_s=settings.longest_s,
-                name=experiment.name,
-            )
+            "{folder}: its last reading is of {last:g} s, and it was to end after {longest_s:g} s "
+            "({name}.longest_s): there is nothing to go on with; start again",
+            folder=run.folder,
+            last=last,
+            longest_s=settings.longest_s,
+            name=experiment.name,
         )
 
 

@@ -254,9 +254,9 @@ class Session(Generic[S]):
     def _write_event(self, kind: RunEvent, text: str, **data: Any) -> None:
         self.writer.event(None if self.zero is None else self.now(), kind, text, **data)
 
-    def warn(self, text: str) -> None:
-        """Record and show a warning about the readings; every result of the run repeats it."""
-        self.event(RunEvent.WARNING, text)
+    def warn(self, text: str, **values: object) -> None:
+        """Record and show a warning about the readings, with values in it; every result of the run repeats it."""
+        self.event(RunEvent.WARNING, Text(text, **values) if values else text)
 
     def progress(self, text: str, share: float) -> None:
         """Show how far the bench is on the way to the first reading.

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 class ConfigError(LevilabError):
     """A configuration that cannot be used."""
 
+    def __init__(self, text: str, /, **values: object) -> None:
+        """Say why, in a template with its values; without values in a text."""
+        super().__init__(Text(text, **values) if values else text)
+
 
 class InstrumentSettings(Settings):
     """Address and model of an instrument.
@@ -104,17 +108,15 @@ def read_table(path: Path, *, instead: str = ", or try `mock`") -> dict[str, Any
         return parse_toml(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise ConfigError(
-            Text(
-                "{path}: there is no such file: describe your bench in it (docs/bench.md){instead}",
-                path=path,
-                instead=instead,
-            )
+            "{path}: there is no such file: describe your bench in it (docs/bench.md){instead}",
+            path=path,
+            instead=instead,
         ) from None
     except OSError as error:
         if path.is_dir():
-            raise ConfigError(Text("{path}: is a folder; a TOML file is expected", path=path)) from None
+            raise ConfigError("{path}: is a folder; a TOML file is expected", path=path) from None
         raise ConfigError(
-            Text("{path}: cannot be read ({why}): a TOML file is expected", path=path, why=error.strerror)
+            "{path}: cannot be read ({why}): a TOML file is expected", path=path, why=error.strerror
         ) from error
     except ValueError as error:
-        raise ConfigError(Text("{path}: not readable as TOML: {why}", path=path, why=error)) from error
+        raise ConfigError("{path}: not readable as TOML: {why}", path=path, why=error) from error

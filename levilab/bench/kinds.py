@@ -10,7 +10,6 @@ from instruments.catalogue import COUNTERS, GENERATORS, MAGNETOMETERS, OSCILLOSC
 from instruments.drivers import Instrument
 from instruments.links.opening import open_link
 from levilab.bench.config import ConfigError, InstrumentSettings
-from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from instruments.clock import Clock
@@ -39,7 +38,7 @@ class Kind(Generic[I_co]):
                 return model
         known = ", ".join(model.name for model in self.models)
         raise ConfigError(
-            Text("{kind}.model = {name} is unknown, known are {known}", kind=self.name, name=repr(name), known=known)
+            "{kind}.model = {name} is unknown, known are {known}", kind=self.name, name=repr(name), known=known
         )
 
     def named(self, text: str, described: InstrumentSettings | None) -> InstrumentSettings:
@@ -64,26 +63,22 @@ class Kind(Generic[I_co]):
         if found:
             how = "give its address" if found[0].scheme else "describe it in the bench file, or give its address"
             raise ConfigError(
-                Text(
-                    "where the {name} is was not said: {how}, such as {address}",
-                    name=found[0].name,
-                    how=how,
-                    address=found[0].address,
-                )
+                "where the {name} is was not said: {how}, such as {address}",
+                name=found[0].name,
+                how=how,
+                address=found[0].address,
             )
         if not _ADDRESS.search(text):
             known = ", ".join(row.name for row in self.models)
             raise ConfigError(
-                Text("{text} is neither a model nor an address: the models are {known}", text=repr(text), known=known)
+                "{text} is neither a model nor an address: the models are {known}", text=repr(text), known=known
             )
         if described is None:
             raise ConfigError(
-                Text(
-                    "the bench file describes no {name}, so the model at {text} is not known: add a table "
-                    "[{name}] with model and address",
-                    name=self.name,
-                    text=text,
-                )
+                "the bench file describes no {name}, so the model at {text} is not known: add a table "
+                "[{name}] with model and address",
+                name=self.name,
+                text=text,
             )
         return described.model_copy(update={"address": text})
 

@@ -9,7 +9,6 @@ from instruments.clock import Clock, WallClock
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
 from levilab.bench.kinds import COUNTER, GENERATOR, KINDS
 from levilab.bench.person import Person, ask_no_person
-from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -57,11 +56,9 @@ class Wiring:
         if kind not in self.instruments:
             instead = _INSTEAD.get(kind, "")
             raise ConfigError(
-                Text(
-                    "the bench file describes no {kind}: add a table [{kind}] with model and address{instead}",
-                    kind=kind,
-                    instead=instead,
-                )
+                "the bench file describes no {kind}: add a table [{kind}] with model and address{instead}",
+                kind=kind,
+                instead=instead,
             )
         settings = self.instruments[kind]
         KINDS[kind].model(settings.model)

@@ -106,26 +106,21 @@ class FieldSettings(ExperimentSettings):
         """Raise ConfigError for radii that no ring has, and heights that no stand reaches."""
         if self.base_inner_radius_m >= self.base_outer_radius_m:
             raise ConfigError(
-                Text(
-                    "{table}.base_inner_radius_m = {base_inner_radius_m:g} must be less than "
-                    "{table}.base_outer_radius_m = {base_outer_radius_m:g}",
-                    table=table,
-                    base_inner_radius_m=self.base_inner_radius_m,
-                    base_outer_radius_m=self.base_outer_radius_m,
-                )
+                "{table}.base_inner_radius_m = {base_inner_radius_m:g} must be less than "
+                "{table}.base_outer_radius_m = {base_outer_radius_m:g}",
+                table=table,
+                base_inner_radius_m=self.base_inner_radius_m,
+                base_outer_radius_m=self.base_outer_radius_m,
             )
         for name in ("lowest_m", "highest_m"):
             if not _LOWEST_M <= getattr(self, name) <= _HIGHEST_M:
                 raise ConfigError(
-                    Text(
-                        "{table}.{name} = {height:g}: heights from {low:g} to {high:g} m are expected;"
-                        " is it in metres?",
-                        table=table,
-                        name=name,
-                        height=getattr(self, name),
-                        low=_LOWEST_M,
-                        high=_HIGHEST_M,
-                    )
+                    "{table}.{name} = {height:g}: heights from {low:g} to {high:g} m are expected; is it in metres?",
+                    table=table,
+                    name=name,
+                    height=getattr(self, name),
+                    low=_LOWEST_M,
+                    high=_HIGHEST_M,
                 )
 
 
@@ -176,13 +171,11 @@ def _read_again(session: Session[FieldSettings]) -> None:
     session.event(RunEvent.HEIGHT_READ_AGAIN, text, drift_t=drift, u_t=u)
     if abs(drift) > _MOST_DRIFT_U * u:
         session.warn(
-            Text(
-                "base or probe drifted: {drift}, at most {most:g} u are expected; let both come to"
-                " one temperature, and scan again in less than {minutes} min",
-                drift=text,
-                most=_MOST_DRIFT_U,
-                minutes=math.ceil(session.now() / 60),
-            )
+            "base or probe drifted: {drift}, at most {most:g} u are expected; let both come to"
+            " one temperature, and scan again in less than {minutes} min",
+            drift=text,
+            most=_MOST_DRIFT_U,
+            minutes=math.ceil(session.now() / 60),
         )
 
 

@@ -49,11 +49,9 @@ class HoldSettings(DriveSettings):
         """Raise ConfigError for a drive that the bench does not allow."""
         if self.drive != "triggered":
             raise ConfigError(
-                Text(
-                    "{table}.drive = {drive}: triggered is expected, no other drive has a loop",
-                    table=table,
-                    drive=self.drive,
-                )
+                "{table}.drive = {drive}: triggered is expected, no other drive has a loop",
+                table=table,
+                drive=self.drive,
             )
         super().check(table, limits)
 

@@ -72,19 +72,17 @@ class LimitSettings(DriveSettings):
         super().check(table, limits)
         if self.which == "upper" and self.drive_waveform == "NONE":
             raise ConfigError(
-                Text("{table}.drive_waveform = NONE: the upper limit needs a drive, SIN, SQU or TRI", table=table)
+                "{table}.drive_waveform = NONE: the upper limit needs a drive, SIN, SQU or TRI", table=table
             )
         if self.which == "upper":
             check_drive(table, limits, self.drive_amplitude_vpp, [("highest_hz", self.highest_hz)])
         if self.which == "upper" and self.highest_hz <= self.drive_frequency_hz:
             raise ConfigError(
-                Text(
-                    "{table}.highest_hz = {highest_hz:g}: more than {table}.drive_frequency_hz = "
-                    "{drive_frequency_hz:g} is expected, from where the drive creeps up",
-                    table=table,
-                    highest_hz=self.highest_hz,
-                    drive_frequency_hz=self.drive_frequency_hz,
-                )
+                "{table}.highest_hz = {highest_hz:g}: more than {table}.drive_frequency_hz = "
+                "{drive_frequency_hz:g} is expected, from where the drive creeps up",
+                table=table,
+                highest_hz=self.highest_hz,
+                drive_frequency_hz=self.drive_frequency_hz,
             )
 
 

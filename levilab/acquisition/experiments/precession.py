@@ -101,21 +101,17 @@ class PrecessionSettings(DriveSettings):
         model = COUNTER.model(config.counter.model)
         if model.driver.SIGNAL is not LIGHT:
             raise ConfigError(
-                Text(
-                    "{model} cannot count a laser beam: the precession needs another counter, one of pulses of light",
-                    model=model.name,
-                )
+                "{model} cannot count a laser beam: the precession needs another counter, one of pulses of light",
+                model=model.name,
             )
         if self.laser_input <= model.inputs:
             return suited
         if "laser_input" in self.model_fields_set:
             raise ConfigError(
-                Text(
-                    "precession.laser_input = {input}: the {model} has one input; take 1, and change the"
-                    " cable when you are asked to",
-                    input=self.laser_input,
-                    model=model.name,
-                )
+                "precession.laser_input = {input}: the {model} has one input; take 1, and change the"
+                " cable when you are asked to",
+                input=self.laser_input,
+                model=model.name,
             )
         return suited.model_copy(update={"laser_input": 1})
 

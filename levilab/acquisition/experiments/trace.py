@@ -99,14 +99,12 @@ class TraceSettings(ExperimentSettings):
         low, high = (self.offset_v + k * self.volts_per_division for k in (-_HALF_SCREEN, _HALF_SCREEN))
         if self.trigger_source in self.channels and not low <= self.trigger_level_v <= high:
             raise ConfigError(
-                Text(
-                    "{table}.trigger_level_v = {trigger_level_v:g} is beyond what the oscilloscope records, "
-                    "{low:g} to {high:g} V: change it, {table}.offset_v or {table}.volts_per_division",
-                    table=table,
-                    trigger_level_v=self.trigger_level_v,
-                    low=low,
-                    high=high,
-                )
+                "{table}.trigger_level_v = {trigger_level_v:g} is beyond what the oscilloscope records, "
+                "{low:g} to {high:g} V: change it, {table}.offset_v or {table}.volts_per_division",
+                table=table,
+                trigger_level_v=self.trigger_level_v,
+                low=low,
+                high=high,
             )
         if self.drive_frequency_hz is not None:
             check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
@@ -261,11 +259,9 @@ class _Watch:
             session.check_settings("generator")
         except InstrumentError as error:
             session.warn(
-                Text(
-                    "record {number} may be of another drive: the generator was changed, or failed ({why})",
-                    number=number,
-                    why=error,
-                )
+                "record {number} may be of another drive: the generator was changed, or failed ({why})",
+                number=number,
+                why=error,
             )
             session.reconnect("generator", error, lambda: _drive(session))
             return
@@ -274,12 +270,10 @@ class _Watch:
         lost = spin is not None and abs(spin - drive) > HELD_WITHIN_HZ
         if spin is not None and lost and not self.lost:
             session.warn(
-                Text(
-                    "record {number} shows a tape of {spin:.2f} Hz: the drive of {drive:g} Hz lost the top",
-                    number=number,
-                    spin=spin,
-                    drive=drive,
-                )
+                "record {number} shows a tape of {spin:.2f} Hz: the drive of {drive:g} Hz lost the top",
+                number=number,
+                spin=spin,
+                drive=drive,
             )
         elif spin is not None and self.lost and not lost:
             session.event(

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import pytest
 
 from levilab.acquisition.counting import AnotherTop, FreeTop, Missed
+from levilab.texts.text import Text
 
 
 class Bench:
@@ -29,7 +30,7 @@ class Bench:
             now=lambda: self.time,
             check_settings=lambda _: None,
             event=lambda kind, text, **_: self.events.append((kind, text)),
-            warn=self.warnings.append,
+            warn=lambda text, **values: self.warnings.append(Text(text, **values)),
             saw=lambda *_: None,
         )
         return FreeTop(session, [{"time_s": time, "spin_frequency_hz": spin} for time, spin in before])

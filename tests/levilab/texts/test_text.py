@@ -33,6 +33,8 @@ SAYING = {
     "ExperimentFailed": 0, "DidNotFollow": 0, "NoLight": 0, "_unfit": 0,
 }  # fmt: skip
 ROOMS = ("levilab.live.", "levilab.acquisition.")
+#: Errors that make a `Text` of what they are given.
+WITH_VALUES = ("ConfigError", "CannotResume")
 _LITERAL = r'"((?:[^"\\]|\\.)*)"'
 #: In JavaScript: a text, or one of two.
 _PHRASE = re.compile(rf"phrase\((?:[^()\"]*\?)?\s*{_LITERAL}(?:\s*:\s*{_LITERAL})?")
@@ -89,7 +91,8 @@ def of_program() -> set[str]:
             if not isinstance(call, ast.Call):
                 continue
             called = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
-            if called == "Text" and call.args and name.startswith("levilab."):
+            said = called == "Text" or (called in WITH_VALUES and call.keywords)
+            if said and call.args and name.startswith("levilab."):
                 found |= {*strings(call.args[0])}
             elif called in SAYING and name.startswith(ROOMS) and len(call.args) > SAYING[called]:
                 found |= {*strings(call.args[SAYING[called]])}
