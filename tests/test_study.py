@@ -17,25 +17,9 @@ FOUND = json.loads((ROOT / "benchmarks/results/study.json").read_text(encoding="
 TEXT = (DOCS / "study.md").read_text(encoding="utf-8")
 #: Numbers with a point that the template may have: of starts, scans and scenes, which were chosen.
 CHOSEN = {
-    "0.01",
-    "24.45",
-    "25.26",
-    "1.8",
-    "0.1",
-    "0.0025",
-    "0.02",
-    "0.7",
-    "0.4",
-    "0.2",
-    "0.8",
-    "0.3",
-    "24.9",
-    "25.20",
-    "25.40",
-    "25.4",
-    "30.0",
-    "30.9",
-}
+    "0.01", "24.45", "25.26", "1.8", "0.1", "0.0025", "0.02", "0.7", "0.4", "0.2", "0.8", "0.3", "24.9", "25.20",
+    "25.40", "25.4", "30.0", "30.9",
+}  # fmt: skip
 
 
 def page_module():

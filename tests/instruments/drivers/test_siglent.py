@@ -11,7 +11,6 @@ import pytest
 
 from instruments.clock import VirtualClock
 from instruments.drivers.generator.siglent_sdg1000x import SiglentSDG1000X
-from instruments.drivers.oscilloscope import NeverTriggered
 from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange
 from instruments.ieee488 import BlockForm, BrokenBlock, block_of
@@ -282,21 +281,3 @@ def test_a_scope_that_keeps_its_memory_gives_all_its_points():
     # the trigger is in the middle, where the light rises through the level
     middle = trace.volts[trace.codes.size // 2 + np.array([-100, 100])]
     assert middle[0] < 0.65 < middle[1]
-
-
-def test_a_trigger_that_never_comes_is_waited_for_as_long_as_a_record_and_the_time_given():
-    device = scope(signal=lambda _start, _step, n: np.full(n, 0.4))
-    driver = connected(SiglentSDS1000XE, device, clock=device.clock)
-    driver.prepare(duration_s=0.1, points=1000, volts_per_division=0.2, trigger_level_v=0.65)
-    before = device.clock.now()
-    with pytest.raises(NeverTriggered, match=r"0\.65 V"):
-        driver.acquire(timeout_s=2.0)
-    assert device.clock.now() - before == pytest.approx(14 * 0.01 + 2.0, abs=0.2)  # fourteen divisions
-
-
-def test_a_record_without_a_trigger_is_forced_where_auto_is_asked_for():
-    device = scope(signal=lambda _start, _step, n: np.full(n, 0.4))
-    driver = connected(SiglentSDS1000XE, device, clock=device.clock)
-    driver.prepare(duration_s=0.1, points=1000, volts_per_division=0.2, trigger_level_v=0.65, sweep="auto")
-    driver.acquire(timeout_s=1.0)
-    assert driver.trace(1).volts == pytest.approx(0.4, abs=0.01)

@@ -257,10 +257,3 @@ def test_both_slopes_are_more_than_its_trigger_knows():
     with pytest.raises(OutOfRange) as refused:
         driver.prepare(**ASKED, trigger_slope="either")
     assert refused.value.name == "trigger_slope"
-
-
-def test_a_record_without_a_trigger_comes_where_auto_is_asked_for():
-    _, driver = scope(constant(0.4))
-    driver.prepare(**ASKED, sweep="auto")
-    driver.acquire(timeout_s=1.0)
-    assert driver.trace(1).volts == pytest.approx(0.4, abs=0.01)

@@ -10,6 +10,8 @@ from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired
 from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
+from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
+from instruments.drivers.oscilloscope.tektronix_tds2000 import TektronixTDS2000
 from instruments.errors import BadAnswer, SettingsLost
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bench import VirtualBench
@@ -18,6 +20,8 @@ from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.oscilloscope.keysight_dsox import VirtualDSOX1000
 from instruments.virtual.oscilloscope.record import PIECE
 from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
+from instruments.virtual.oscilloscope.siglent_sds1000xe import VirtualSDS1000XE
+from instruments.virtual.oscilloscope.tektronix_tds2000 import VirtualTDS2000
 from support.scopes import cheap, constant, pulses
 
 
@@ -29,9 +33,12 @@ def bench(make, signal):
     return device, VisaTransport(name, library=library), clock
 
 
-BOTH = pytest.mark.parametrize(
-    ("driver", "make"), [(RigolDS1000Z, VirtualDS1000Z), (KeysightDSOX, VirtualDSOX1000)], ids=["rigol", "keysight"]
-)
+PAIRS = [
+    *((RigolDS1000Z, VirtualDS1000Z), (KeysightDSOX, VirtualDSOX1000)),
+    *((SiglentSDS1000XE, VirtualSDS1000XE), (TektronixTDS2000, VirtualTDS2000)),
+]
+BOTH = pytest.mark.parametrize(("driver", "make"), PAIRS[:2], ids=["rigol", "keysight"])
+ALL = pytest.mark.parametrize(("driver", "make"), PAIRS, ids=["rigol", "keysight", "siglent", "tektronix"])
 PULSES = {"duration_s": 0.1, "points": 10_000, "volts_per_division": 0.2, "offset_v": 0.6}
 
 
@@ -54,7 +61,7 @@ def test_the_driver_sees_the_pulse_where_and_as_it_was(driver, make, slope):
     transport.close()
 
 
-@BOTH
+@ALL
 def test_the_driver_says_when_the_scope_never_triggers(driver, make):
     device, transport, clock = bench(make, pulses)
     scope = driver(transport, clock=clock)
@@ -62,7 +69,7 @@ def test_the_driver_says_when_the_scope_never_triggers(driver, make):
     before = clock.now()
     with pytest.raises(NeverTriggered) as never:
         scope.acquire(timeout_s=5.0)
-    assert (never.value.level_v, never.value.source) == (pytest.approx(1.25, abs=0.01), "CHAN1")
+    assert (never.value.level_v, never.value.source) == (pytest.approx(1.25, abs=0.01), scope.SOURCE.format(1))
     assert clock.now() - before == pytest.approx(5.1, abs=0.3)
     assert not device.running()
     scope.prepare(**PULSES, trigger_level_v=0.65)  # and goes on
@@ -70,7 +77,7 @@ def test_the_driver_says_when_the_scope_never_triggers(driver, make):
     transport.close()
 
 
-@BOTH
+@ALL
 def test_with_sweep_auto_the_driver_shows_what_there_is(driver, make):
     _, transport, clock = bench(make, constant(0.5))
     scope = driver(transport, clock=clock)
