@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.numbers import how_many
 from analysis.pulses.clean import mains_lines
 from analysis.pulses.search import shorten
 from instruments.links.sound import inputs
@@ -122,7 +123,7 @@ def listen(scope: SoundCard) -> tuple[str, float]:
         lines += [f"channel {channel}: {heard.text}", *(f"  {remark}" for remark in heard.remarks)]
     if "VIRTUAL" not in scope.identity():
         lines += [
-            f"input {one.number}: {one.name} ({one.host}, {one.channels} channel{'s' * (one.channels != 1)}, "
+            f"input {one.number}: {one.name} ({one.host}, {how_many(one.channels, 'channel')}, "
             f"{one.rate:g} Hz){', the default' if one.is_default else ''}"
             for one in inputs(scope.transport.address)
         ]

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
+from analysis.numbers import how_many
 from levilab.cli.later import Later, NamedLast
 from levilab.cli.options import Json, Paths, existing_path, number, place
 from levilab.cli.output import interruptible, message, print_json, result
@@ -232,7 +233,7 @@ def _tabulate(
         if bar is None:
             bar = ShareBar("runs", first=tally.done / tally.total, line_every=LINE_EVERY_S)
         failed = f", {tally.failed} failed" if tally.failed else ""
-        bar(tally.done / tally.total, f"{tally.done} of {tally.total} runs{failed}")
+        bar(tally.done / tally.total, f"{tally.done} of {how_many(tally.total, 'run')}{failed}")
 
     kept = f"the rows so far are in {writing.table}.part.csv: the same command with --resume goes on with them"
     with interruptible(kept):
@@ -253,9 +254,10 @@ def _print_tally(context: typer.Context, tally: "Tally", table: Path, *, as_json
     if (more := tally.failed - len(tally.failures)) > 0:
         message(f"and {more} more, whose problem stands in the table")
     for why, count in tally.passed_over.items():
-        message(f"skipped {count} times: {why}")
+        message(f"skipped {how_many(count, 'time')}: {why}")
     if tally.same:
-        message(f"note: {tally.same} rows have the same readings as another one (readings_sha256): count them once")
+        rows = "row has" if tally.same == 1 else "rows have"
+        message(f"note: {tally.same} {rows} the same readings as another one (readings_sha256): count them once")
     if as_json:
         print_json({
             "table": table.as_posix(), "rows": tally.rows, "failed": tally.failed, "kept": tally.kept,
@@ -263,9 +265,9 @@ def _print_tally(context: typer.Context, tally: "Tally", table: Path, *, as_json
         })  # fmt: skip
     else:
         kept = f", {tally.kept} of them of an earlier call" if tally.kept else ""
-        result(f"the table of {tally.rows} runs is in {table}{kept}; {tally.failed} could not be analyzed")
+        result(f"the table of {how_many(tally.rows, 'run')} is in {table}{kept}; {tally.failed} could not be analyzed")
     if tally.failed and tally.failed == tally.rows:
-        raise NoneUsable(f"none of {tally.rows} runs could be analyzed; their problems stand in {table}")
+        raise NoneUsable(f"none of {how_many(tally.rows, 'run')} could be analyzed; their problems stand in {table}")
 
 
 def _analyze_as(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any]) -> Any:

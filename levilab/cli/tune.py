@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
+from analysis.numbers import how_many
 from levilab.cli.options import Json, existing_path
 from levilab.cli.output import message, print_json, result
 from levilab.errors import UsageError
@@ -74,7 +75,7 @@ def tune(
         advice = advise(owner, degrees)
         if owner != kept:
             write_owner(file, owner)
-            message(f"kept in {file}: {len(owner.attempts)} trial{'s' * (len(owner.attempts) != 1)}")
+            message(f"kept in {file}: {how_many(len(owner.attempts), 'trial')}")
         kept = owner
         if as_json:
             print_json(advice.as_dict())

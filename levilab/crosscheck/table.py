@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from analysis.numbers import digits
+from analysis.numbers import digits, how_many
 from levilab.crosscheck.own.model import OF_ONE_RUN
 from levilab.crosscheck.own.study import ENOUGH, TRIALS
 from levilab.crosscheck.study import LONG_TAILS, Spread, Verdict, by_pulls
@@ -149,7 +149,7 @@ def _about_student(study: Study, symbols: Mapping[str, str]) -> Iterator[str]:
         of = enumeration([_name(name, symbols) for name in few])
         yield f"As u of {of} comes from the scatter of few values, {share} within 1 u are right (Student's t)."
         if freedom <= LONG_TAILS:
-            degrees = f"{freedom} degree{'s' * (freedom > 1)} of freedom"
+            degrees = f"{how_many(freedom, 'degree')} of freedom"
             # the variance of Student's t is n/(n − 2)
             tails = "has no finite standard deviation" if freedom <= 2 else "has long tails"
             yield f"Student's t with {degrees} {tails}, so the standard deviation of these pulls is not judged."

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.numbers import how_many
 from levilab.formats.columns import Column, TableError, shorten
 from levilab.formats.dialect import CLOCK, MISSING, UNVALUED, clock_time, is_dated, slashed_date, unit_behind
 from levilab.formats.layout import Layout
@@ -269,7 +270,7 @@ def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: 
         hint = "; if the comma is a decimal mark, separate by ; or tab" if layout.dialect.separator == "," else ""
         raise TableError(
             path,
-            f"'{shorten(text.strip())}' has {len(fields)} field{'s' * (len(fields) != 1)}, {layout.width} are "
+            f"'{shorten(text.strip())}' has {how_many(len(fields), 'field')}, {layout.width} are "
             f"expected: complete or remove the line{hint}",
             line=line,
         )

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.numbers import how_many
 from levilab.errors import UsageError
 from levilab.formats.columns import SHORTHANDS, Column, TableError, shorten
 from levilab.formats.dialect import MISSING_WORDS, Dialect
@@ -103,7 +104,7 @@ def read_table(
     path = plan.path
     if len(table) >= FEWEST:
         return table
-    what = f"{len(table)} reading{'s' * (len(table) != 1)}" if rows.lines.size else "only a header"
+    what = how_many(len(table), "reading") if rows.lines.size else "only a header"
     missed = f" and {rows.lines.size - len(table)} missed ones" if rows.lines.size > len(table) else ""
     raise TableError(
         path,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from analysis.numbers import how_many
 from levilab.errors import UsageError
 from levilab.formats.titles import read_title
 from levilab.present.units import split
@@ -129,7 +130,7 @@ def frame_of_arrays(data: Any, kind: str | None) -> pd.DataFrame:
         names = ARRAYS["limit"]
     elif len(columns) > len(names) or (len(columns) < 2 and names[0] == "time_s"):
         expected = f"arrays of {', '.join(names[:2])}, in this order, are expected; or a DataFrame"
-        raise UsageError("data", expected, value=f"{len(columns)} array{'s' * (len(columns) > 1)}")
+        raise UsageError("data", expected, value=how_many(len(columns), "array"))
     return pd.DataFrame(dict(zip(names, columns, strict=False)))
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 import levilab
+from analysis.numbers import how_many
 from levilab.errors import UsageError, unquote
 from levilab.files import CannotWrite, as_json, replace_atomically
 from levilab.notebook.fit import FIT, METHODS, FittedModel, axes_of
@@ -276,7 +277,7 @@ class AnalysisResult(Helpful):
         shown = [f"  {name} = {quantity!r}" for name, quantity in [*values.items()][:MOST_VALUES]]
         more = len(values) - MOST_VALUES
         ends = [f"{more} more in values"] * (more > 0 and bool(self.values))
-        ends += [f"{len(self.warnings)} warning{'s' * (len(self.warnings) > 1)}"] * bool(self.warnings)
+        ends += [how_many(len(self.warnings), "warning")] * bool(self.warnings)
         return "\n".join(
             [
                 f"<{self.kind} of {of}{', SYNTHETIC' if self.synthetic else ''}",
@@ -564,9 +565,9 @@ def _parts(result: AnalysisResult) -> Iterator[str]:
     yield fold("readings and residuals", _picture(result), opened=True)
     yield fold("models", _models(result))
     warnings = result.warnings
-    yield fold(f"{len(warnings)} note{'s' * (len(warnings) > 1)}", paragraphs(warnings[:_MOST_INPUTS]))
+    yield fold(how_many(len(warnings), "note"), paragraphs(warnings[:_MOST_INPUTS]))
     frame = result.to_dataframe("readings")
-    yield fold(f"{len(frame)} readings", head_as_html(frame, _MOST_READINGS))
+    yield fold(how_many(len(frame), "reading"), head_as_html(frame, _MOST_READINGS))
     yield fold(
         "how it was made",
         paragraphs(

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import levilab
+from analysis.numbers import how_many
 from levilab.notebook.analysis import analyze_data
 from levilab.notebook.labels import dataset_of_contents
 from levilab.notebook.names import Helpful, bare, meant
@@ -174,7 +175,7 @@ class RunList(list[RecordedRun]):
     def _repr_html_(self) -> str:
         """Return the HTML that a notebook shows."""
         rows = [[str(getattr(one, name)) for name in _SHOWN] for one in self.listed]
-        return facts_as_html(f"{len(rows)} runs", [], table_as_html(_SHOWN, rows, texts=len(_SHOWN)))
+        return facts_as_html(how_many(len(rows), "run"), [], table_as_html(_SHOWN, rows, texts=len(_SHOWN)))
 
 
 def runs_in(folder: str | PathLike[str], last: int | None) -> RunList:

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from analysis.numbers import how_many
 from levilab.errors import UsageError
 from levilab.notebook.labels import dataset_of, head_as_html
 from levilab.notebook.names import Helpful, bare
@@ -90,7 +91,9 @@ class SimulatedMap(Helpful):
         frame = self.to_dataframe()
         rows = head_as_html(frame, _MOST_ROWS, texts=0)
         facts = [("axis", line) for line in axes_lines(summarise(self.store))]
-        return facts_as_html(headline(summarise(self.store)), facts, fold(f"{len(frame)} points", rows, opened=True))
+        return facts_as_html(
+            headline(summarise(self.store)), facts, fold(how_many(len(frame), "point"), rows, opened=True)
+        )
 
     def summary(self) -> str:
         """Return the text that `levilab sweep` prints."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from analysis.numbers import digits
+from analysis.numbers import digits, how_many
 from levilab.present.document.blocks import Points
 from levilab.present.numbers import short_name
 
@@ -115,7 +115,7 @@ def title_of(subject: str, sources: Sequence[Source[Any]], noun: str = "run") ->
     """Return the title of a first table: the subject, the number of inputs, and how many are synthetic."""
     total, synthetic = len(sources), sum(source.synthetic for source in sources)
     mark = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
-    return f"{subject}, {total} {noun}{'s' * (total > 1)}{mark}"
+    return f"{subject}, {how_many(total, noun)}{mark}"
 
 
 def labels_of(sources: Sequence[Source[Any]]) -> list[str]:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
+from analysis.numbers import how_many
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.formats.columns import NoSuchColumn
 from levilab.formats.kinds import AUDIO, OTHER, Kind, kind_of
@@ -205,7 +206,7 @@ class SkippedRuns:
     count: int
 
     def __str__(self) -> str:
-        return f"skipped {self.count} {self.experiment} run{'s' * (self.count > 1)}"
+        return f"skipped {how_many(self.count, f'{self.experiment} run')}"
 
 
 @dataclass(frozen=True)
@@ -582,7 +583,7 @@ def _files(root: Path) -> list[Path]:
 def _nothing_found(
     needs: Needs[Any], others: list[SkippedRuns], broken: list[Skipped], left_out: Sequence[LeftOut]
 ) -> str:
-    seen = [f"{one.count} {one.experiment} run{'s' * (one.count > 1)}" for one in others]
+    seen = [how_many(one.count, f"{one.experiment} run") for one in others]
     seen += [f"{len(broken)} that cannot be used, as {broken[0].reason}"] if broken else []
     seen += [files_by_kind(left_out)] if any(one.kind is not OTHER for one in left_out) else []
     if not seen:

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from analysis.errors import AnalysisError
+from analysis.numbers import how_many
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.pipelines import catalogue
 from levilab.pipelines.result import ResultError, is_of_another, read_inputs, results_in
@@ -234,8 +235,8 @@ def _refusal(path: Path, errors: Mapping[str, DataError]) -> DataError:
     if own:
         return errors[own[0]]
     counts = Counter(run.record.experiment for run in runs)
-    seen = [f"{count} {name} run{'s' * (count > 1)}" for name, count in counts.items()]
-    seen += [f"{len(files)} data file{'s' * (len(files) > 1)}, as {files[0].name}"] if files else []
+    seen = [how_many(count, f"{name} run") for name, count in counts.items()]
+    seen += [f"{how_many(len(files), 'data file')}, as {files[0].name}"] if files else []
     if runs:
         kinds = " or ".join(counts)
         return DoesNotSuit(f"{path}: there is no analysis of a {kinds} run (found {'; '.join(seen)})")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from analysis.numbers import how_many
 from levilab.crosscheck.own.study import OWN, quick_study
 from levilab.crosscheck.stored import read_study
 from levilab.crosscheck.table import blocks_of
@@ -189,7 +190,7 @@ def _title(counts: str, others: Sequence[Section]) -> str:
 def _lead(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
     """Return the amount of data used."""
     count = sum(map(len, found.grouped_warnings))
-    return f"{count_inputs(found.sources)}, {part.lead}, {count or 'no'} note{'s' * (count != 1)}"
+    return f"{count_inputs(found.sources)}, {part.lead}, {how_many(count, 'note') if count else 'no notes'}"
 
 
 def _measurements(results: Results, parts: Sequence[ReportPart]) -> Section:
@@ -278,4 +279,4 @@ def count_inputs(sources: Sequence[Source[Any]]) -> str:
     """Return how many inputs of which kind: "4 runs and 1 data file"."""
     files = sum(source.run is None for source in sources)
     kinds = ((len(sources) - files, "run"), (files, "data file"))
-    return " and ".join(f"{n} {kind}{'s' * (n > 1)}" for n, kind in kinds if n)
+    return " and ".join(how_many(n, kind) for n, kind in kinds if n)

@@ -14,6 +14,7 @@ import pydantic_core
 from rich.cells import cell_len
 from rich.markup import escape
 
+from analysis.numbers import how_many
 from levilab.errors import DataError
 from levilab.formats.table import NO_READING
 from levilab.present.numbers import short_name
@@ -64,7 +65,7 @@ class Listed:
         """The number of readings, or a description of other content."""
         if self.states:
             return f"{self.states} states"
-        return f"{self.records} record{'s' * (self.records > 1)}" if self.records else str(self.readings)
+        return how_many(self.records, "record") if self.records else str(self.readings)
 
 
 def list_runs(root: Path) -> list[Listed]:

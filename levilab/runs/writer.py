@@ -17,6 +17,7 @@ import shutil
 from itertools import count
 from typing import TYPE_CHECKING, Any, Self
 
+from analysis.numbers import how_many
 from levilab.computer import computer
 from levilab.errors import DataError
 from levilab.files import CannotWrite, replace_atomically
@@ -392,7 +393,7 @@ class RunWriter:
         text = (
             f"{old} was removed, replaced or cut while it was being written: all {readings} readings "
             f"are in {self.folder} now, and the run goes on there"
-            + (f"; {lost} record{'s' * (lost > 1)} of the oscilloscope are gone" if lost else "")
+            + (f"; {how_many(lost, 'record')} of the oscilloscope are gone" if lost else "")
         )
         event = {"utc": utc_now(), "time_s": None, "kind": "rescued", "text": text}
         self._append(EVENTS, json.dumps(event, ensure_ascii=False))

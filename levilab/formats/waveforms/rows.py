@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.numbers import how_many
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.dialect import MISSING
 from levilab.formats.layout import EXPORT, HEAD, encoding_of, lines_of, refuse_other_kinds
@@ -179,7 +180,7 @@ def _row(path: Path, text: str, line: int, dialect: Dialect, used: Sequence[int]
     if max(used) >= len(fields):
         raise TableError(
             path,
-            f"'{shorten(text.strip())}' has {len(fields)} field{'s' * (len(fields) != 1)}, {max(used) + 1} are "
+            f"'{shorten(text.strip())}' has {how_many(len(fields), 'field')}, {max(used) + 1} are "
             "expected: complete or remove the line",
             line=line,
         )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from analysis.numbers import how_many
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST
@@ -58,7 +59,9 @@ def read_hold_run(run: Run, _: InputOptions) -> HoldReadings:
         table.column(name) for name in ("time_s", "spin_frequency_hz", "spin_frequency_u_hz", "drive_amplitude_v")
     )
     if len(time) < FEWEST:
-        raise TableError(table.path, f"holds {len(time)} readings, at least {FEWEST} are needed: hold the spin longer")
+        raise TableError(
+            table.path, f"holds {how_many(len(time), 'reading')}, at least {FEWEST} are needed: hold the spin longer"
+        )
     settings = run.record.configuration.get("hold")
     full = settings.get("drive_amplitude_vpp") if isinstance(settings, dict) else None
     if not isinstance(full, int | float) or not full > 0:

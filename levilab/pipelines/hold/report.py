@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from analysis.numbers import how_many
 from levilab.pipelines.hold.analysis import QUANTITIES, text_of
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, points_of, title_of
 from levilab.pipelines.row import cells_of
@@ -96,8 +97,8 @@ def hold_part(analysis: HoldAnalysis) -> ReportPart:
 def _in_words(source: Source[HoldReadings], *_: object) -> tuple[str, ...]:
     one = source.readings
     return (
-        f"{len(one)} readings from {one.time[0]:.1f} s to {one.time[-1]:.1f} s",
-        f"gain at the full amplitude measured {len(one.gains)} times",
+        f"{how_many(len(one), 'reading')} from {one.time[0]:.1f} s to {one.time[-1]:.1f} s",
+        f"gain at the full amplitude measured {how_many(len(one.gains), 'time')}",
     )
 
 

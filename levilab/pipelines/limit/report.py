@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.locked import Cause
-from analysis.numbers import digits
+from analysis.numbers import digits, how_many
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import (
     VALUE_U,
@@ -126,7 +126,7 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
     return ReportPart(
         subject="limits of the spin",
         heading="Limits of the spin of a levitated top",
-        lead=f"{n} tops",
+        lead=how_many(n, "top"),
         result=(
             Paragraph(" ".join(text for group in analysis.groups for text in _meaning(group)), "What it means."),
             Tabular("limit-statistics", runs_table(analysis), _STATISTICS, first_column_wraps=True),
@@ -167,7 +167,7 @@ _THEORY = (
 
 def _in_words(source: Source[LimitReadings], run: Limits, *_: object) -> tuple[str, ...]:
     limit, u = source.readings.limit, source.readings.u
-    span = f"{run.statistics.n} {run.which} limits, {limit.min():.2f} Hz to {limit.max():.2f} Hz"
+    span = f"{how_many(run.statistics.n, f'{run.which} limit')}, {limit.min():.2f} Hz to {limit.max():.2f} Hz"
     return span, f"u of a limit: {'not known' if u is None else size_of_u(u)}"
 
 

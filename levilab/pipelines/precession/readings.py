@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from analysis.numbers import digits
+from analysis.numbers import digits, how_many
 from analysis.precession.gates import rates_at_point, shared_scatter
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, read_table, refuse
@@ -135,7 +135,7 @@ def sweep_readings(table: Table) -> SweepReadings:
     if drive.size < FEWEST:
         raise TableError(
             table.path,
-            f"holds {drive.size} point{'s' * (drive.size != 1)}, at least {FEWEST} are needed: sweep further",
+            f"holds {how_many(drive.size, 'point')}, at least {FEWEST} are needed: sweep further",
         )
     if drive.size > MOST_POINTS:
         raise TableError(

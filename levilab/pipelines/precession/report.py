@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.numbers import digits
+from analysis.numbers import digits, how_many
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import (
     VALUE_U,
@@ -96,7 +96,7 @@ def lines_table(analysis: PrecessionAnalysis) -> Table:
 def line_name(fit: SweepFit) -> str:
     """Return the name of the line, and through how many points it goes."""
     kind = "orthogonal" if fit.line.orthogonal else "weighted" if fit.line.chi_square is not None else "least squares"
-    return f"{kind}, {fit.line.n} points"
+    return f"{kind}, {how_many(fit.line.n, 'point')}"
 
 
 def _line_cells(fit: SweepFit) -> tuple[str, ...]:
@@ -232,7 +232,7 @@ def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
     return ReportPart(
         subject="precession",
         heading="Precession of a driven top",
-        lead=f"{analysis.combined.line.n} points used",
+        lead=f"{how_many(analysis.combined.line.n, 'point')} used",
         result=(
             Paragraph(" ".join(_meaning(analysis.combined)), "What it means."),
             Tabular("precession-lines", lines_table(analysis), _LINES, first_column_wraps=True),
@@ -311,7 +311,7 @@ def _figure_points(run: PrecessionRun) -> Iterator[tuple[str, ...]]:
 
 def _in_words(source: Source[SweepReadings], run: PrecessionRun, options: PrecessionOptions) -> tuple[str, ...]:
     drive, out = run.fit.column("drive"), sum(not point.used for point in run.fit.points)
-    text = f"{len(drive)} points, {drive.min():.4g} Hz to {drive.max():.4g} Hz"
+    text = f"{how_many(len(drive), 'point')}, {drive.min():.4g} Hz to {drive.max():.4g} Hz"
     return text + (f", {out} left out as miscounts" if out else ""), _uncertainty(source, run, options)
 
 

@@ -8,6 +8,7 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
+from analysis.numbers import how_many
 from analysis.pulses import track_of_blocks, track_of_samples
 from analysis.rotation.record import FEWEST
 from levilab.errors import DataError, DoesNotSuit
@@ -71,7 +72,7 @@ class Records(Readings):
         if self.pulses:
             return self.pulses.format
         if len(self.waveforms) > 1:
-            return f"{len(self.waveforms)} records of an oscilloscope"
+            return f"{how_many(len(self.waveforms), 'record')} of an oscilloscope"
         return self.waveforms[0].format
 
 

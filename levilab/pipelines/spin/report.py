@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.numbers import digits
+from analysis.numbers import digits, how_many
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, title_of
 from levilab.pipelines.row import cells_of
@@ -287,7 +287,7 @@ def _count_pulses(analysis: SpinAnalysis) -> str:
     for run in analysis.runs:
         if run.which:
             counts[run.series.of] = counts.get(run.series.of, 0) + len(run.series)
-    said = [f"{count} {name}{'s' * (count > 1)}" for name, count in counts.items()]
+    said = [how_many(count, name) for name, count in counts.items()]
     return f"{enumeration(said)} used"
 
 

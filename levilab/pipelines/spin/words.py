@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from analysis.numbers import digits
+from analysis.numbers import digits, how_many
 from analysis.pulses import Finding
 
 
@@ -96,8 +96,8 @@ def _fold_by_slope(rate: float, *folds: float) -> str:
 #: Name and case of a finding → its values as a sentence.
 _SENTENCES: Mapping[tuple[str, str], Callable[..., str]] = MappingProxyType({
     ("missing", ""): _missing,
-    ("doubled", ""): lambda n: f"{n} pulses lie beside the turns' own and were left out",
-    ("wrong", ""): lambda n: f"{n} pulses are not at their place and were left out",
+    ("doubled", ""): lambda n: f"{how_many(n, 'pulse')} beside the turns' own left out",
+    ("wrong", ""): lambda n: f"{how_many(n, 'pulse')} not at the place of a turn left out",
     ("jump", ""): _jump,
     ("half", ""): lambda: "two equal pulses a turn: half the frequency fitted too, and was not taken",
     ("double", "height"): _double("has another height"),

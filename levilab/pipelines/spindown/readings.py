@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from analysis.errors import AnalysisError, NotPositive, TimesNotIncreasing
-from analysis.numbers import digits
+from analysis.numbers import digits, how_many
 from analysis.pulses import phases, track_of_times
 from analysis.rotation import track_of_field
 from analysis.rotation.track import WINDOW_S as FIELD_WINDOW_S
@@ -97,7 +97,7 @@ def _between(readings: SpinReadings, options: "InputOptions", path: "Path") -> S
     inside = np.flatnonzero((readings.frequency >= low) & (readings.frequency <= high))
     span = f"between {low:g} Hz and {high:g} Hz"
     if inside.size < FEWEST:
-        seen = f"of {len(readings)} readings {inside.size} lie {span}, at least {FEWEST} are needed"
+        seen = f"{inside.size} of {how_many(len(readings), 'reading')} {span} are too few, at least {FEWEST} are needed"
         spins = f"{readings.frequency[0]:.4g} Hz to {readings.frequency[-1]:.4g} Hz"
         raise DataError(f"{path}: {seen}: the spin goes from {spins}, choose `between` in it")
     part = slice(inside[0], inside[-1] + 1)
@@ -211,7 +211,9 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> SpinReadings:
     has_u = "spin_frequency_u_hz" in table.columns
     u = table.column("spin_frequency_u_hz") if has_u else None
     if time.size < fewest:
-        raise TableError(table.path, f"holds {time.size} readings, at least {fewest} are needed: record longer")
+        raise TableError(
+            table.path, f"holds {how_many(time.size, 'reading')}, at least {fewest} are needed: record longer"
+        )
     _must_be_ordinary(table, time, frequency)
     if u is not None:
         _must_be_possible(table, u, frequency)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.numbers import digits
+from analysis.numbers import digits, how_many
 from analysis.spindown.drag import LAWS
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.tilt import count_of
@@ -440,7 +440,7 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
     return ReportPart(
         subject="spin-down",
         heading="Spin-down of a levitated top",
-        lead=f"{n} readings used",
+        lead=f"{how_many(n, 'reading')} used",
         result=(*_meaning(analysis), *_falls(analysis), *_laws(analysis), *_count(analysis)),
         figure=FigureText(
             title="Spin-down.",
@@ -628,9 +628,9 @@ def scatter(mean: Mean) -> Estimate | None:
 
 def _in_words(source: Source[SpinReadings], fit: SpinDown, options: SpinDownOptions) -> tuple[str, ...]:
     count, outliers = len(source.readings), len(fit.outliers)
-    text = f"{count} readings"
+    text = how_many(count, "reading")
     if outliers:
-        text += f", {outliers} of them outlier{'s' * (outliers > 1)}, {'kept' if options.keep_outliers else 'left out'}"
+        text += f", {how_many(outliers, 'outlier')} of them {'kept' if options.keep_outliers else 'left out'}"
     t, nu = fit.time, fit.frequency
     span = f"{with_decimals(t[0], 1)} s to {with_decimals(t[-1], 1)} s, {nu[0]:.2f} Hz to {nu[-1]:.2f} Hz"
     return f"{text}; {span}", _uncertainty(source, fit, options)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.numbers import digits
+from analysis.numbers import digits, how_many
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, points_of, title_of
 from levilab.pipelines.row import cells_of
@@ -99,7 +99,7 @@ def sway_part(analysis: SwayAnalysis) -> ReportPart:
     return ReportPart(
         subject="slow swings",
         heading="Slow swings of a floating top: geometric magnetism",
-        lead=f"{sum(len(run.swings) for run in analysis.runs)} windows",
+        lead=how_many(sum(len(run.swings) for run in analysis.runs), "window"),
         result=(
             Paragraph(" ".join(_meaning(analysis)), "What it means."),
             Tabular("sway-values", quantities_table(analysis), _VALUES, first_column_wraps=True),

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.comparison import Comparison, compare
-from analysis.numbers import digits
+from analysis.numbers import digits, how_many
 from analysis.spindown.drag import LAWS
 from analysis.uncertainty import Estimate
 from levilab.crosscheck.truth import Truth, truth_of
@@ -278,7 +278,7 @@ _WITHIN_2_U = 0.954
 def finding(of: Class) -> str:
     """Return the mean of the class and whether its groups agree, in one sentence."""
     if not of.quantities:
-        return f"{len(of.groups)} groups: no quantity has a value with u"
+        return f"{how_many(len(of.groups), 'group')}: no quantity has a value with u"
     first = of.quantities[0]
     return f"{_mean(first)}, mean of {_count(of, first)}: {_agreement(first)}"
 
@@ -317,8 +317,8 @@ def _count(of: Class, one: Compared) -> str:
     """Return the number of groups with a value, and that of their runs where it is another one."""
     found = [group.source for group, estimate in zip(of.groups, one.estimates, strict=True) if estimate]
     n = len({source.group or source.name for source in found})
-    groups = f"{n} group{'s' * (n > 1)}"
-    return groups if len(found) == n else f"{len(found)} runs of {groups}"
+    groups = how_many(n, "group")
+    return groups if len(found) == n else f"{how_many(len(found), 'run')} of {groups}"
 
 
 def _agreement(of: Compared) -> str:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from analysis.numbers import how_many
 from levilab.errors import unquote
 from levilab.files import check_writable, replace_atomically
 from levilab.pipelines.suits import recall_suiting
@@ -55,7 +56,7 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], ending: str)
         chapters += own if alone else [Section(_subject(of), own, anchor=of.analysis.name, new_page=k > 0)]
     names = {source.group or source.name for source in sources}
     return Document(
-        title=f"Class of {len(names)} group{'s' * (len(names) > 1)}",
+        title=f"Class of {how_many(len(names), 'group')}",
         lead=f"{count_inputs(sources)}: {', '.join(map(_subject, classes))}",
         blocks=(*of_all, *chapters, _made_by(paths, ending)),
         banner=banner_of(sources),

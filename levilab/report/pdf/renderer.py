@@ -13,6 +13,7 @@ from importlib.util import find_spec
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from analysis.numbers import how_many
 from levilab.errors import LevilabError
 from levilab.present.characters import printable
 from levilab.present.document.blocks import (
@@ -219,7 +220,7 @@ def _in_short(blocks: Iterable[Block]) -> Iterator[Drawn]:
     several = sum(map(bool, verdicts)) > 1
     for (chapter, inner), verdict in zip(chapters, verdicts, strict=True) if several else ():
         count = sum(len(group) for one in inner if isinstance(one, Warnings) for group in one.groups)
-        notes = f"{count} note{'s' * (count > 1)}" if count else ""
+        notes = how_many(count, "note") if count else ""
         yield {"title": _text(chapter.title), "verdict": _text(verdict), "notes": notes}
 
 

@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from analysis.numbers import how_many
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.errors import UsageError
@@ -238,7 +239,7 @@ def write_worksheets(
     for sheet in (SHEETS[name] for name in experiments or SHEETS):
         contents = {sheet.experiment: worksheet(sheet, texts, seeds)}
         if keys:
-            tell(f"the key of {sheet.experiment}: {len(seeds)} run{'s' * (len(seeds) > 1)} on the virtual bench")
+            tell(f"the key of {sheet.experiment}: {how_many(len(seeds), 'run')} on the virtual bench")
             contents[f"{sheet.experiment}-key"] = key(sheet, texts, seeds, measure(sheet, seeds))
         with writing(f"{out}: could not be written"):
             out.mkdir(parents=True, exist_ok=True)

@@ -61,7 +61,7 @@ def test_a_missing_column_is_reported_with_those_there_are(tmp_path):
 def test_a_run_with_too_few_readings_is_reported(tmp_path):
     path = tmp_path / "readings.csv"
     path.write_text(HEADER + "0,61,.1\n")
-    with pytest.raises(TableError, match="holds 1 readings, at least 3"):
+    with pytest.raises(TableError, match="holds 1 reading, at least 3"):
         spin_readings(read_run_readings(path))
 
 
