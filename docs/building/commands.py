@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,19 +14,45 @@ if TYPE_CHECKING:
     from sphinx.application import Sphinx
 
 
-def reference() -> str:
-    """Return usage, explanation, options and example of every command, in Markdown."""
+#: Page of the reference → the commands on it, in their order.
+PAGES = {
+    "reference/commands-acquire": ("acquire",),
+    "reference/commands-bench": ("live", "bench", "tune", "top"),
+    "reference/commands-analyze": ("analyze",),
+    "reference/commands-data": ("open", "runs", "report", "export", "worksheet", "class"),
+    "reference/commands-simulate": ("simulate", "stability", "sweep"),
+    "reference/commands-check": ("crosscheck", "reproduce", "benchmark", "fuzz"),
+}
+
+
+def reference(page: str) -> str:
+    """Return usage, explanation, options and example of every command of a page, in Markdown."""
+    return "\n\n".join(text for name in PAGES[page] for text in _described(_app().commands[name], f"levilab {name}"))
+
+
+def overview() -> str:
+    """Return a table of all commands with links to their pages, in Markdown."""
+    rows = []
+    for page, names in PAGES.items():
+        for name in names:
+            command = _app().commands[name]
+            about = _in_plain_text(getattr(command, "command", command).help or "").partition("\n")[0]
+            rows.append(f"| [`levilab {name}`]({page.rpartition('/')[2]}.md#levilab-{name}) | {about} |\n")
+    return "| command | what for |\n|---|---|\n" + "".join(rows)
+
+
+def _app() -> Any:
     import typer.main
 
     from levilab.cli.main import app
 
-    return "\n\n".join(_described(typer.main.get_command(app), "levilab", None))
+    return typer.main.get_command(app)
 
 
-def _described(command: Any, name: str, parent: Any) -> Iterator[str]:
+def _described(command: Any, name: str, parent: Any = None) -> Iterator[str]:
     command = getattr(command, "command", command)  # of a stand-in, see levilab.cli.later
-    context = command.context_class(command, info_name=name.rpartition(" ")[2], parent=parent)
-    yield f"{'#' * (1 + name.count(' '))} `{name}`" if parent else ""
+    context = command.context_class(command, info_name=name.rpartition(" ")[2] if parent else name, parent=parent)
+    yield f"{'#' * (1 + name.count(' '))} `{name}`"
     yield f"```text\n{' '.join(command.get_usage(context).removeprefix('Usage:').split())}\n```"
     yield _in_plain_text(command.help or "")
     rows = [row for parameter in command.get_params(context) if (row := _row(parameter, context))]
@@ -137,7 +164,8 @@ def _beyond(spread: Any, limit: float) -> str:
 #: Page → mark in it → what takes its place.
 MADE = {
     "crosscheck": {"<!-- all results -->": checks},
-    "reference/commands": {"<!-- all commands -->": reference},
+    "reference/commands": {"<!-- all commands -->": overview},
+    **{page: {"<!-- commands -->": partial(reference, page)} for page in PAGES},
     "data": {"<!-- all columns -->": columns, "<!-- all laws -->": laws},
     "notebook": {"<!-- all names of a fit -->": fit},
     "simulator": {"<!-- all keys -->": scene},

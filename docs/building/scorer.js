@@ -11,8 +11,12 @@ var Scorer = {
     lock: "glossary", locked: "glossary",
   },
   score: ([page, title, anchor, description, score, file]) => {
-    const typed = (new URLSearchParams(location.search).get("q") || "").trim().toLowerCase();
+    const asked = (new URLSearchParams(location.search).get("q") || "").trim();
+    const typed = asked.toLowerCase();
     if (Scorer.pages[typed] === page) return 1000 + score;
+    // a name of the reference that is typed whole, as of a function or a command
+    const ends = ["." + typed, "> " + typed].some((end) => `.${title.toLowerCase()}`.endsWith(end));
+    if (ends && anchor && page.startsWith("reference/") && /[_. ]|[a-z][A-Z]/.test(asked)) return 500 + score;
     if (typed && !anchor && title.toLowerCase().includes(typed)) score += 100;
     if (/^(decisions\/|reference\/|speed$|mutants$|fuzzing$|contributing$|changes$)/.test(page)) return 0.2 * score;
     if (/^(reproduce$)/.test(page)) return 0.4 * score;

@@ -3,7 +3,7 @@
 import pytest
 import typer.main
 
-from building.commands import MADE, checks, columns, fit, observables, reference, scene
+from building.commands import MADE, PAGES, checks, columns, fit, observables, overview, reference, scene
 from building.docstrings import as_markup
 from building.outside_pages import lead_to_site
 from building.requests import loaded_from_elsewhere
@@ -12,12 +12,16 @@ from levilab.pipelines.catalogue import ANALYSES
 from support.paths import DOCS
 
 
-def test_the_page_of_commands_has_each_command_with_its_options():
-    text = reference()
-    group = typer.main.get_command(app)
-    assert [name for name in group.commands if f"\n## `levilab {name}`\n" not in text] == []
-    assert "### `levilab acquire spin`" in text
-    assert "`--tolerance X`\n: Error that is accepted" in text
+def test_the_pages_of_commands_have_each_command_with_its_options():
+    commands = typer.main.get_command(app).commands
+    assert sorted(name for names in PAGES.values() for name in names) == sorted(commands)
+    assert [
+        name for page, names in PAGES.items() for name in names if f"## `levilab {name}`" not in reference(page)
+    ] == []
+    assert "### `levilab acquire spin`" in reference("reference/commands-acquire")
+    assert "```text\nlevilab acquire spin [OPTIONS]\n```" in reference("reference/commands-acquire")
+    assert "`--tolerance X`\n: Error that is accepted" in reference("reference/commands-simulate")
+    assert "| [`levilab sweep`](commands-simulate.md#levilab-sweep) | Map a scene" in overview()
 
 
 def test_the_page_of_data_has_each_column_and_each_mark_stands_in_its_page():

@@ -38,6 +38,10 @@ QUERIES = {
     "first experiment": ("tutorial",),
     "lock": ("glossary",),
     "Präzession": ("tutorial-de", "glossary"),
+    "simulate_many": ("reference/python-simulator",),
+    "spin_at_fall": ("reference/python-analyses",),
+    "SpinDown": ("reference/python-spin",),
+    "levilab stability": ("reference/commands-simulate",),
 }
 #: The same, and one of these pages is among the first two.
 AMONG_TWO = {
