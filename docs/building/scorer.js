@@ -6,7 +6,7 @@ var Scorer = {
     excel: "open-my-file", spreadsheet: "open-my-file", xlsx: "open-my-file", csv: "open-my-file",
     labview: "open-my-file", arduino: "open-my-file", audio: "open-my-file", smartphone: "phone", phyphox: "phone",
     microphone: "sound-card", "sound card": "sound-card", jupyter: "notebook", python: "notebook", grading: "class",
-    students: "class", windows: "install", oscilloscope: "instruments/oscilloscope", washers: "experiments/washers",
+    students: "class", worksheet: "class", windows: "install", oscilloscope: "instruments/oscilloscope", washers: "experiments/washers",
     pdf: "report", tutorial: "tutorial", wav: "open-my-file", mp3: "open-my-file", film: "video", animation: "animation",
     lock: "glossary", locked: "glossary",
   },
