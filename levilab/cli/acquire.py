@@ -133,7 +133,7 @@ def acquire_experiment(
     """Carry out the experiment that the command is named after."""
     speak(language)
     if not list_settings:
-        look_at_files(bench, resume, out, virtual=mock, named=bool(counter or scope))
+        look_at_files(bench, resume, out, scene, virtual=mock, named=bool(counter or scope))
     with importing():
         from levilab.acquisition.loop import acquire
         from levilab.acquisition.request import AcquisitionOptions, chosen_settings, request_for
@@ -193,8 +193,10 @@ def acquire_experiment(
             raise typer.Exit(exit_codes.INTERRUPTED)
 
 
-def look_at_files(bench: Path | None, resume: Path | None, out: Path, *, virtual: bool, named: bool) -> None:
-    """Refuse a bench file or a run that is not there, before what takes long is imported.
+def look_at_files(
+    bench: Path | None, resume: Path | None, out: Path, scene: str | None = None, *, virtual: bool, named: bool
+) -> None:
+    """Refuse a bench file, a run or a scene that is not there, before what takes long is imported.
 
     virtual: on the virtual bench; named: whether instruments are, so that bench.toml may be missing.
     """
@@ -206,6 +208,10 @@ def look_at_files(bench: Path | None, resume: Path | None, out: Path, *, virtual
         from levilab.runs.find import run_to_resume
 
         run_to_resume(resume, out)
+    if scene and virtual:
+        from levilab.simulator.scene import read_scene
+
+        read_scene(scene)
 
 
 def _print_settings(config: "BenchConfig", experiment: str, *, as_json: bool) -> None:

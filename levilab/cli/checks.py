@@ -7,14 +7,29 @@ from typing import Annotated
 import typer
 
 from levilab.cli import exit_codes
-from levilab.cli.options import Json, existing_paths, place, writable
+from levilab.cli.options import Json, among, existing_paths, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.errors import UsageError
+
+#: Names of the rooms' catalogues, which take too long to import for a help or a refusal.
+SUBJECTS = (
+    "spin", "spindown", "sound", "phone", "motion", "precession", "field", "sway", "video", "hold", "limit", "tune",
+)  # fmt: skip
+CHAPTERS = (
+    "stability", "limits", "paths", "driven", "drive", "spindown", "statistics", "dipole", "errata", "beyond", "simon",
+    "gans",
+)  # fmt: skip
 
 
 def crosscheck(
     subjects: Annotated[
-        list[str] | None, typer.Argument(metavar="[SUBJECT]…", help="What is checked.", show_default="everything")
+        list[str] | None,
+        typer.Argument(
+            metavar="[SUBJECT]…",
+            help=f"Of {', '.join(SUBJECTS)}.",
+            show_default="all",
+            callback=among(SUBJECTS, "subject"),
+        ),
     ] = None,
     like: Annotated[
         list[Path] | None,
@@ -86,8 +101,8 @@ def reproduce(
         str | None,
         typer.Option(
             metavar="CHAPTER,…",
-            help="These chapters alone: stability, limits, paths, driven, drive, spindown, statistics, dipole, "
-            "errata, beyond, simon, gans.",
+            help=f"These chapters alone: {', '.join(CHAPTERS)}.",
+            callback=among(CHAPTERS, "only"),
         ),
     ] = None,
     as_json: Json = False,
@@ -98,7 +113,7 @@ def reproduce(
     """
     from levilab.reproduce.run import choose
 
-    wanted = choose(only)  # a wrong name is refused before anything is computed
+    wanted = choose(only)
 
     from levilab.present.progress import ShareBar
     from levilab.reproduce.report import format_of, write

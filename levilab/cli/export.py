@@ -9,31 +9,49 @@ from levilab.cli.analyze import takes_options
 from levilab.cli.options import existing_path, place, writable
 from levilab.cli.output import interruptible, message, result
 from levilab.cli.quantities import with_options
+from levilab.errors import UsageError
 from levilab.pipelines.options import OF_REPORT, read_options
+
+#: Endings of the formats, whose room takes too long to import for a refusal.
+ENDINGS = (".nc", ".h5", ".csv", ".zip")
+
+
+def _named_path(path: Path | None) -> Path | None:
+    if path is None:
+        raise UsageError("PATH", "is missing: name a run, a data file or a sweep, as in levilab export runs/NAME")
+    return existing_path(path)
+
+
+def _named_file(file: Path | None) -> Path | None:
+    """Return the name of a file in one of the formats that can be written.  Raises UsageError, CannotWrite."""
+    if file and file.suffix.lower() not in ENDINGS:
+        raise UsageError("out", f"a name that ends in {', '.join(ENDINGS)} is expected", value=file)
+    return writable(file)
 
 
 @takes_options(OF_REPORT)
 def export_data(
     context: typer.Context,
     path: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
             metavar="PATH",
             readable=False,
             help="A run folder, a data file, a sweep's NAME.zarr.",
-            callback=existing_path,
+            show_default=False,
+            callback=_named_path,
         ),
-    ],
+    ] = None,
     file: Annotated[
-        Path | None, typer.Argument(metavar="FILE", readable=False, help="The same as --out.", callback=writable)
+        Path | None, typer.Argument(metavar="FILE", readable=False, help="The same as --out.", callback=_named_file)
     ] = None,
     out: Annotated[
         Path | None,
         place(
             "FILE",
-            "The file to write; its ending is .nc, .h5, .csv or .zip.",
+            f"The file to write; its ending is {', '.join(ENDINGS)}.",
             show_default="NAME.zip",
-            callback=writable,
+            callback=_named_file,
         ),
     ] = None,
     creator: Annotated[str, typer.Option(metavar="NAMES", help="Who measured; by default the run's group.")] = "",
@@ -47,6 +65,7 @@ def export_data(
     from levilab.report.export.contents import contents_of
     from levilab.report.export.write import export
 
+    assert path  # else it was refused
     app, options = context.find_root().command, read_options(given, typed=True)
 
     def tell(text: str) -> None:

@@ -6,10 +6,13 @@ from typing import Annotated, Any
 import typer
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import HEADING, Language, Paths, place, writable
+from levilab.cli.options import HEADING, Language, Paths, among, place, writable
 from levilab.cli.output import interruptible, message, result
 from levilab.cli.quantities import with_options
 from levilab.pipelines.options import OF_REPORT, read_options
+
+#: Experiments with a worksheet; their room takes too long to import for a help or a refusal.
+SHEETS = ("spin", "limit", "field", "precession")
 
 
 @takes_options(OF_REPORT, HEADING)
@@ -40,7 +43,12 @@ def of_class(
 def worksheet(
     experiments: Annotated[
         list[str] | None,
-        typer.Argument(metavar="[EXPERIMENT]…", help="spin, limit, field or precession; by default all."),
+        typer.Argument(
+            metavar="[EXPERIMENT]…",
+            help=f"Of {', '.join(SHEETS)}.",
+            show_default="all",
+            callback=among(SHEETS, "experiment"),
+        ),
     ] = None,
     out: Annotated[Path, place("DIR", "Where the files are written.")] = Path("worksheets"),
     groups: Annotated[int, typer.Option(min=1, max=500, metavar="N", help="How many, each with its seed.")] = 20,

@@ -27,6 +27,12 @@ class Commands(typer.core.TyperGroup):
         with importing():
             return super().make_context(info_name, args, parent, **extra)
 
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Return the command that was named.  Fails where a file or a folder stands in its place."""
+        if args and args[0] not in self.commands and os.path.exists(args[0]):  # noqa: PTH110 - without pathlib's import
+            ctx.fail(f"{args[0]} is a file or a folder, and no command: take levilab analyze {args[0]}")
+        return super().resolve_command(ctx, args)
+
     def invoke(self, ctx: Any) -> Any:
         """Carry out what was called."""
         try:

@@ -12,7 +12,7 @@ import typer
 from levilab.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
 
 def number(unit: str = "", *, low: float = -math.inf, high: float = math.inf) -> Callable[[Any], float]:
@@ -67,6 +67,27 @@ def existing_path(path: Path | None) -> Path | None:
     """Return a path that is there.  Raises DataError."""
     existing_paths([path] if path else None)
     return path
+
+
+def among(known: Sequence[str], what: str) -> Callable[[Any], Any]:
+    """Return the check of names, in a list or with commas: UsageError before their room is imported, which takes long.
+
+    Args:
+        known: names.
+        what: the option's name, or what is named.
+    """
+
+    def check(given: Any) -> Any:
+        from difflib import get_close_matches  # not for every help
+
+        for name in [one.strip() for one in given.split(",")] if isinstance(given, str) else given or ():
+            if name not in known:
+                near = get_close_matches(name, known, n=1)
+                advice = f"did you mean {near[0]}? Known are" if near else "known are"
+                raise UsageError(what, f"{advice} {', '.join(known)}", value=name or "''")
+        return given
+
+    return check
 
 
 def _runs_or(paths: list[Path] | None) -> list[Path]:

@@ -59,11 +59,16 @@ def tune(
     as_json: Json = False,
 ) -> None:
     """Say which washers to take, ask how the top did, and say it again."""
-    from levilab.formats.typed import read_temperature
+    from levilab.formats.typed import read_mass, read_masses, read_temperature
+
+    asks = sys.stdin.isatty() and sys.stdout.isatty() and not as_json if ask is None else ask
+    _check("top", top, read_mass, is_needed=not (asks or file.exists()))  # before what takes long is imported
+    _check("washers", washers, read_masses)
+    _check("scan_temperature", scan_temperature, read_temperature)
+    _check("temperature", temperature, read_temperature, is_needed=not asks)
     from levilab.pipelines.tune.advice import advise
     from levilab.pipelines.tune.owner import read_owner, write_owner
 
-    asks = sys.stdin.isatty() and sys.stdout.isatty() and not as_json if ask is None else ask
     kept = read_owner(file)
     owner = _with_bench(kept, top, washers, file, asks=asks)
     owner = _with_scan(owner, scan, scan_temperature, device)
@@ -86,6 +91,12 @@ def tune(
         owner, degrees, ends = _next(advice) if asks else (owner, degrees, True)
     if not as_json:
         _print_chances(advice)
+
+
+def _check(name: str, given: str | None, read: Callable[[str], object], *, is_needed: bool = False) -> None:
+    """Raise UsageError for a wrong option, or one that is missing and cannot be asked for."""
+    if given is not None or is_needed:
+        _answer(name, given, read)
 
 
 def _with_bench(owner: "Owner", top: str | None, washers: str | None, file: Path, *, asks: bool) -> "Owner":

@@ -101,7 +101,19 @@ class Advice:
         """The reason, in one or two sentences."""
         parts = [*self._reasons, f"the middle of the window is now estimated at {self._show('mass_to_set')}."]
         text = "; ".join(parts)
-        return f"{text[0].upper()}{text[1:]}{self._beyond_reach}"
+        return f"{text[0].upper()}{text[1:]}{self._likelier}{self._beyond_reach}"
+
+    @property
+    def _likelier(self) -> str:
+        """Return why another choice of the table is not the best, as a sentence behind a blank; empty where none is."""
+        most = max(self.choices, key=lambda one: one.floats)
+        chance = _percent(most.floats)
+        if chance == _percent(self.best.floats):
+            return ""
+        on = self.owner.attempts[-1].washers if self.owner.attempts else None
+        few = _changes(on, self.best.washers_kg) < _changes(on, most.washers_kg)
+        reason = "takes more changes" if few else "leaves less to try next if it fails"
+        return f" {washers_text(most.washers_kg)} floats with {chance}, but {reason}."
 
     @property
     def _reasons(self) -> Iterator[str]:

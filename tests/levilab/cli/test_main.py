@@ -348,6 +348,13 @@ IMPORTS = [
                 "simulate no.toml",
                 "tune --scan nowhere",
                 "top nowhere",
+                "crosscheck nothing",
+                "reproduce --only nothing",
+                "worksheet nothing",
+                "export . -o x.xyz",
+                "acquire spin --mock --scene nowhere",
+                "tune --top light --no-ask",
+                "tune --no-ask",
             )
         ],
         set[str](),
@@ -378,6 +385,16 @@ def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path, commands, allo
     assert len(heavy) == len(commands)
     for words, seen in zip(commands, heavy, strict=True):
         assert seen <= allowed, words
+
+
+def test_names_that_are_checked_before_imports_are_those_of_the_rooms():
+    from levilab.cli import checks, export, groups
+    from levilab.crosscheck.catalogue import SUBJECTS
+    from levilab.report.export.write import FORMATS
+    from levilab.report.worksheets.document import SHEETS
+
+    assert (tuple(SUBJECTS), tuple(CHAPTERS)) == (checks.SUBJECTS, checks.CHAPTERS)
+    assert (tuple(FORMATS), tuple(SHEETS)) == (export.ENDINGS, groups.SHEETS)
 
 
 def test_help_lists_the_scenes_that_come_with_levilab():
@@ -411,10 +428,13 @@ def test_experiments_and_values_are_understood_as_people_write_them(levilab):
         ("acquire --mock", "as levilab acquire spin --mock: spin, trace"),
         ("acquire spin --duration 60", "levilab acquire spin --settings lists"),
         ("acquire spin --mok", "(Possible options: --mock)"),
+        ("here", "here is a file or a folder, and no command: take levilab analyze here"),
+        ("export", "PATH: is missing: name a run, a data file or a sweep, as in levilab export runs/NAME"),
         ("simulate undriven --spin 30", "--set changes the scene: --set start.spin_hz=…"),
     ],
 )
-def test_what_is_not_understood_is_answered_with_what_was_meant(levilab, words, said):
+def test_what_is_not_understood_is_answered_with_what_was_meant(levilab, tmp_path, words, said):
+    (tmp_path / "here").mkdir()
     refused = " ".join(levilab(*words.split(), check=2).stderr.replace("│", " ").split())
     assert said in refused
     assert ("Possible" in refused) == ("Possible" in said)

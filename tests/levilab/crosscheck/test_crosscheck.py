@@ -163,16 +163,16 @@ def test_a_trial_goes_through_drivers_and_analysis(tmp_path, name, seed, quantit
 
 
 def test_the_command_prints_writes_and_judges(levilab, tmp_path, monkeypatch):
-    monkeypatch.setattr("levilab.crosscheck.command.SUBJECTS", {"good": made_up(), "bad": made_up(2.0)})
-    done = levilab("crosscheck", "good", "--trials", "40", "--out", "kept")
+    monkeypatch.setattr("levilab.crosscheck.command.SUBJECTS", {"spin": made_up(), "tune": made_up(2.0)})
+    done = levilab("crosscheck", "spin", "--trials", "40", "--out", "kept")
     assert "five" in done.stdout
     document = json.loads((tmp_path / "kept/crosscheck.json").read_text(encoding="utf-8"))
     assert document["checks"][0]["holds"] is True
     assert (tmp_path / "kept/crosscheck.png").stat().st_size > 5000
-    levilab("crosscheck", "good", "--calibrate", "--trials", "40", "--out", "ranks")
+    levilab("crosscheck", "spin", "--calibrate", "--trials", "40", "--out", "ranks")
     assert (tmp_path / "ranks/calibration.png").stat().st_size > 5000
-    levilab("crosscheck", "bad", "--calibrate", "--trials", "40", check=1)
-    failed = levilab("crosscheck", "bad", "--json", "--trials", "40", check=1)
+    levilab("crosscheck", "tune", "--calibrate", "--trials", "40", check=1)
+    failed = levilab("crosscheck", "tune", "--json", "--trials", "40", check=1)
     assert json.loads(failed.stdout)["checks"][0]["spreads"][0]["mean"] > 1.5
     refused = levilab("crosscheck", "nonsense", check=2)
-    assert refused.stderr == "levilab: subject nonsense: known are good, bad\n"
+    assert refused.stderr.startswith("levilab: subject nonsense: known are spin, spindown,")

@@ -159,6 +159,12 @@ def test_of_washers_that_promise_nearly_the_same_the_fewest_are_changed():
     assert advise(owner, 21.0).text.startswith("Put on the 0.1 g washer:")  # 0.02 g more promise less than 2 % more
 
 
+def test_a_likelier_choice_of_the_table_is_told_with_its_cost():
+    advice = advise(told("0.1 g, 20.5 C, rises", owner=Owner(24.9 * G, (0.06 * G, 0.06 * G, 0.1 * G, 0.2 * G))), 21.5)
+    assert max(one.floats for one in advice.choices) > advice.best.floats + 0.005
+    assert "0.06 + 0.06 + 0.1 + 0.2 g floats with 47 %, but takes more changes." in advice.why
+
+
 # --- the scan ---
 
 
