@@ -10,7 +10,7 @@ from levilab.crosscheck.own.study import OWN, quick_study
 from levilab.crosscheck.stored import read_study
 from levilab.crosscheck.table import blocks_of
 from levilab.errors import unquote
-from levilab.pipelines.sources import mark_of
+from levilab.pipelines.sources import Doubt, mark_of
 from levilab.present.document.blocks import (
     Banner,
     Code,
@@ -92,7 +92,7 @@ def blocks_of_part(
     *,
     deeper: bool = False,
 ) -> list[Block]:
-    """Return what one analysis found: result, figure, notes, what else is known, run by run.
+    """Return what one analysis found: result with its doubts, figure, notes, what else is known, run by run.
 
     Args:
         analysis: the row of the catalogue.
@@ -105,12 +105,15 @@ def blocks_of_part(
     def section(title: str, anchor: str, *blocks: Block) -> Section:
         return Section(title, blocks, anchor=f"{analysis.name}-{anchor}" if deeper else anchor)
 
-    groups = tuple(tuple(map(unquote, alike)) for alike in found.grouped_warnings)
-    notes = [section("Notes", "notes", Warnings(groups))] if groups else []
+    grave, notes = (
+        tuple(tuple(map(unquote, alike)) for alike in found.grouped_warnings if isinstance(alike[0], Doubt) == doubtful)
+        for doubtful in (True, False)
+    )
+    doubts = [Warnings(grave)] if grave else []
     blocks = [
-        section("Result", "result", Verdict(_verdict(found)), *part.result),
+        section("Result", "result", Verdict(_verdict(found)), *doubts, *part.result),
         section("Figure", "figure", picture_of(analysis, found, part)),
-        *notes,
+        *([section("Notes", "notes", Warnings(notes))] if notes else []),
     ]
     if not asked.short:
         blocks += [_budget(analysis, found), *_trials(analysis, found, made=asked.crosscheck)]

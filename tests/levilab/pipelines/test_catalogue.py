@@ -10,13 +10,17 @@ import pytest
 
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines import catalogue
-from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.catalogue import ANALYSES, print_analysis
 from levilab.pipelines.document import Analysis
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Archive
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import analyze_suiting, recall_suiting, suiting
 from levilab.pipelines.suits import save as save_found
+from levilab.present.terminal import as_text
+from levilab.report.document import blocks_of_part
+from levilab.report.reproduction import Asked
+from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
 
 
@@ -202,3 +206,15 @@ def test_a_sweep_that_keeps_records_is_a_sweep_first(tmp_path, sample_data):
     assert save_found(row, found)[0].name == "result.json"
     spin = ANALYSES["spin"]
     assert save_found(spin, spin.analyze([run], spin.options_from({"channel": "laser"})))[0].name == "result.spin.json"
+
+
+def test_the_answer_comes_first_and_then_what_makes_it_doubtful():
+    limit = ANALYSES["limit"]
+    found = limit.analyze([SAMPLE_DATA / "loose-washers"], limit.options())
+    shown = " ".join(as_text(lambda console: print_analysis(limit, found, console=console)).split())
+    in_order = ("What the data say. 8 upper limits have the mean", "LOOSE WASHERS", "Limits of the spin, 1 run", "tops")
+    assert sorted(in_order, key=shown.index) == list(in_order)
+    result, *others = blocks_of_part(limit, found, limit.part(found), Asked(crosscheck=False))
+    assert [type(block).__name__ for block in result.blocks[:2]] == ["Verdict", "Warnings"]
+    assert "LOOSE WASHERS" in repr(result.blocks[1])
+    assert not any("LOOSE WASHERS" in repr(section) for section in others if section.title == "Notes")
