@@ -13,7 +13,7 @@ import numpy as np
 from analysis import stability
 from analysis.errors import AnalysisError
 from analysis.limits import Comparison, Sample, Statistics, combine, compare, nearest_edge, spins_of_window, summarize
-from analysis.numbers import digits
+from analysis.numbers import digits, how_many
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.limit.readings import LimitReadings
@@ -147,11 +147,6 @@ class Conditions:
     synthetic: bool | None = None
     triggered: bool = False
     levels_off: bool = False
-
-    def name(self, count: int) -> str:
-        """Return the name of one or several such spins."""
-        plural = "s" * (count > 1)
-        return f"spin{plural} at which the drive pulls no further" if self.levels_off else f"{self.which} limit{plural}"
 
     @property
     def text(self) -> str:
@@ -444,22 +439,21 @@ def warnings_of(statistics: Statistics) -> list[str]:
 
 
 def _sentences(limits: Limits) -> Iterable[str]:
-    found = limits.statistics
-    name = limits.conditions.name(found.n)
-    if found.n == 1:
-        lost = "The top fell" if limits.which == "lower" else "The drive lost the top"
-        lost = "The top went no faster" if limits.conditions.levels_off else lost
-        yield f"{lost} at {with_uncertainty(found.mean)}: one {name} ({limits.conditions_text})."
-    else:
-        scatter = f" and scatter by {with_uncertainty(found.scatter)}" if found.scatter and found.scatter.value else ""
-        scatter = scatter or " and do not scatter" * (found.scatter is not None)
-        yield f"{found.n} {name} have the mean {with_uncertainty(found.mean)}{scatter} ({limits.conditions_text})."
+    found, levels_off = limits.statistics, limits.conditions.levels_off
+    tops = "top" if found.n == 1 else "tops"
+    lost = f"The {tops} fell" if limits.which == "lower" else f"The drive lost the {tops}"
+    lost = f"The {tops} went no faster than" if levels_off else f"{lost} at"
+    spread = f", which scatter by {with_uncertainty(found.scatter)}" if found.scatter and found.scatter.value else ""
+    spread = spread or ", which do not scatter" * (found.scatter is not None)
+    average = " on average" * (found.n > 1)
+    count = how_many(found.n, "spin" if levels_off else f"{limits.which} limit")
+    yield f"{lost} {with_uncertainty(found.mean)}{average}: {count}{spread} ({limits.conditions_text})."
     if found.between:
         beyond = with_uncertainty(found.between) if found.between.value else "no more than their tops do"
         yield f"They are of {found.runs} runs, which differ by {beyond}."
     if limits.ends and found.n > 1:
         yield "The top " + ", ".join(f"{ENDS[kind]} {_times(n)}" for kind, n in limits.ends.items()) + "."
-    if limits.conditions.levels_off:
+    if levels_off:
         yield "The pull of the drive equals the drag there: a stronger drive gets higher, this is no limit of the top."
         return
     if limits.causes:
