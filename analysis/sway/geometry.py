@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from analysis.errors import ShapesDiffer, TooFewReadings
 from analysis.sway.joint import Corrections, Joint, fit_together
-from analysis.sway.lines import vertical_swing
 from analysis.sway.orbit import NoSwing, slow_swings, small_swings
+from analysis.sway.vertical import vertical_swing
 from analysis.uncertainty import Estimate, partly_believed, propagate
 
 if TYPE_CHECKING:
@@ -235,7 +235,7 @@ def _misfit(swings: Sequence[Swings], spin: Array, known: Known) -> float:
     except NoSwing:
         return math.inf
     backward, forward = one.frequency[:2].tolist()
-    off = one.vertical - vertical_swing(backward, forward, slope, known.top.gravity)
+    off = one.vertical.value - vertical_swing(backward, forward, slope, known.top.gravity)
     u = math.hypot(_VERTICAL_U_HZ, _VERTICAL_SHIFT_U * one.size**2 / max(_away(one), NEAREST_HZ))
     energy = 4 * float(np.sum(np.log(one.amplitude[:2])))
     uneven = share.std() / (bent * (abs(share.mean()) + 1e-9))
@@ -244,7 +244,7 @@ def _misfit(swings: Sequence[Swings], spin: Array, known: Known) -> float:
 
 def _away(swings: Swings) -> float:
     """Return how far the beat of the slow swings is from the vertical swing [Hz]."""
-    return abs(float(swings.frequency[1] - swings.frequency[0]) - swings.vertical)
+    return abs(float(swings.frequency[1] - swings.frequency[0]) - swings.vertical.value)
 
 
 def _doubt(swings: Swings) -> float:

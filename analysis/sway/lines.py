@@ -3,8 +3,9 @@
 In a window the place x + iy is a sum of waves: the backward and the forward slow swing and the precession, each with a
 frequency and a slope, and the four lines at the slow swings' frequencies plus and minus that of the vertical swing,
 since the field changes with height.  One of those four lies within 0.2 Hz of the backward swing: a fit without it is
-wrong by tens of millihertz.  Noise is white.  Amplitudes are linear; frequencies follow by Gauss and Newton from the
-peaks of a spectrum, from several starts, of which the one of the greatest likelihood is kept.
+wrong by tens of millihertz.  Where the height is known, it gives the vertical swing.  Noise is white.  Amplitudes are
+linear; frequencies follow by Gauss and Newton from the peaks of a spectrum, from several starts, of which the likeliest
+is kept.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError, NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewReadings
 from analysis.lines import spectral_lines
+from analysis.sway.vertical import BESIDE, VERTICAL_U_HZ, Vertical, beside, of_heights, of_places, vertical_swing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -33,10 +35,6 @@ WINDOW_S, FEWEST = 20.0, 100
 #: Where the slow swings and the precession of a top are looked for [Hz]: the thesis's top has 0.3 to 1.1 and 4 to 12 Hz
 #: over its window of masses and spins.
 SLOW_HZ, PRECESSION_HZ = (0.15, 1.6), (2.5, 15.0)
-#: B′/2B [1/m] that the prior of the vertical swing follows from, and that swing's standard uncertainty [Hz].
-GRADIENT_PER_M, VERTICAL_U_HZ = 9.3, 0.03
-#: No top floats whose vertical swing is slower [Hz].
-_SLOWEST_HZ = 0.2
 #: Prior of the slopes [Hz/s]: a spin that falls by up to 0.4 Hz/s changes the slow swings by up to 6 mHz per Hz and the
 #: precession by up to 0.5 Hz per Hz.
 _SLOPES_U = np.array([2e-3, 2e-3, 0.2])
@@ -69,7 +67,7 @@ class Swings:
             signed: positive in the sense of the spin [Hz].
         u: standard uncertainties, same shape [Hz].
         amplitude: same shape [m].
-        vertical: the vertical swing, as the combination lines have it [Hz].
+        vertical: the vertical swing, as the lines beside the slow swings and the heights have it [Hz].
         others: frequency, its u [Hz] and amplitude [m] of the lines at forward less vertical and at backward plus
             vertical swing, shape (2, 3): they may be taken for the backward and for the forward swing that are near.
         noise: standard deviation of a coordinate [m].
@@ -81,7 +79,7 @@ class Swings:
     frequency: Array
     u: Array
     amplitude: Array
-    vertical: float
+    vertical: Vertical
     others: Array
     noise: float
     misfit: float
@@ -95,7 +93,7 @@ class Swings:
         lines, others = np.array([self.frequency, self.u, self.amplitude]), self.others.copy()
         others[k], lines[:, k] = lines[:, k], self.others[k]
         frequency, u, amplitude = lines
-        beat = float(self.frequency[1] - self.frequency[0])
+        beat = Vertical(float(self.frequency[1] - self.frequency[0]), math.hypot(*self.u[:2]))
         return replace(self, frequency=frequency, u=u, amplitude=amplitude, vertical=beat, others=others)
 
     @property
@@ -114,12 +112,13 @@ class Swings:
         return math.hypot(self.u[0], self.u[1])
 
 
-def swings_of(times: Array, places: Places, *, window: float = WINDOW_S) -> list[Swings]:
+def swings_of(times: Array, places: Places, heights: Array | None = None, *, window: float = WINDOW_S) -> list[Swings]:
     """Return the swings of all windows in which they stand out.
 
     Args:
         times: increasing, not necessarily evenly, shape (n,) [s].
         places: x + iy, shape (n,) [m], seen so that the spin is positive.
+        heights: shape (n,) [m]; None where they are not known.
         window: [s].
 
     Raises:
@@ -127,13 +126,18 @@ def swings_of(times: Array, places: Places, *, window: float = WINDOW_S) -> list
         NoSwings: they stand out in none.
     """
     t, s = _check(times, places)
+    z = None if heights is None else np.asarray(heights, dtype=np.float64)
+    if z is not None:
+        if z.shape != t.shape:
+            raise ShapesDiffer(quantity="the height", seen=z.shape, expected=t.shape)
+        _refuse_unless_finite("height", z)
     borders = np.searchsorted(t, np.linspace(t[0], t[-1], max(round(float(t[-1] - t[0]) / window), 1) + 1))
     borders[-1] = t.size
     parts = [slice(*ends) for ends in itertools.pairwise(borders.tolist()) if ends[1] - ends[0] >= FEWEST]
     found: list[Swings] = []
     used = []
     for part in parts:
-        if one := swings_in_window(t[part], s[part], found[-1:]):
+        if one := swings_in_window(t[part], s[part], None if z is None else z[part], near=found[-1:]):
             found.append(one)
             used.append(part)
     if not found:
@@ -142,47 +146,40 @@ def swings_of(times: Array, places: Places, *, window: float = WINDOW_S) -> list
         near = [
             one for one in found[max(k - 1, 0) : k + 2] if abs(one.frequency[0] - found[k].frequency[0]) > _APART_HZ
         ]
-        if near and (one := swings_in_window(t[part], s[part], near)):
+        if near and (one := swings_in_window(t[part], s[part], None if z is None else z[part], near=near)):
             found[k] = one
     return found
 
 
 def _check(times: Array, places: Places) -> tuple[Array, Places]:
-    t, s = np.asarray(times, dtype=np.float64), np.asarray(places, dtype=np.complex128)
-    if t.ndim != 1 or s.shape != t.shape:
-        raise ShapesDiffer(quantity="the place", seen=s.shape, expected=(t.size,))
+    t = np.asarray(times, dtype=np.float64)
+    if t.ndim != 1 or np.shape(places) != t.shape:
+        raise ShapesDiffer(quantity="the place", seen=np.shape(places), expected=(t.size,))
     if t.size < FEWEST:
         raise TooFewReadings(seen=t.size, needed=FEWEST)
-    for quantity, values in (("time", t), ("place", s)):
-        if (wrong := np.flatnonzero(~np.isfinite(values))).size:
-            raise NotFinite(quantity=quantity, index=int(wrong[0]), value=math.nan)
+    s = np.asarray(places, dtype=np.complex128)
+    _refuse_unless_finite("time", t)
+    _refuse_unless_finite("place", s)
     if (back := np.flatnonzero(np.diff(t) <= 0)).size:
         k = int(back[0])
         raise TimesNotIncreasing(index=k + 1, before=float(t[k]), after=float(t[k + 1]))
     return t, s
 
 
-def vertical_swing(backward: float, forward: float, gradient: float = GRADIENT_PER_M, gravity: float = 9.82) -> float:
-    """Return the frequency of the vertical swing that goes with two slow ones [Hz].
-
-    A field without sources and currents has α_v² = g B′/2B − 2|α₋α₊|: what stiffens the swings sideways softens the
-    one up and down.
-
-    Args:
-        backward: slow swing, negative [Hz].
-        forward: slow swing, positive [Hz].
-        gradient: B′/2B at the top [1/m].
-        gravity: [m/s²].
-    """
-    return math.sqrt(max(gravity * gradient / (4 * math.pi**2) + 2 * backward * forward, _SLOWEST_HZ**2))
+def _refuse_unless_finite(quantity: str, values: Array | Places) -> None:
+    if (wrong := np.flatnonzero(~np.isfinite(values))).size:
+        raise NotFinite(quantity=quantity, index=int(wrong[0]), value=math.nan)
 
 
-def swings_in_window(t: Array, s: Places, near: Sequence[Swings] = ()) -> Swings | None:
+def swings_in_window(
+    t: Array, s: Places, heights: Array | None = None, *, near: Sequence[Swings] = ()
+) -> Swings | None:
     """Return the swings of one window; None where they do not stand out.
 
     Args:
         t: shape (n,) [s].
         s: shape (n,) [m].
+        heights: shape (n,) [m]; None where they are not known.
         near: swings at nearby times, from which the search starts, too.
     """
     lines = _spectrum(t, s)
@@ -194,12 +191,23 @@ def swings_in_window(t: Array, s: Places, near: Sequence[Swings] = ()) -> Swings
     starts = [one.frequency[:2] for one in near]
     starts += [np.array([backward, forward[0]]) for backward in {*seen, seen[0] - apart, seen[0] + apart}]
     starts += [np.array([backward, one]) for backward in seen[:2] for one in forward[1:]]
-    fits = [_fit(t, s, start, np.zeros(2)) for start in starts]
-    slow, rest = min(fits, key=lambda one: one[0].misfit)
-    ahead, back = _precession(t, rest), _precession(t, rest.conj())
-    if ahead is not None:
-        slow, _ = _fit(t, s, np.append(slow.frequency, ahead.frequency), np.array([0, 0, ahead.slope]))
-    return replace(slow, backwards=0.0 if back is None else back.amplitude)
+    fits = [_fit(t, s, start, np.zeros(2), _expected(t, heights, start)) for start in starts]
+    best = min(fits, key=lambda one: one.swings.misfit)
+    ahead, back = _precession(t, best.rest), _precession(t, best.rest.conj())
+    slow = best.swings.frequency
+    expected, rise = _expected(t, heights, slow), best.vertical(t, s).value
+    if ahead is None:
+        best = _fit(t, s, slow, np.zeros(2), expected, rise=rise)
+    else:
+        best = _fit(t, s, np.append(slow, ahead.frequency), np.array([0, 0, ahead.slope]), expected, rise=rise)
+    return replace(best.swings, vertical=best.vertical(t, s), backwards=0.0 if back is None else back.amplitude)
+
+
+def _expected(t: Array, heights: Array | None, slow: Array) -> Vertical:
+    """Return the vertical swing that goes with the slow ones [Hz], and, where the heights are known, with them."""
+    backward, forward = slow.tolist()
+    expected = Vertical(vertical_swing(backward, forward), VERTICAL_U_HZ)
+    return expected if heights is None else of_heights(t - t.mean(), heights, expected, forward - backward)
 
 
 class _Precession(NamedTuple):
@@ -240,33 +248,47 @@ def _peaks(lines: Sequence[Line], between: tuple[float, float]) -> list[float]:
     return [line.frequency for line in lines if between[0] < line.frequency < between[1]]
 
 
-#: The lines beside the slow swings: of which swing, and which times the vertical swing is added.
-_BESIDE = ((1, -1), (0, 1), (1, 1), (0, -1))
+class _Fit(NamedTuple):
+    """Swings, what they leave of the places, and what they were fitted with: waves, drift, and the vertical swing."""
+
+    swings: Swings
+    rest: Places
+    waves: Places
+    still: Array
+    expected: Vertical
+
+    def vertical(self, t: Array, s: Places) -> Vertical:
+        """Return the vertical swing by the lines beside the slow ones, wherever they are [Hz]."""
+        return of_places(t - t.mean(), s, self.waves, self.still, self.expected)
 
 
-def _fit(t: Array, s: Places, start: Array, slopes_start: Array) -> tuple[Swings, Places]:
-    """Return the swings of greatest likelihood near a start [Hz] with slopes [Hz/s], shape (2 or 3,), and the rest."""
+def _fit(t: Array, s: Places, start: Array, slopes_start: Array, known: Vertical, *, rise: float | None = None) -> _Fit:
+    """Return the swings of greatest likelihood near a start [Hz] with slopes [Hz/s], shape (2 or 3,).
+
+    known: of the vertical swing without the places; rise: where it is looked for first, there unless given [Hz].
+    """
     late, half, count = t - t.mean(), float(t[-1] - t[0]) / 2, start.size
     frequency, slope = start.copy(), slopes_start.copy()
-    rise = vertical_swing(start[0], start[1])
+    rise = known.value if rise is None else rise
+    more = known.value - vertical_swing(start[0], start[1])
     still = np.stack([np.ones_like(late), late / half], axis=1)
     prior = np.zeros((count + 1, 2 * count + 1))  # what is known of the slopes and the vertical swing, over its u
     prior[:count, count:-1] = np.diag(1 / _SLOPES_U[:count])
-    prior[-1, -1] = 1 / VERTICAL_U_HZ
+    prior[-1, -1] = 1 / known.u
     most = np.concatenate([np.full(count, 0.3 / half), np.full(count, 0.3 / half**2), [0.1 / half]])
     quarter = 2j * np.pi * late[:, None]
     for _ in range(_STEPS):
         waves = np.exp(quarter * (frequency + late[:, None] * slope / 2))
         up = np.exp(quarter[:, 0] * rise)
-        beside = np.stack([waves[:, i] * (up if sign > 0 else up.conj()) for i, sign in _BESIDE], axis=1)
-        linear = np.concatenate([waves, beside, still], axis=1)
+        lines = beside(waves, up)
+        linear = np.concatenate([waves, lines, still], axis=1)
         normal = linear.conj().T @ linear + 1e-9 * t.size * np.eye(linear.shape[1])
         amplitudes = np.linalg.solve(normal, linear.conj().T @ s)
         rest = s - linear @ amplitudes
         noise = math.sqrt(float(np.sum(np.abs(rest) ** 2)) / (2 * (t.size - linear.shape[1] - count)))
         moving = waves * amplitudes[:count]
         turned = quarter[:, 0] * 0
-        for (i, sign), part in zip(_BESIDE, (beside * amplitudes[count:-2]).T, strict=True):
+        for (i, sign), part in zip(BESIDE, (lines * amplitudes[count:-2]).T, strict=True):
             moving[:, i] += part
             turned += sign * part
         slopes = np.concatenate(
@@ -275,7 +297,7 @@ def _fit(t: Array, s: Places, start: Array, slopes_start: Array) -> tuple[Swings
         slopes -= linear @ np.linalg.solve(normal, linear.conj().T @ slopes)
         information = (slopes.conj().T @ slopes).real / noise**2
         gradient = (slopes.conj().T @ rest).real / noise**2
-        expected = vertical_swing(frequency[0], frequency[1])  # its own slopes would move the swings by 1e-6 Hz
+        expected = vertical_swing(frequency[0], frequency[1]) + more  # its own slopes would move the swings by 1e-6 Hz
         off = np.append(slope / _SLOPES_U[:count], (rise - expected) * prior[-1, -1])
         information += prior.T @ prior
         gradient -= prior.T @ off
@@ -294,9 +316,9 @@ def _fit(t: Array, s: Places, start: Array, slopes_start: Array) -> tuple[Swings
         frequency=frequency,
         u=np.sqrt(np.diagonal(covariance)[:count]),
         amplitude=np.abs(amplitudes[:count]),
-        vertical=rise,
+        vertical=Vertical(rise, math.sqrt(covariance[-1, -1])),
         others=np.stack([shifted, u_others, np.abs(amplitudes[count : count + 2])], axis=1),
         noise=noise,
         misfit=2 * t.size * math.log(noise**2) + float(off @ off),
     )
-    return found, rest
+    return _Fit(found, rest, waves, still, known)

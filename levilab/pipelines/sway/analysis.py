@@ -97,10 +97,10 @@ def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRu
     known, notes = known_of(source, options)
     times, places = readings.time, readings.x + 1j * readings.y
     try:
-        swings = swings_of(times, places)
+        swings = swings_of(times, places, readings.height)
         view = mirrored(swings)
         if view:
-            swings = swings_of(times, places.conj())
+            swings = swings_of(times, places.conj(), readings.height)
         at = np.interp([one.time for one in swings], times, np.abs(spin))
         geometry = geometric_magnetism(swings, at, known)
     except AnalysisError as error:
@@ -153,7 +153,7 @@ def _doubts(swings: Sequence[Swings], found: Geometry, *, view: bool | None) -> 
         )
     elif (found.measured.u or 0.0) > large:
         beat = float(np.mean([one.frequency[1] - one.frequency[0] for one in swings]))
-        vertical = float(np.mean([one.vertical for one in swings]))
+        vertical = float(np.mean([one.vertical.value for one in swings]))
         yield (
             f"u is large: the beat of the slow swings, {beat:.2f} Hz, is near the vertical swing, {vertical:.2f} Hz, "
             "and they exchange energy; add or take off a washer of 0.1 g, or let the top swing less"

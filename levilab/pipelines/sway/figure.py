@@ -88,6 +88,6 @@ def _draw_spectrum(axes: Axes, analysis: SwayAnalysis) -> None:
     text = (
         f"spectrum of x + iy around {one.time:.0f} s,\nat a spin of {run.spin[k]:.1f} Hz; smaller lines\nbeside the "
         "slow swings belong to\nthe vertical swing, "
-        f"{one.vertical:.2f} Hz"
+        f"{one.vertical.value:.2f} Hz"
     )
     axes.text(_BESIDE, 1.0, text, transform=axes.transAxes, va="top", fontsize=8)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 #: Columns of a table that are looked at, and those without which it is no track.
-QUANTITIES = ("time_s", "x_m", "y_m", "spin_frequency_hz")
+QUANTITIES = ("time_s", "x_m", "y_m", "height_m", "spin_frequency_hz")
 NEEDED = QUANTITIES[:3]
 #: Of a magnetometer's record.
 _FIELD = ("time_s", "flux_density_x_t", "flux_density_y_t")
@@ -42,6 +42,7 @@ class SwayReadings(Readings):
     Attributes:
         time: [s].
         x, y: across the axis, seen from above [m].
+        height: [m]; None where the table has none, or not for each place.
         spin: [Hz]; None where the table has none.
         warnings: about the file.
     """
@@ -49,6 +50,7 @@ class SwayReadings(Readings):
     time: Array
     x: Array
     y: Array
+    height: Array | None
     spin: Array | None
     warnings: tuple[str, ...]
 
@@ -105,4 +107,7 @@ def _readings(table: Table) -> SwayReadings:
         f"the top is {np.hypot(x, y)[i]:.3g} m off, less than {_FARTHEST_M:g} m is expected: if the unit is another "
         "one, say so, as `columns` = x=NAME [mm],y=NAME [mm]"
     ))  # fmt: skip
-    return SwayReadings(time, x, y, table.columns.get("spin_frequency_hz"), table.warnings)
+    height, spin = table.columns.get("height_m"), table.columns.get("spin_frequency_hz")
+    if height is not None and not np.isfinite(height).all():
+        height = None
+    return SwayReadings(time, x, y, height, spin, table.warnings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,7 @@ from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts,
 from levilab.pipelines.row import cells_of
 from levilab.pipelines.sway.analysis import QUANTITIES
 from levilab.present.document.blocks import Listing, Paragraph, Tabular
-from levilab.present.numbers import plain, short_name, with_decimals, with_uncertainty, without_unit
+from levilab.present.numbers import short_name, with_decimals, with_uncertainty, without_unit
 from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:
@@ -42,11 +43,11 @@ def windows_table(run: SwayRun, name: str) -> Table:
     """Return the swings, window by window."""
     rows = [
         (
-            with_decimals(one.time, 1),
-            with_decimals(float(spin), 2),
+            with_decimals(one.time, 0),
+            with_decimals(float(spin), 1),
             *(without_unit(Estimate(float(f), float(u), "Hz")) for f, u in zip(one.frequency, one.u, strict=True)),
             *["—"] * (3 - one.frequency.size),
-            "/".join(plain(1e3 * a) for a in one.amplitude[:2].tolist()),
+            without_unit(Estimate(*one.vertical, "Hz")),
             with_decimals(1e3 * float(split), 1),
             with_decimals(1e3 * float(expected), 1),
         )
@@ -55,7 +56,7 @@ def windows_table(run: SwayRun, name: str) -> Table:
         )
     ]
     heads = (
-        "t [s]", "spin\n[Hz]", "backward\n[Hz]", "forward\n[Hz]", "precession\n[Hz]", "size\n[mm]", "split\n[mHz]",
+        "t\n[s]", "spin\n[Hz]", "backward\n[Hz]", "forward\n[Hz]", "precession\n[Hz]", "vertical\n[Hz]", "split\n[mHz]",
         "predicted\n[mHz]",
     )  # fmt: skip
     return table(f"Windows of {name}", heads, rows, numbers=heads)
@@ -79,6 +80,8 @@ def sway_columns(analysis: SwayAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
             "forward_frequency_u_hz": u[:, 1],
             "precession_frequency_hz": frequency[:, 2],
             "precession_frequency_u_hz": u[:, 2],
+            "vertical_frequency_hz": np.array([one.vertical.value for one in swings]),
+            "vertical_frequency_u_hz": np.array([one.vertical.u for one in swings]),
             "split_hz": found.splits,
             "split_predicted_hz": found.expected,
             "residual_hz": found.splits - found.expected,
@@ -125,9 +128,11 @@ def sway_part(analysis: SwayAnalysis) -> ReportPart:
 def _in_words(source: Source[SwayReadings], run: SwayRun, *_: object) -> tuple[str, ...]:
     time = source.readings.time
     noise = 1e3 * max(one.noise for one in run.swings)
+    size = 1e3 * math.sqrt(max(one.size for one in run.swings))
     rate = (len(time) - 1) / float(time[-1] - time[0])
     return (
         f"{len(time)} places from {time[0]:.1f} s to {time[-1]:.1f} s, {rate:.0f} a second",
+        f"swings: {size:.2g} mm at most, root of the sum of both amplitudes' squares",
         f"residuals of a coordinate: standard deviation {noise:.2g} mm at most",
     )
 

@@ -11,6 +11,7 @@ from analysis.stability import SymmetricTop, modes
 from analysis.sway import Known, Swings, geometric_magnetism, mirrored, slow_swings, swings_of
 from analysis.sway.lines import NoSwings
 from analysis.sway.orbit import NoSwing
+from analysis.sway.vertical import Vertical
 from levilab.simulator import preset, simulate
 
 RING = Ring(1.40e-3, 0.0, 0.0, 0.030, 0.055)
@@ -70,7 +71,28 @@ def test_the_vertical_swing_is_that_of_the_lines_beside(fresh):
     places = swing(times, (-0.5945, 0.7400)) + 1e-4 * np.exp(2j * np.pi * (0.74 + 1.23) * times)
     places += 1e-4 * (fresh.normal(size=times.size) + 1j * fresh.normal(size=times.size))
     # the usual field has 1.198 Hz, with u of 0.03 Hz; a line of this strength is known to 1 mHz
-    assert swings_of(times, places)[0].vertical == pytest.approx(1.23, abs=0.004)
+    assert swings_of(times, places)[0].vertical.value == pytest.approx(1.23, abs=0.004)
+
+
+@pytest.mark.parametrize(("beside", "rising"), [(0.0, 5e-5), (2e-5, 0.0), (0.0, 0.0)])
+def test_the_vertical_swing_has_its_uncertainty(fresh, beside, rising):
+    times = np.arange(2400) / 120
+    pulls, u = [], []
+    for _ in range(12):
+        rise = fresh.normal(1.198, 0.03)  # that of the usual field
+        places = swing(times, (-0.5945, 0.7400)) + 1e-4 * (fresh.normal(size=2400) + 1j * fresh.normal(size=2400))
+        for frequency in (0.74 - rise, rise - 0.5945, 0.74 + rise, -0.5945 - rise):
+            places += beside * np.exp(2j * np.pi * frequency * times + 1j * fresh.uniform(0, 2 * np.pi))
+        heights = 0.073 + rising * np.cos(2 * np.pi * rise * times + 1) + 2e-4 * fresh.normal(size=2400)
+        found = swings_of(times, places, heights)[0].vertical
+        pulls.append((found.value - rise) / found.u)
+        u.append(found.u)
+    if rising:  # bound of Cramér and Rao of a sine of 50 µm in noise of 200 µm, whose amplitude is known to 12 %
+        assert np.mean(u) == pytest.approx(np.sqrt(6 / 2400) * (2e-4 / 5e-5) / (np.pi * 20), rel=4 * 0.12 / np.sqrt(12))
+    elif not beside:  # nothing shows it
+        assert np.mean(u) == pytest.approx(0.03, rel=0.1)
+    assert abs(np.mean(pulls)) < 4 / np.sqrt(12)  # 4 standard errors
+    assert np.std(pulls) == pytest.approx(1, abs=4 / np.sqrt(24))
 
 
 def test_a_mirrored_view_is_known_by_the_precession(fresh):
@@ -158,7 +180,9 @@ def test_tops_in_full_motion_have_the_split_that_is_predicted(fresh):
 
 
 def lines(slow, u=3e-4):
-    return Swings(0.0, np.array(slow), np.full(2, u), np.full(2, 1e-5), 1.2, np.zeros((2, 3)), 1e-4, 0.0)
+    return Swings(
+        0.0, np.array(slow), np.full(2, u), np.full(2, 1e-5), Vertical(1.2, 0.03), np.zeros((2, 3)), 1e-4, 0.0
+    )
 
 
 def three_lines(frequencies):
@@ -182,8 +206,7 @@ def test_a_swing_and_a_line_of_the_vertical_swing_are_distinguished_by_the_spin(
     for spin in spins:
         backward, forward = sorted(sorted(modes(field, TOP, HEIGHT, spin).real, key=abs)[:2])
         others = np.array([[forward - 1.19, 3e-4, 2e-5], [backward + 1.19, 3e-4, 2e-5]])
-        one = Swings(0.0, np.array([backward, forward]), np.full(2, 3e-4), np.full(2, 1e-5), 1.19, others, 1e-4, 0.0)
-        seen.append(one.turned(which))
+        seen.append(replace(lines((backward, forward)), others=others).turned(which))
     found = geometric_magnetism(seen, spins, known(0.02526))
     assert found.gradient.value == pytest.approx(abs(slope / (2 * b)), rel=1e-3)
 
@@ -218,7 +241,9 @@ def test_all_lines_together_correct_what_is_known_but_not_exactly(axial):
 
 
 def test_the_shift_by_the_size_of_the_swings_is_in_u_by_its_part():
-    swings = [replace(lines((-0.59, 0.77)), amplitude=np.full(2, 1e-3), vertical=3.0)]  # far from the beat
+    swings = [
+        replace(lines((-0.59, 0.77)), amplitude=np.full(2, 1e-3), vertical=Vertical(3.0, 0.03))
+    ]  # far from the beat
     found = geometric_magnetism(swings, np.array([30.0]), known(0.02526))
     (shift,) = np.abs(found.shifts.sum(axis=1))
     assert shift > 5e-4

@@ -1,0 +1,135 @@
+"""The vertical swing of a top: what the field, the heights and the places sideways say about its frequency.
+
+Each gives a probability along a grid of frequencies, with the amplitudes of all lines fitted at each: the lines of the
+vertical swing may be as weak as the noise, or missing, and then a slope at one frequency says nothing about others.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+Array = NDArray[np.float64]
+Places = NDArray[np.complex128]
+
+#: B′/2B [1/m] that the prior of the vertical swing follows from, and that swing's standard uncertainty [Hz].
+GRADIENT_PER_M, VERTICAL_U_HZ = 9.3, 0.03
+#: No top floats whose vertical swing is slower [Hz].
+_SLOWEST_HZ = 0.2
+#: The grid: to either side of what is expected, in its u; points in the width of a line; to either side of the most
+#: probable frequency, in the u that a normal distribution has there, and points.
+_FAR, _IN_A_LINE, _NEAR, _POINTS = 4.0, 6, 6.0, 25
+#: What the lines leave is at least this part of what they explain: rounding.
+_FINEST = 1e-9
+
+
+class Vertical(NamedTuple):
+    """A frequency of the vertical swing and its standard uncertainty [Hz]."""
+
+    value: float
+    u: float
+
+
+def vertical_swing(backward: float, forward: float, gradient: float = GRADIENT_PER_M, gravity: float = 9.82) -> float:
+    """Return the frequency of the vertical swing that goes with two slow ones [Hz].
+
+    A field without sources and currents has α_v² = g B′/2B − 2|α₋α₊|: what stiffens the swings sideways softens the
+    one up and down.
+
+    Args:
+        backward: slow swing, negative [Hz].
+        forward: slow swing, positive [Hz].
+        gradient: B′/2B at the top [1/m].
+        gravity: [m/s²].
+    """
+    return math.sqrt(max(gravity * gradient / (4 * math.pi**2) + 2 * backward * forward, _SLOWEST_HZ**2))
+
+
+def of_heights(late: Array, heights: Array, expected: Vertical, beat: float) -> Vertical:
+    """Return the vertical swing as heights have it.
+
+    Args:
+        late: times from the middle, shape (n,) [s].
+        heights: shape (n,) [m].
+        expected: without them.
+        beat: of the slow swings, which is seen in the heights, too [Hz].
+    """
+    turns = 2 * np.pi * late * beat
+    still = np.linalg.qr(np.column_stack([np.ones_like(late), late, np.cos(turns), np.sin(turns)]))[0]
+    rest = heights - still @ (still.T @ heights)
+
+    def misfit(rise: float) -> float:
+        turns = 2 * np.pi * late * rise
+        return _misfit(rest, np.column_stack([np.cos(turns), np.sin(turns)]), still)
+
+    return _posterior(misfit, expected, float(np.ptp(late)))
+
+
+def of_places(late: Array, places: Places, waves: Places, still: Array, expected: Vertical) -> Vertical:
+    """Return the vertical swing as the lines beside the slow swings have it.
+
+    Args:
+        late: times from the middle, shape (n,) [s].
+        places: shape (n,) [m].
+        waves: the slow swings first, shape (n, 2 or 3).
+        still: what else is in the places, shape (n, k).
+        expected: without them.
+    """
+    others = np.linalg.qr(np.concatenate([waves, still], axis=1))[0]
+    rest = places - others @ (others.conj().T @ places)
+
+    def misfit(rise: float) -> float:
+        return _misfit(rest, beside(waves, np.exp(2j * np.pi * late * rise)), others)
+
+    return _posterior(misfit, expected, float(np.ptp(late)))
+
+
+#: The lines beside the slow swings: of which swing, and which times the vertical swing is added.
+BESIDE = ((1, -1), (0, 1), (1, 1), (0, -1))
+
+
+def beside(waves: Places, up: Places) -> Places:
+    """Return the waves of the lines beside the slow swings, shape (n, 4), by those of the vertical swing, (n,)."""
+    return np.stack([waves[:, i] * (up if sign > 0 else up.conj()) for i, sign in BESIDE], axis=1)
+
+
+def _misfit(rest: NDArray[np.number], lines: NDArray[np.number], others: NDArray[np.number]) -> float:
+    """Return −2 times the logarithm of the likelihood of what the others leave, but for a constant.
+
+    The lines may be there or not, each as probable; their amplitudes cost what a prior as wide as one reading costs
+    (Schwarz, Ann. Stat. 6, 461 (1978)).
+    """
+    numbers = 2 if np.iscomplexobj(rest) else 1  # of each reading
+    count, paid = numbers * rest.size, numbers * lines.shape[1]
+    lines = np.linalg.qr(lines - others @ (others.conj().T @ lines))[0]
+    energy = float(np.linalg.norm(rest) ** 2)
+    left = max(energy - float(np.linalg.norm(lines.conj().T @ rest) ** 2), _FINEST**2 * energy)
+    there = count * math.log(left / energy) + paid * math.log(count)
+    return -2 * float(np.logaddexp(-there / 2, 0.0))
+
+
+def _posterior(misfit: Callable[[float], float], expected: Vertical, length: float) -> Vertical:
+    """Return mean and standard deviation of the probability that goes with −2 log L and a normal prior."""
+
+    def whole(rise: float) -> float:
+        return misfit(rise) + ((rise - expected.value) / expected.u) ** 2
+
+    count = 2 * math.ceil(_FAR * expected.u * length * _IN_A_LINE / 2) + 3
+    coarse = np.linspace(-_FAR, _FAR, count) * expected.u + expected.value
+    values = np.array([whole(rise) for rise in coarse.tolist()])
+    k = int(np.clip(np.argmin(values), 1, count - 2))
+    step = coarse[1] - coarse[0]
+    bend = max(float(values[k - 1] - 2 * values[k] + values[k + 1]) / step**2, 2 / expected.u**2)
+    top = coarse[k] + np.clip((values[k - 1] - values[k + 1]) / (2 * step * bend), -step, step)
+    fine = np.linspace(-_NEAR, _NEAR, _POINTS) * math.sqrt(2 / bend) + top
+    grid, first = np.unique(np.concatenate([coarse, fine]), return_index=True)
+    values = np.concatenate([values, [whole(rise) for rise in fine.tolist()]])[first]
+    weights = np.exp((values.min() - values) / 2) * np.gradient(grid)
+    mean = float(np.average(grid, weights=weights))
+    return Vertical(mean, math.sqrt(float(np.average((grid - mean) ** 2, weights=weights))))
