@@ -2,6 +2,7 @@
 PYTHON ?= python3
 BIN    := .venv/bin
 DEMO   := demo
+OTHER_PYTHONS = $(shell $(BIN)/python -c 'import sys; print(*(f"3.{k}" for k in range(11, 15) if k != sys.version_info[1]))')
 
 # keep bytecode whatever the environment says: the tests start hundreds of processes, which would compile it anew
 export PYTHONDONTWRITEBYTECODE :=
@@ -57,11 +58,11 @@ lint: setup  ## style, types, import rules, and the number of lines
 	$(BIN)/lint-imports --no-cache
 	@$(BIN)/python tests/support/size.py
 
-all-pythons: setup  ## the tests on every Python from 3.11 on that is installed
+all-pythons: setup  ## the tests against the wheel, on every other Python from 3.11 on that is installed
 	@# pyenv shows only the versions that PYENV_VERSION names
 	@if command -v pyenv >/dev/null; then \
 	  PYENV_VERSION="$$(pyenv version-name):$$(pyenv versions --bare | tr '\n' ':')"; export PYENV_VERSION; fi; \
-	$(BIN)/nox --session tests
+	$(BIN)/nox --session tests --pythons $(OTHER_PYTHONS)
 
 wheel: setup  ## build the wheel into dist/ and try it in a clean environment, beside a decoy
 	$(BIN)/nox --session wheel
