@@ -299,16 +299,12 @@ def _did_not_follow(session: Session[D], target: float, seen: str) -> DidNotFoll
     lowest, highest = _USUAL_WINDOW_HZ
     if not lowest <= target <= highest:
         return DidNotFollow(
-            Text(
-                "{observed}; a Levitron of the usual kind floats only between {lowest:.2f} and {highest:.2f} Hz",
-                observed=observed,
-                lowest=lowest,
-                highest=highest,
-            ),
-            Text(
-                "ask for a spin between these ({name}.drive_frequency_hz); levilab stability computes them for a top",
-                name=name,
-            ),
+            "{observed}; a Levitron of the usual kind floats only between {lowest:.2f} and {highest:.2f} Hz",
+            "ask for a spin between these ({name}.drive_frequency_hz); levilab stability computes them for a top",
+            observed=observed,
+            lowest=lowest,
+            highest=highest,
+            name=name,
         )
     return DidNotFollow(
         observed, Text("ramp slower ({name}.ramp_hz_per_s) or drive harder ({name}.drive_amplitude_vpp)", name=name)
@@ -322,8 +318,12 @@ def _no_light(session: Session[D]) -> NoLight:
         level = Text(" at {level:g} V", level=session.settings.trigger_level_v)
         where = Text(" ({name}.trigger_level_v in the bench file)", name=name)
     return NoLight(
-        Text("the counter sees no {signal}{level}", signal=signal.name, level=level),
-        Text("{advice}{where}?", advice=signal.advice, where=where),
+        "the counter sees no {signal}{level}",
+        "{advice}{where}?",
+        signal=signal.name,
+        level=level,
+        advice=signal.advice,
+        where=where,
     )
 
 

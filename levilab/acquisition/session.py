@@ -51,7 +51,9 @@ class ExperimentFailed(LevilabError):
         advice: what is to be done; empty where `observed` says it.
     """
 
-    def __init__(self, observed: str, advice: str = "") -> None:
+    def __init__(self, observed: str, advice: str = "", /, **values: object) -> None:
+        if values:  # then both are templates
+            observed, advice = Text(observed, **values), Text(advice, **values)
         self.observed, self.advice = observed, advice
         super().__init__(Text("{observed}: {advice}", observed=observed, advice=advice) if advice else observed)
 
@@ -309,7 +311,7 @@ class Session(Generic[S]):
         """
         if self.rows and not row["time_s"] > self.rows[-1]["time_s"]:
             raise ExperimentFailed(
-                Text("the clock went back: {now} s after {before} s", now=row["time_s"], before=self.rows[-1]["time_s"])
+                "the clock went back: {now} s after {before} s", now=row["time_s"], before=self.rows[-1]["time_s"]
             )
         self.writer.reading(row)
         self.rows.append(row)

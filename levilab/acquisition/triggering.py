@@ -280,17 +280,13 @@ class Motor:
             )
             if len(spins) > _GAINING and abs(spins[-1] - spins[-_GAINING]) < _LEAST_GAIN_HZ:
                 raise DidNotFollow(
-                    Text(
-                        "the top spins at {spin:.2f} Hz and gets no {other}: pull and drag are equal there, "
-                        "{target:g} Hz were asked for",
-                        spin=self.spin,
-                        other="slower" if brakes else "faster",
-                        target=target,
-                    ),
-                    Text(
-                        "drive harder ({experiment}.drive_amplitude_vpp), or ask for less",
-                        experiment=session.writer.record.experiment,
-                    ),
+                    "the top spins at {spin:.2f} Hz and gets no {other}: pull and drag are equal there, "
+                    "{target:g} Hz were asked for",
+                    "drive harder ({experiment}.drive_amplitude_vpp), or ask for less",
+                    spin=self.spin,
+                    other="slower" if brakes else "faster",
+                    target=target,
+                    experiment=session.writer.record.experiment,
                 )
         self._trend = 0.0
         if brakes:
@@ -343,12 +339,10 @@ class Motor:
             gained = gain * (times[-1] - times[-_GAINING])
             if gained < -_LEAST_GAIN_HZ:
                 raise DidNotFollow(
-                    Text(
-                        "the top gets slower under the drive, {spin:.2f} Hz after {before:.2f} Hz",
-                        spin=self.spin,
-                        before=max(spins),
-                    ),
+                    "the top gets slower under the drive, {spin:.2f} Hz after {before:.2f} Hz",
                     "does the cable lead from the phototransistor to the generator's trigger input, and to the coil?",
+                    spin=self.spin,
+                    before=max(spins),
                 )
             level = level + 1 if gained < _LEAST_GAIN_HZ else 0
             if level == _GAINING:  # for as long: one that is about to get slower has shown it
@@ -383,31 +377,24 @@ class Motor:
 def _too_fast(session: Session[Any], highest: float) -> ExperimentFailed:
     name = session.writer.record.experiment
     return ExperimentFailed(
-        Text(
-            "the top still gets faster at {highest:.1f} Hz ({name}.highest_hz, and "
-            "limits.drive_frequency_hz over {cycle:g}, for the cycles are so much faster than the "
-            "top): allow more there, or weaken the drive",
-            highest=highest,
-            name=name,
-            cycle=CYCLE,
-        )
+        "the top still gets faster at {highest:.1f} Hz ({name}.highest_hz, and "
+        "limits.drive_frequency_hz over {cycle:g}, for the cycles are so much faster than the "
+        "top): allow more there, or weaken the drive",
+        highest=highest,
+        name=name,
+        cycle=CYCLE,
     )
 
 
 def _no_pull(session: Session[Any], found: Response) -> DidNotFollow:
     name = session.writer.record.experiment
     return DidNotFollow(
-        Text(
-            "the bursts do not turn the top: at each start phase its spin changes by {slower:.2f} "
-            "Hz/s, as without a drive",
-            slower=-found.drag,
-        ),
-        Text(
-            "does the cable lead from the phototransistor to the generator's trigger input, does its "
-            "pulse reach TTL levels there, once a turn, and is the drive strong enough "
-            "({name}.drive_amplitude_vpp)?",
-            name=name,
-        ),
+        "the bursts do not turn the top: at each start phase its spin changes by {slower:.2f} Hz/s, as without a drive",
+        "does the cable lead from the phototransistor to the generator's trigger input, does its "
+        "pulse reach TTL levels there, once a turn, and is the drive strong enough "
+        "({name}.drive_amplitude_vpp)?",
+        slower=-found.drag,
+        name=name,
     )
 
 

@@ -269,12 +269,10 @@ def _read(session: Session[FieldSettings], height: float) -> float:
             else "beyond what the probe can measure"
         )
         raise ExperimentFailed(
-            Text(
-                "the flux density at {height:.1f} mm is {seen}: choose a larger one (field.range_t in the "
-                "bench file), or begin higher up (field.lowest_m)",
-                height=1e3 * height,
-                seen=seen,
-            )
+            "the flux density at {height:.1f} mm is {seen}: choose a larger one (field.range_t in the "
+            "bench file), or begin higher up (field.lowest_m)",
+            height=1e3 * height,
+            seen=seen,
         )
     session.saw("flux_density_t", flux_density)
     return flux_density

@@ -203,13 +203,11 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_sinc
     settings = session.settings
     if len(seen) < _FEWEST:
         raise ExperimentFailed(
-            Text(
-                "the top fell {count} readings after the drive went off, {fewest} are needed: drive it "
-                "higher first ({experiment}.drive_frequency_hz)",
-                count=len(seen),
-                fewest=_FEWEST,
-                experiment=session.writer.record.experiment,
-            )
+            "the top fell {count} readings after the drive went off, {fewest} are needed: drive it "
+            "higher first ({experiment}.drive_frequency_hz)",
+            count=len(seen),
+            fewest=_FEWEST,
+            experiment=session.writer.record.experiment,
         )
     times, spins = (np.array([row[name] for row in seen]) for name in ("time_s", "spin_frequency_hz"))
     between = (float(times[-1]) + settings.gate_s / 2, missed_since + settings.gate_s)
@@ -275,7 +273,7 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
             except NotHeld as lost:
                 if not counts:  # no spin at which it was held to begin with
                     raise DidNotFollow(
-                        Text("{lost}, as the creep began", lost=lost), "float it again, or drive harder"
+                        "{lost}, as the creep began", "float it again, or drive harder", lost=lost
                     ) from lost
                 limit = _limit_of_loss(settings, (held, drive), counts[-1][1])
                 keep({"time_s": session.now()} | limit)
@@ -293,12 +291,10 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
         if drive > settings.highest_hz:
             name = session.writer.record.experiment
             raise ExperimentFailed(
-                Text(
-                    "the top still follows at {highest_hz:g} Hz ({name}.highest_hz): allow a higher drive "
-                    "there and in limits.drive_frequency_hz, or weaken it",
-                    highest_hz=settings.highest_hz,
-                    name=name,
-                )
+                "the top still follows at {highest_hz:g} Hz ({name}.highest_hz): allow a higher drive "
+                "there and in limits.drive_frequency_hz, or weaken it",
+                highest_hz=settings.highest_hz,
+                name=name,
             )
         session.bench.generator.frequency = drive
         session.progress(Text("drive at {drive:.2f} Hz", drive=drive), (drive - start) / (settings.highest_hz - start))
@@ -317,7 +313,7 @@ def _climb(session: Session[LimitSettings], motor: Motor, keep: Callable[[Row], 
     if spin is None:
         if climb.spins.size < FEWEST_ON_PARABOLA:
             raise DidNotFollow(
-                Text("the top was lost {size} counts after the way up began", size=climb.spins.size), "float it again"
+                "the top was lost {size} counts after the way up began", "float it again", size=climb.spins.size
             )
         between = (float(climb.times[-1]), climb.first_missed)
         spin = spin_at_loss(climb.times - settings.gate_s / 2, climb.spins, between)

@@ -398,11 +398,9 @@ def _check_pulses(session: Session[PrecessionSettings], laser: Gates) -> None:
             )
         )
     raise ExperimentFailed(
-        Text(
-            "the counter sees no laser pulses {where}: does the stem cut the beam, and is the trigger"
-            " level between free and cut (precession.laser_trigger_level_v)?",
-            where=where,
-        )
+        "the counter sees no laser pulses {where}: does the stem cut the beam, and is the trigger"
+        " level between free and cut (precession.laser_trigger_level_v)?",
+        where=where,
     )
 
 

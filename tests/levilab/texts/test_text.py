@@ -34,7 +34,7 @@ SAYING = {
 }  # fmt: skip
 ROOMS = ("levilab.live.", "levilab.acquisition.")
 #: Errors that make a `Text` of what they are given.
-WITH_VALUES = ("ConfigError", "CannotResume")
+WITH_VALUES = ("ConfigError", "CannotResume", "ExperimentFailed", "DidNotFollow", "NoLight")
 _LITERAL = r'"((?:[^"\\]|\\.)*)"'
 #: In JavaScript: a text, or one of two.
 _PHRASE = re.compile(rf"phrase\((?:[^()\"]*\?)?\s*{_LITERAL}(?:\s*:\s*{_LITERAL})?")
@@ -91,9 +91,9 @@ def of_program() -> set[str]:
             if not isinstance(call, ast.Call):
                 continue
             called = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
-            said = called == "Text" or (called in WITH_VALUES and call.keywords)
-            if said and call.args and name.startswith("levilab."):
-                found |= {*strings(call.args[0])}
+            said = call.args if called in WITH_VALUES and call.keywords else call.args[: called == "Text"]
+            if said and name.startswith("levilab."):
+                found |= {text for one in said for text in strings(one)}
             elif called in SAYING and name.startswith(ROOMS) and len(call.args) > SAYING[called]:
                 found |= {*strings(call.args[SAYING[called]])}
     return found
