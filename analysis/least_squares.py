@@ -18,11 +18,7 @@ _ENDED = frozenset({1, 2, 3, 4, 6, 7, 8})
 
 
 def solve(
-    residual: Residual,
-    gradient: Gradient,
-    start: Array,
-    most: int = MOST_EVALUATIONS,
-    tolerance: float = TOLERANCE,
+    residual: Residual, gradient: Gradient, start: Array, most: int = MOST_EVALUATIONS, tolerance: float = TOLERANCE
 ) -> tuple[Array, bool]:
     """Find the parameters of the smallest sum of squares, and whether the search converged.
 

@@ -127,8 +127,7 @@ def lag_before_loss(ends: Sequence[float], spins: Sequence[float], drives: Seque
         return math.nan
     lasts = np.diff(time, prepend=time[0] - float(np.median(np.diff(time))))
     last = max(
-        max(np.flatnonzero(lasts > _GAP * np.median(lasts)), default=0),
-        int(np.searchsorted(time, time[-1] - _LAST_S)),
+        max(np.flatnonzero(lasts > _GAP * np.median(lasts)), default=0), int(np.searchsorted(time, time[-1] - _LAST_S))
     )
     before = off[np.searchsorted(time, time[last] - _BEFORE_S) : last]
     if time.size - last < _FEWEST:

@@ -291,12 +291,7 @@ def _hum_of(bins: Array, place: Array, first: int, half: int, frequencies: list[
     return np.asarray(found[:, ::2] - 1j * found[:, 1::2])
 
 
-def _blend(
-    fits: list[Array],
-    place: Array,
-    half: float,
-    waves: list[tuple[float, float]],
-) -> Array:
+def _blend(fits: list[Array], place: Array, half: float, waves: list[tuple[float, float]]) -> Array:
     """Return the hum at places [bins], each piece, of twice `half` bins, with a weight that falls to 0 at its ends.
 
     place: rising; waves: frequency [1/bin], and what amplitude is divided by, of each line.

@@ -49,10 +49,7 @@ def alternates(found: Match) -> str:
     Turns of 167½ samples have flanks that lie on either side of a sample by turns: that is no second mark.
     """
     odd = found.numbers % 2 == 1
-    for values, least, what in (
-        (found.heights, HIGHER, "height"),
-        (found.shifts, max(ASIDE, found.grid), "place"),
-    ):
+    for values, least, what in ((found.heights, HIGHER, "height"), (found.shifts, max(ASIDE, found.grid), "place")):
         a, b = values[odd & found.used], values[~odd & found.used]
         if min(a.size, b.size) < 8:
             return ""

@@ -58,12 +58,7 @@ class Record:
     """
 
     def __init__(
-        self,
-        times: Array,
-        field: Array,
-        others: Sequence[Line] = (),
-        *,
-        mains_hz: tuple[float, ...] = MAINS_HZ,
+        self, times: Array, field: Array, others: Sequence[Line] = (), *, mains_hz: tuple[float, ...] = MAINS_HZ
     ) -> None:
         from scipy.sparse import csr_array
 

@@ -25,9 +25,7 @@ _MANY = 30
 
 
 def crosscheck_table(
-    studies: Sequence[Study],
-    symbols: Mapping[str, str] | None = None,
-    judge: Judge = by_pulls,
+    studies: Sequence[Study], symbols: Mapping[str, str] | None = None, judge: Judge = by_pulls
 ) -> Table:
     """Return a table with a row a quantity; behind ± stands the standard error, in parentheses what is wanted.
 

@@ -193,9 +193,4 @@ def _modes(scene: Scene, height: float, spin: float) -> dict[str, float]:
     if np.abs(modes.imag).max() > 1e-6 * np.abs(modes).max():
         return {}  # the lines are other than these
     slow1, slow2, precession, nutation = sorted(modes.real, key=abs)
-    return {
-        "nutation": nutation,
-        "precession": precession,
-        "swing sideways": slow2,
-        "swing sideways, backwards": slow1,
-    }
+    return {"nutation": nutation, "precession": precession, "swing sideways": slow2, "swing sideways, backwards": slow1}

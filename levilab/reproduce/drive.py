@@ -165,13 +165,7 @@ def make() -> Found:
         "motions.",
         "Pull of the drive and drag over the spin; highest spin over the swing about the drive",
         partial(
-            drive_figure,
-            driven,
-            fields=FIELDS_T,
-            ramps=RAMPS,
-            spread=DRAG_U / DRAG,
-            swings=SWINGS_HZ,
-            start=START_HZ,
+            drive_figure, driven, fields=FIELDS_T, ramps=RAMPS, spread=DRAG_U / DRAG, swings=SWINGS_HZ, start=START_HZ
         ),
     )
     note = Note(

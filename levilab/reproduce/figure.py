@@ -480,9 +480,7 @@ def dipole_figure(z: Array, fields: tuple[Array, Array], height: float) -> Figur
 
 
 @mpl.rc_context(STYLE)
-def simon_figure(
-    scans: Sequence[tuple[str, Array, Flags, tuple[float, float], tuple[float, float]]],
-) -> Figure:
+def simon_figure(scans: Sequence[tuple[str, Array, Flags, tuple[float, float], tuple[float, float]]]) -> Figure:
     """Draw survival of the three tops over spin."""
     figure, panels = _figure(2.9, *[(0.14, 0.67 - 0.265 * k, 0.845, 0.14) for k in range(len(scans))])
     for axes, (name, spins, up, window, printed) in zip(panels, scans, strict=True):

@@ -30,13 +30,7 @@ class FieldError(LevilabError):
 
 
 def field_of(
-    inner_radius: float,
-    outer_radius: float,
-    strength: float,
-    kind: str,
-    *,
-    thickness: float = 0.0,
-    origin: float = 0.0,
+    inner_radius: float, outer_radius: float, strength: float, kind: str, *, thickness: float = 0.0, origin: float = 0.0
 ) -> Field:
     """Return the field of a ring magnet.
 

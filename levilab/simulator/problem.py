@@ -154,11 +154,7 @@ def scheme_for(name: str | None, model: Any) -> Scheme:
 
 
 def _follow(
-    problem: Problem,
-    step: float,
-    wanted: Array,
-    escape: tuple[float, float],
-    progress: Callable[[float], None] | None,
+    problem: Problem, step: float, wanted: Array, escape: tuple[float, float], progress: Callable[[float], None] | None
 ) -> Stops:
     """Follow a motion with a drive that it triggers, and return the stops with the states there."""
     start, trigger = problem.start, trigger_of(problem)

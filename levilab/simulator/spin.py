@@ -89,10 +89,7 @@ DECAYS: dict[str, SpinDecay] = {
         damping=lambda spin, c: c * sqrt(spin),
     ),
     "mixed": SpinDecay(
-        after=_mixed_after,
-        elapsed=_mixed_elapsed,
-        turned=_mixed_turned,
-        damping=lambda spin, c1, c2: c1 + c2 * spin,
+        after=_mixed_after, elapsed=_mixed_elapsed, turned=_mixed_turned, damping=lambda spin, c1, c2: c1 + c2 * spin
     ),
 }
 

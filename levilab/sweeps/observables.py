@@ -130,7 +130,7 @@ OBSERVABLES: dict[str, Observable] = {
 
 #: Short names of several columns.
 GROUPS: dict[str, tuple[str, ...]] = {
-    "lines": tuple(name for name in OBSERVABLES if name.endswith(("_line_hz", "_line_rad"))),
+    "lines": tuple(name for name in OBSERVABLES if name.endswith(("_line_hz", "_line_rad")))
 }
 
 #: Names for `--observe`: each is a column, or several.

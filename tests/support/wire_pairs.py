@@ -97,9 +97,7 @@ def _channel_setting(name):
 
 def _set(name, value):
     return Operation(
-        lambda driver: setattr(driver, name, value),
-        lambda pair, _: getattr(pair.side, name) == value,
-        remakes=True,
+        lambda driver: setattr(driver, name, value), lambda pair, _: getattr(pair.side, name) == value, remakes=True
     )
 
 
@@ -309,12 +307,7 @@ class Kind:
     operations: dict
 
 
-_OF_KIND = {
-    "counter": _counter,
-    "generator": _generator,
-    "oscilloscope": _scope,
-    "magnetometer": _magnetometer,
-}
+_OF_KIND = {"counter": _counter, "generator": _generator, "oscilloscope": _scope, "magnetometer": _magnetometer}
 
 
 def _kind(name):

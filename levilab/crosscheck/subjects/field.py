@@ -75,8 +75,4 @@ def _values(folder: Path, options: FieldOptions) -> Mapping[str, Estimate]:
     return values
 
 
-SUBJECT = Subject(
-    "field",
-    "the Hall scan of a base: strength, place, and the tops that float there",
-    trial,
-)
+SUBJECT = Subject("field", "the Hall scan of a base: strength, place, and the tops that float there", trial)

@@ -136,7 +136,5 @@ def _simulated_fall(scene: Scene, wobble_hz: float) -> float:
 
 
 SUBJECT = Subject(
-    "motion",
-    "the spin-down of a top in full motion: constant of the disc's drag, exponent, the fall",
-    trial,
+    "motion", "the spin-down of a top in full motion: constant of the disc's drag, exponent, the fall", trial
 )

@@ -80,8 +80,4 @@ def _in_world(request: AcquisitionRequest, world: _Watched, duration_s: float) -
     return replace(request, config=config, wiring=lambda: virtual_wiring(world, config.limits))
 
 
-SUBJECT = Subject(
-    "spin",
-    "a record of the light of a top that slows down: frequency and chirp",
-    trial,
-)
+SUBJECT = Subject("spin", "a record of the light of a top that slows down: frequency and chirp", trial)

@@ -111,9 +111,7 @@ def fall_of_spin(law: str, constants: tuple[float, ...], start_hz: float, fall_h
 
 
 SUBJECT = Subject(
-    "spindown",
-    "the spin-down of a top that only spins: constants of the drag, its exponent, the fall",
-    trial,
+    "spindown", "the spin-down of a top that only spins: constants of the drag, its exponent, the fall", trial
 )
 #: Its clock is up to 0.1 per mille off, which moves the constants by 0.1 u.
 SOUND = Subject(

@@ -76,7 +76,5 @@ def trial(seed: int, folder: Path) -> list[Pull]:
 
 
 SUBJECT = Subject(
-    "sway",
-    "the slow swings of a top in full motion, filmed while it spins down: geometric magnetism",
-    trial,
+    "sway", "the slow swings of a top in full motion, filmed while it spins down: geometric magnetism", trial
 )

@@ -87,13 +87,7 @@ def of_sheet(field: Any, z: Any, r2: Any) -> Any:
     p, bz, s, g = k * (pb - pa), k * (zb - za), k * (sb - sa), k * (gb - ga)
     q = -(g + 2 * p) / away  # ∇·B = 0
     np, nq, nz, ns, ng = to_any_power(field, z, r2)
-    return (
-        np if close else p,
-        nq if close else q,
-        nz if close else bz,
-        ns if close else s,
-        ng if close else g,
-    )
+    return (np if close else p, nq if close else q, nz if close else bz, ns if close else s, ng if close else g)
 
 
 def of_thick_ring(field: Any, z: Any, r2: Any) -> Any:

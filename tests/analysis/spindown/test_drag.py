@@ -67,13 +67,7 @@ POINTS = [
 def test_the_closed_form_solves_the_equation_of_motion(law):
     start = 2 * np.pi * 40.0
     solved = solve_ivp(
-        lambda _, w: SLOWING[law](w, *CONSTANTS[law]),
-        (0, TIMES[-1]),
-        [start],
-        "DOP853",
-        TIMES,
-        rtol=1e-13,
-        atol=1e-13,
+        lambda _, w: SLOWING[law](w, *CONSTANTS[law]), (0, TIMES[-1]), [start], "DOP853", TIMES, rtol=1e-13, atol=1e-13
     )
     # 1e-10: the integrator's error grows with its few hundred steps of 1e-13 each
     assert spin(law, TIMES, 40.0, *CONSTANTS[law]) == pytest.approx(solved.y[0] / 2 / np.pi, rel=1e-10)

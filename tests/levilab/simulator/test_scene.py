@@ -163,13 +163,7 @@ def test_a_folder_is_no_scene(tmp_path):
 def test_settings_are_values_of_toml_and_bare_words_are_strings():
     scene = with_settings(
         preset("undriven"),
-        [
-            "top.mass_kg=0.0255",
-            "start.spin_hz = 22",
-            "start.position_m=[0,0,0.072]",
-            "drag.law=stokes",
-            "name=my own",
-        ],
+        ["top.mass_kg=0.0255", "start.spin_hz = 22", "start.position_m=[0,0,0.072]", "drag.law=stokes", "name=my own"],
     )
     assert (scene.top.mass_kg, scene.start.spin_hz, scene.start.position_m) == (0.0255, 22.0, (0.0, 0.0, 0.072))
     assert (scene.drag.law, scene.name) == ("stokes", "my own")
@@ -357,10 +351,7 @@ def test_a_direction_is_made_unit_however_long_it_is():
 
 @pytest.mark.parametrize(
     ("law", "runs"),
-    [
-        ("newton", [1.760e-5, 1.707e-5, 1.669e-5, 1.772e-5]),
-        ("disc", [2.365e-4, 2.309e-4, 2.289e-4, 2.397e-4]),
-    ],
+    [("newton", [1.760e-5, 1.707e-5, 1.669e-5, 1.772e-5]), ("disc", [2.365e-4, 2.309e-4, 2.289e-4, 2.397e-4])],
 )
 def test_a_law_without_a_constant_takes_the_mean_of_the_thesiss_runs(law, runs):
     assert with_settings(Scene(), [f"drag.law={law}"]).drag.constants == (pytest.approx(np.mean(runs), rel=1e-9),)

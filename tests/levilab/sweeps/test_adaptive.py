@@ -27,10 +27,7 @@ SCENE = preset("undriven").changed({"start.place": "given"})
 
 def plan(spins: int, masses: int, duration: float = 3.0) -> Plan:
     """The upper edge, with its islands."""
-    axes = (
-        Axis("start.spin_hz", np.linspace(46, 94, spins)),
-        Axis("top.mass_kg", np.linspace(0.0251, 0.0259, masses)),
-    )
+    axes = (Axis("start.spin_hz", np.linspace(46, 94, spins)), Axis("top.mass_kg", np.linspace(0.0251, 0.0259, masses)))
     made = Plan.of(SCENE, axes, ("survived", "lifetime_s"), duration)
     share = step_share_of(SCENE, grid({axis.key: axis.values for axis in axes}), duration, tolerance=1e-6)
     return replace(made, step_share=share)

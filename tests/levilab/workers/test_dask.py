@@ -33,11 +33,7 @@ def test_a_killed_worker_of_a_cluster_costs_no_bit(tmp_path, capfd):
 
 
 def test_a_lost_scheduler_ends_the_work_at_once(capfd):
-    with (
-        DaskCluster(workers=1, threads=2) as dask,
-        listening() as server,
-        ThreadPoolExecutor(1) as beside,
-    ):
+    with DaskCluster(workers=1, threads=2) as dask, listening() as server, ThreadPoolExecutor(1) as beside:
         some_came = threading.Event()
 
         def kill_the_scheduler():

@@ -76,10 +76,7 @@ BLOCKS = {
     "the preamble of the Rigol is that of the guide": (
         *(of(rigol, pulses, "CHAN1:PROB 1;SCAL 1;OFFS -3", ":TIM:SCAL 0.002;OFFS -0.00256"),),
         (":WAV:PRE?", "0,0,1200,1,2.000000e-05,-1.456000e-02,0,4.000000e-02,-75,127"),
-        (
-            ":WAV:XINC?;XOR?;XREF?;YINC?;YOR?;YREF?",
-            "2.000000e-05;-1.456000e-02;0;4.000000e-02;-75;127",
-        ),
+        (":WAV:XINC?;XOR?;XREF?;YINC?;YOR?;YREF?", "2.000000e-05;-1.456000e-02;0;4.000000e-02;-75;127"),
     ),
     "the preamble of the Keysight is that of a real one after a reset": (
         *(of(keysight, pulses, "*RST", ":WAV:FORM ASC"),),
