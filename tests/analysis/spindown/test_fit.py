@@ -213,13 +213,6 @@ def test_the_fitted_curve_goes_through_the_readings_on_their_own_clock():
 # -------------------------------------------------------------------------------------------------- statistics, verdict
 
 
-def test_weights_are_akaikes():
-    fits = fit_spin_down(T, readings(sigma=0.3), 0.3).fits
-    aicc = np.array([fit.statistics.aicc for fit in fits])
-    expected = np.exp(-(aicc - aicc.min()) / 2)
-    assert [fit.statistics.weight for fit in fits] == pytest.approx(expected / expected.sum())
-
-
 @pytest.mark.parametrize("u", [SIGMA, None])
 def test_precise_readings_of_a_disc_exclude_stokes_and_newton(u):
     verdict = fit_spin_down(T, readings(), u).verdict

@@ -177,10 +177,7 @@ def pulls(top, run):
     """Of the constant, the exponent and the tilt, as far as the law has them."""
     wanted = [(top["law"], "moment_tilt", top["delta_rad"])]
     if top["law"] in NAMES:
-        wanted += [
-            (top["law"], NAMES[top["law"]], top["constant"]),
-            ("power", "exponent", EXPONENTS[top["law"]]),
-        ]
+        wanted += [(top["law"], NAMES[top["law"]], top["constant"]), ("power", "exponent", EXPONENTS[top["law"]])]
     found = [(run.fit(law).parameters.get(name), truth) for law, name, truth in wanted]
     return [(each.value - truth) / each.u for each, truth in found if each is not None]
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 
 from instruments.clock import VirtualClock
 from instruments.virtual.core.signal import crossings
@@ -136,26 +135,6 @@ def test_a_top_let_go_while_it_is_pulled_spins_down_from_there():
     assert spin_hz(top, 11.5) == pytest.approx(expected, rel=1e-14)
 
 
-def test_after_the_drive_is_off_the_top_follows_its_law_of_drag():
-    top = world()
-    drive(top, 0.0, "SIN", 30.0, FIELD)
-    off(top, 25.0)
-    times = np.linspace(25.0, 80.0, 12)
-    exact = solve_ivp(
-        lambda _, y: [-2.34e-4 * y[0] ** 1.5, y[0]],
-        (25.0, 80.0),
-        [TURN * 30.0, TURN * 30.0 * 25.0],
-        method="DOP853",
-        t_eval=times,
-        rtol=1e-12,
-        atol=1e-12,
-    )
-    spin, turned = top.motion(times)
-    # the integrator's tolerance a step, times some hundred steps
-    np.testing.assert_allclose(spin, exact.y[0], rtol=2e-10)
-    np.testing.assert_allclose(turned, exact.y[1], rtol=2e-10)
-
-
 #: Seconds since the last change, waveform, how far from 30 Hz, amplitude as a part of the usual one.
 CHANGES = st.lists(
     st.tuples(
@@ -229,12 +208,6 @@ def test_a_hand_takes_a_top_that_floats_and_spins_it_anew():
     top.float_top(1)
     assert spin_hz(top, 49.0) < QUIET.start_hz - 1.0
     assert spin_hz(top, 50.0) == pytest.approx(QUIET.start_hz)
-
-
-def test_a_held_top_does_not_fall():
-    top = world()
-    drive(top, 0.0, "SIN", 30.0, FIELD)
-    assert spin_hz(top, 10_000.0) == pytest.approx(30.0, rel=1e-15)
 
 
 def test_a_top_that_was_never_spun_up_is_dark_from_the_start():
@@ -626,10 +599,6 @@ def test_a_top_that_falls_is_put_back_if_the_scene_says_so():
     assert np.all(np.diff(angle) >= 0)
     drive(top, fallen + 12.0, "SIN", 30.0, FIELD)
     assert top.motion(np.array([fallen + 500.0]))[0] == pytest.approx(2 * np.pi * 30)
-
-
-def test_else_it_lies_there():
-    assert world(SpinScene()).motion(np.array([1e5]))[0] == 0
 
 
 # --- the laser ---

@@ -34,13 +34,6 @@ def test_crossings_are_those_of_a_schmitt_trigger(voltage, level, hysteresis):
     np.testing.assert_allclose(got, brute_force(voltage, level, hysteresis), rtol=1e-14, atol=1e-14)
 
 
-@given(voltage=VOLTAGES, level=st.sampled_from([-0.25, 0.0, 0.3]), hysteresis=st.sampled_from([0.0, 0.1, 0.6]))
-def test_crossings_lie_between_samples_and_one_turn_back_apart(voltage, level, hysteresis):
-    got = crossings(np.array(voltage), level, hysteresis)
-    assert np.all((got >= 0) & (got <= len(voltage) - 1))
-    assert np.all(np.diff(got) > 0)
-
-
 @given(
     voltage=VOLTAGES,
     level=st.sampled_from([-0.25, 0.0, 0.3]),
