@@ -17,7 +17,7 @@ from instruments.errors import InstrumentError
 from levilab.acquisition.onlooker import publishing
 from levilab.acquisition.session import Earlier, Session
 from levilab.acquisition.table import EXPERIMENTS, settings_of
-from levilab.bench.bench import open_bench
+from levilab.bench.bench import OutputMayBeOn, open_bench
 from levilab.bench.kinds import GENERATOR, estimates_u
 from levilab.errors import LevilabError, unquote
 from levilab.files import CannotWrite
@@ -103,6 +103,9 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
     off = Event()
     try:
         return _acquire(request, show, watch, off)
+    except OutputMayBeOn:  # which says it itself
+        off.set()
+        raise
     finally:
         if not off.is_set() and request.synthetic_how is None and GENERATOR.name in _kinds(request):
             show.message(_NOT_SEEN_OFF)

@@ -185,7 +185,7 @@ def _lines(found: Mapping[str, Any]) -> Iterator[Block]:
         if because:
             yield Note(f"No lines of the axis: {because}.")
         return
-    heads = ("frequency [Hz]", "amplitude [mrad]", "what it is")
+    heads = ("frequency [Hz]", "amplitude [mrad]", "identified as")
     rows = [
         (
             with_decimals(line.get("frequency_hz", math.nan), 3),

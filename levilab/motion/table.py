@@ -109,7 +109,7 @@ def _lines_table(summary: Summary) -> Table:
     digits = 2 if resolution > 0.05 else 3
     shown = new_table(
         "Lines of the axis, n_x + i n_y",
-        "frequency \\[Hz]", "amplitude \\[mrad]", "what it is",
+        "frequency \\[Hz]", "amplitude \\[mrad]", "identified as",
         numbers=("frequency \\[Hz]", "amplitude \\[mrad]"),
     )  # fmt: skip
     for line in summary.lines.lines:
@@ -125,7 +125,7 @@ def print_effects(effects: Sequence[Effect]) -> None:
     """Print one row an effect: in or out, and its influence."""
     changes = ("height \\[mm]", "precession \\[Hz]", "spin at the end \\[Hz]")
     table = new_table(
-        "What is in this scene, and what is left out", "effect", "", *changes, "what it is, what else it does",
+        "What is in this scene, and what is left out", "effect", "", *changes, "meaning; other influence",
         numbers=changes,
     )  # fmt: skip
     for effect in effects:

@@ -193,7 +193,7 @@ def line_table(analysis: SpinAnalysis) -> Table:
         if run.line
     ]
     title = "The line" + (", of several windows that of the one above" if several else "")
-    heads = ("input", "what it is", *(one.head for one in quantities), "noise [µT]", "S/N\n[dB]")
+    heads = ("input", "kind of record", *(one.head for one in quantities), "noise [µT]", "S/N\n[dB]")
     return table(title, heads, rows, numbers=heads[2:])
 
 
@@ -215,7 +215,7 @@ def pulse_table(analysis: SpinAnalysis) -> Table:
     ]
     numbers = ("pulses", "missing", "doubled", "scatter\n[µs]", "S/N\n[dB]")
     title = "The pulses" + (", of several records or windows those of the one above" if several else "")
-    return table(title, ("input", "what it is", *numbers), rows, numbers=numbers)
+    return table(title, ("input", "kind of record", *numbers), rows, numbers=numbers)
 
 
 def series_table(source: Source[Records], run: SpinRun, most: int) -> Table:

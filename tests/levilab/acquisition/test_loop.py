@@ -24,6 +24,7 @@ from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration
+from levilab.bench.bench import OutputMayBeOn
 from levilab.bench.config import InstrumentSettings
 from levilab.bench.wiring import Wiring
 from levilab.computer import Computer, at_another_computer
@@ -564,3 +565,19 @@ def test_a_run_in_full_motion_is_repeated_by_its_seed_and_resumed_in_its_scene(i
     assert run.status == "finished"
     assert np.allclose(run.readings().frame["spin_frequency_hz"], whole["spin_frequency_hz"], rtol=0, atol=0.02)
     assert run.record.configuration["scene"]["name"] == "spindown"
+
+
+@pytest.mark.parametrize("error", [OutputMayBeOn("COM1", OSError("gone")), ConnectionError("gone")])
+def test_a_drive_that_may_be_on_is_said_once(monkeypatch, error):
+    """Either by the error, or by a message where the error is another one."""
+
+    def fail(*_):
+        raise error
+
+    said = [str(error)]
+    monkeypatch.setattr("levilab.acquisition.loop._acquire", fail)
+    monkeypatch.setattr(Silent, "message", lambda _, text: said.append(str(text)), raising=False)
+    request = dataclasses.replace(request_for("spin", AcquisitionOptions(mock=True)), synthetic_how=None)
+    with pytest.raises(type(error)):
+        acquire(request, Silent())
+    assert " ".join(said).count("MAY STILL BE ON") == 1
