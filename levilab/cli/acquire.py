@@ -12,7 +12,7 @@ import typer
 from levilab.cli import exit_codes
 from levilab.cli.importing import importing
 from levilab.cli.later import Later, NamedLast
-from levilab.cli.options import Json, Language, number, place
+from levilab.cli.options import Json, Language, flag, option, place, quantity
 from levilab.cli.output import message, print_json, result
 from levilab.texts.text import Text, in_language, speak
 
@@ -54,83 +54,59 @@ _ENDING = "Ctrl-C ends the run after the reading under way; outputs go off and t
 
 
 def acquire_experiment(
-    context: typer.Context,
-    mock: Annotated[bool, typer.Option("--mock", help="Use the virtual bench; needs no hardware.")] = False,
+    experiment: str,
+    mock: Annotated[bool, flag("Use the virtual bench; needs no hardware.", "--mock")] = False,
     bench: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE", help="Describes the bench; with --mock only its settings count.", show_default="bench.toml"
-        ),
+        option("FILE", "Describes the bench; with --mock only its settings count.", show_default="bench.toml"),
     ] = None,
     counter: Annotated[
         str | None,
-        typer.Option(
-            metavar="MODEL|ADDRESS",
-            help="Count with this one instead of the bench's, as phyphox or phyphox://HOST:8080.",
-        ),
+        option("MODEL|ADDRESS", "Count with this one instead of the bench's, as phyphox or phyphox://HOST:8080."),
     ] = None,
     scope: Annotated[
-        str | None,
-        typer.Option(metavar="MODEL|ADDRESS", help="Record with this oscilloscope instead of the bench's."),
+        str | None, option("MODEL|ADDRESS", "Record with this oscilloscope instead of the bench's.")
     ] = None,
     out: Annotated[Path, place("DIR", "Where the run folder is made.")] = Path("runs"),
     drive: Annotated[
-        str | None,
-        typer.Option(metavar="ramp|triggered", help="How the coil drives the top: triggered by its own light pulse."),
+        str | None, option("ramp|triggered", "How the coil drives the top: triggered by its own light pulse.")
     ] = None,
     spin: Annotated[
-        float | None,
-        typer.Option(
-            metavar="HZ", parser=number("Hz"), help="Bring the top to this spin.", show_default="the settings'"
-        ),
+        float | None, quantity("HZ", "Hz", "Bring the top to this spin.", show_default="the settings'")
     ] = None,
     scene: Annotated[
         str | None,
-        typer.Option(
-            metavar="SCENE",
-            help="With --mock: a top in full motion, such as spindown, or a scene's file.",
-            show_default="spin only",
+        option(
+            "SCENE", "With --mock: a top in full motion, such as spindown, or a scene's file.", show_default="spin only"
         ),
     ] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Makes a virtual run repeatable.")] = None,
     group: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Who measures, as 'Group 7': the run's name in tables and figures."),
+        str | None, option("NAME", "Who measures, as 'Group 7': the run's name in tables and figures.")
     ] = None,
     note: Annotated[str, typer.Option(help="Kept with the run.")] = "",
-    temperature: Annotated[
-        str | None, typer.Option(metavar="T", help="Of the magnets, as 21.5 C; kept with the run.")
-    ] = None,
-    washers: Annotated[
-        str | None, typer.Option(metavar="MASSES", help="On the top, as 0.06+0.1 g; kept with the run.")
-    ] = None,
-    realtime: Annotated[bool, typer.Option("--realtime", help="Run the virtual bench in real time.")] = False,
-    resume: Annotated[
-        Path | None,
-        typer.Option(metavar="RUN", help="Continue an interrupted run, with its own settings."),
-    ] = None,
-    wire_log: Annotated[bool, typer.Option("--wire-log", help="Keep all bytes sent and received.")] = False,
-    yes: Annotated[
-        bool, typer.Option("--yes", help="Ask no questions: the bench is as the experiment needs it.")
-    ] = False,
-    upper: Annotated[
-        bool, typer.Option("--upper", help="The upper limit, of a driven top, with the cause of each loss.")
-    ] = False,
+    temperature: Annotated[str | None, option("T", "Of the magnets, as 21.5 C; kept with the run.")] = None,
+    washers: Annotated[str | None, option("MASSES", "On the top, as 0.06+0.1 g; kept with the run.")] = None,
+    realtime: Annotated[bool, flag("Run the virtual bench in real time.", "--realtime")] = False,
+    resume: Annotated[Path | None, option("RUN", "Continue an interrupted run, with its own settings.")] = None,
+    wire_log: Annotated[bool, flag("Keep all bytes sent and received.", "--wire-log")] = False,
+    yes: Annotated[bool, flag("Ask no questions: the bench is as the experiment needs it.", "--yes")] = False,
+    upper: Annotated[bool, flag("The upper limit, of a driven top, with the cause of each loss.", "--upper")] = False,
     settings: Annotated[
         list[str] | None,
-        typer.Option(
+        option(
+            "KEY=VALUE",
+            "Change a setting of the experiment, as limit.repetitions=3 or spin.gate_s=2s; repeatable.",
             "--set",
-            metavar="KEY=VALUE",
-            help="Change a setting of the experiment, as limit.repetitions=3 or spin.gate_s=2s; repeatable.",
         ),
     ] = None,
     list_settings: Annotated[
-        bool, typer.Option("--settings", help="List the settings that --set changes, with units and ranges, and exit.")
+        bool, flag("List the settings that --set changes, with units and ranges, and exit.", "--settings")
     ] = False,
     language: Language = "en",
     as_json: Json = False,
 ) -> None:
-    """Carry out the experiment that the command is named after."""
+    """Carry out an experiment."""
     speak(language)
     if not list_settings:
         look_at_files(bench, resume, out, scene, virtual=mock, named=bool(counter or scope))
@@ -163,7 +139,6 @@ def acquire_experiment(
         tell=message,
         settings=(*given, *(settings or ()), *[SHORT["upper"]] * upper),
     )
-    experiment = str(context.info_name)
     if list_settings:
         _print_settings(chosen_settings(experiment, options), experiment, as_json=as_json)
         return
@@ -232,10 +207,11 @@ def _command_of(experiment: str) -> Callable[[], Callable[..., None]]:
     def make() -> Callable[..., None]:
         @wraps(acquire_experiment)
         def command(**given: Any) -> None:
-            acquire_experiment(**given)
+            acquire_experiment(experiment, **given)
 
         shared = signature(acquire_experiment)
-        own = [one for one in shared.parameters.values() if SHORT.get(one.name, experiment).startswith(experiment)]
+        _, *options = shared.parameters.values()
+        own = [one for one in options if SHORT.get(one.name, experiment).startswith(experiment)]
         command.__signature__ = shared.replace(parameters=own)  # type: ignore[attr-defined]
         return command
 

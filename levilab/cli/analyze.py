@@ -3,7 +3,6 @@
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from enum import StrEnum
-from functools import partial
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -69,9 +68,9 @@ def takes_options(
     own = [_parameter(typed_name(name), OPTIONS[name]) for name in names if OPTIONS[name].typed is not None]
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
-        context, paths, *shared, _ = inspect.signature(command).parameters.values()
+        paths, *shared, _ = inspect.signature(command).parameters.values()
         shared = [one.replace(kind=inspect.Parameter.KEYWORD_ONLY) for one in shared]
-        command.__signature__ = inspect.Signature([context, paths, *own, *shared, *more])  # type: ignore[attr-defined]
+        command.__signature__ = inspect.Signature([paths, *own, *shared, *more])  # type: ignore[attr-defined]
         return command
 
     return decorate
@@ -96,12 +95,11 @@ def _parameter(name: str, option: Option) -> inspect.Parameter:
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=Annotated[kind, about])
 
 
-def _command(options: Iterable[str]) -> Callable[..., None]:
-    """Return the command of an analysis with these options."""
+def _command(kind: str) -> Callable[..., None]:
+    """Return the command of an analysis, or of each."""
 
-    @takes_options(options)
+    @takes_options(OPTIONS if kind == _EACH else options_of(KINDS[kind]))
     def analyze(
-        context: typer.Context,
         paths: Paths = None,
         save: Annotated[
             bool | None,
@@ -133,14 +131,12 @@ def _command(options: Iterable[str]) -> Callable[..., None]:
     ) -> None:
         if table is not None:
             writing = Writing(table, cores=cores, resume=resume, save=bool(save))
-            _tabulate(context, paths or (), read_options(given, typed=True), writing, out=out, as_json=as_json)
+            _tabulate(kind, paths or (), read_options(given, typed=True), writing, out=out, as_json=as_json)
             return
         for name, value in (("cores", cores), ("resume", resume or None)):
             if value is not None:
                 raise UsageError(name, "goes with `table` alone")
-        _analyze(
-            context, paths or (), read_options(given, typed=True), save=save is not False, out=out, as_json=as_json
-        )
+        _analyze(kind, paths or (), read_options(given, typed=True), save=save is not False, out=out, as_json=as_json)
 
     return analyze
 
@@ -151,7 +147,7 @@ def _add(name: str, text: str) -> None:
 
     @analyze_app.command(name, cls=Later, help=text, epilog=f"Example: {words}", hidden=name == _EACH)
     def command() -> Callable[..., None]:
-        return _command(OPTIONS if name == _EACH else options_of(KINDS[name]))
+        return _command(name)
 
 
 for _name, _text in COMMANDS.items():
@@ -159,28 +155,22 @@ for _name, _text in COMMANDS.items():
 
 
 def _analyze(
-    context: typer.Context,
-    paths: Sequence[Path],
-    given: Mapping[str, Any],
-    *,
-    save: bool,
-    out: Path | None,
-    as_json: bool,
+    kind: str, paths: Sequence[Path], given: Mapping[str, Any], *, save: bool, out: Path | None, as_json: bool
 ) -> None:
-    """Carry out the analysis that the command is named after, or each."""
+    """Carry out an analysis, or each."""
     from levilab.pipelines.catalogue import ANALYSES
     from levilab.pipelines.suits import analyze_suiting
 
     left_out: list[str] = []
     with interruptible("what was fitted so far is lost, nothing is written"):
         _advise_on_many(paths)
-        if context.info_name == _EACH:
+        if kind == _EACH:
             results = analyze_suiting(paths, given, left_out.append)
         else:
-            analysis = ANALYSES[str(context.info_name)]
+            analysis = ANALYSES[kind]
             results = [(analysis, _analyze_as(analysis, paths, given))]
     with interruptible("look which results are written: each one is whole"):
-        write_and_print(context, results, left_out, save=save, out=out, as_json=as_json)
+        write_and_print(results, left_out, save=save, out=out, as_json=as_json)
 
 
 def _advise_on_many(paths: Sequence[Path]) -> None:
@@ -208,7 +198,7 @@ MANY_RUNS = 500
 
 
 def _tabulate(
-    context: typer.Context,
+    kind: str,
     paths: Sequence[Path],
     given: Mapping[str, Any],
     writing: Writing,
@@ -221,7 +211,7 @@ def _tabulate(
     from levilab.pipelines.many.table import write_table
     from levilab.present.progress import ShareBar
 
-    if context.info_name == _EACH:
+    if kind == _EACH:
         example = f"as levilab analyze spindown {paths[0]} --table {writing.table}"
         raise UsageError("table", f"has columns of one analysis: name it, {example}")
     if out is not None:
@@ -238,19 +228,18 @@ def _tabulate(
     kept = f"the rows so far are in {writing.table}.part.csv: the same command with --resume goes on with them"
     with interruptible(kept):
         try:
-            tally = write_table(ANALYSES[str(context.info_name)], paths, given, **writing._asdict(), show=show)
+            tally = write_table(ANALYSES[kind], paths, given, **writing._asdict(), show=show)
         finally:
             if bar:
                 bar.close()
-    _print_tally(context, tally, writing.table, as_json=as_json)
+    _print_tally(tally, writing.table, as_json=as_json)
 
 
-def _print_tally(context: typer.Context, tally: "Tally", table: Path, *, as_json: bool) -> None:
+def _print_tally(tally: "Tally", table: Path, *, as_json: bool) -> None:
     """Print where the table is and which inputs are not in it.  Raises NoneUsable where nothing was analyzed."""
-    app = context.find_root().command
     for path, problem in tally.failures:
         named = problem if PurePath(path).name in problem else f"{path}: {problem}"
-        message(with_options(f"failed: {named}", app))
+        message(f"failed: {named}")
     if (more := tally.failed - len(tally.failures)) > 0:
         message(f"and {more} more, whose problem stands in the table")
     for why, count in tally.passed_over.items():
@@ -307,7 +296,6 @@ def _advice(tried: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, A
 
 
 def write_and_print(
-    context: typer.Context,
     results: list[tuple["Analysis[Any]", Any]],
     left_out: list[str],
     *,
@@ -323,7 +311,6 @@ def write_and_print(
     from levilab.pipelines.catalogue import print_analysis
     from levilab.pipelines.suits import left_out_of, remarks, texts_of
 
-    in_words = partial(with_options, app=context.find_root().command)
     failures: list[LevilabError] = []
     said = remarks([found.remarks for _, found in results])
     messages = [*left_out, *texts_of(said)]
@@ -338,9 +325,9 @@ def write_and_print(
         print_json(documents[0] if len(documents) == 1 else documents, sort_keys=True)
     else:
         for analysis, found in results:
-            print_analysis(analysis, found, in_words, tables=tables)
+            print_analysis(analysis, found, with_options, tables=tables)
     for text in messages:
-        message(in_words(text))
+        message(text)
     if failures:
         raise failures[0]
 

@@ -7,7 +7,7 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.acquire import look_at_files
-from levilab.cli.options import Json, number, place
+from levilab.cli.options import Json, flag, option, place, quantity
 from levilab.cli.output import message, print_json, result
 from levilab.errors import NoInstrument, UsageError
 
@@ -23,17 +23,14 @@ bench_app = typer.Typer(no_args_is_help=True, add_completion=False)
 def bench_init(
     addresses: Annotated[
         list[str] | None,
-        typer.Option(
-            "--address", metavar="NAME", help="Search there, too: a resource name or a serial port; repeatable."
-        ),
+        option("NAME", "Search there, too: a resource name or a serial port; repeatable.", "--address"),
     ] = None,
     library: Annotated[
-        str, typer.Option(metavar="NAME", help="PyVISA's library: @py is its own, '' a vendor's, @levilab virtual.")
+        str, option("NAME", "PyVISA's library: @py is its own, '' a vendor's, @levilab virtual.")
     ] = "@py",
     out: Annotated[Path, place("FILE", "The file to write.")] = Path("bench.toml"),
     force: Annotated[
-        bool,
-        typer.Option("--force", help="Replace the file if it is there; write one to fill in if no instrument answers."),
+        bool, flag("Replace the file if it is there; write one to fill in if no instrument answers.", "--force")
     ] = False,
     as_json: Json = False,
 ) -> None:
@@ -75,15 +72,12 @@ def _print_found(found: "list[Found]") -> None:
 
 @bench_app.command("check", epilog="Example: levilab bench check --bench lab2.toml")
 def bench_check(
-    bench: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Describes the bench.", show_default="bench.toml")
-    ] = None,
-    counter: Annotated[str | None, typer.Option(metavar="MODEL|ADDRESS", help="Check this one, too.")] = None,
+    bench: Annotated[Path | None, option("FILE", "Describes the bench.", show_default="bench.toml")] = None,
+    counter: Annotated[str | None, option("MODEL|ADDRESS", "Check this one, too.")] = None,
     scope: Annotated[
-        str | None,
-        typer.Option(metavar="MODEL|ADDRESS", help="Check this one, too; `sound` lists the inputs of the computer."),
+        str | None, option("MODEL|ADDRESS", "Check this one, too; `sound` lists the inputs of the computer.")
     ] = None,
-    mock: Annotated[bool, typer.Option("--mock", help="Check the virtual bench.")] = False,
+    mock: Annotated[bool, flag("Check the virtual bench.", "--mock")] = False,
     as_json: Json = False,
 ) -> None:
     """Connect to each instrument of the bench, and print its identity and a reading, or what failed and what to try.
@@ -126,42 +120,28 @@ def _print_checked(one: "Checked") -> None:
 
 @bench_app.command("clock", epilog="Example: levilab bench clock --tone 1000 --u 0.001")
 def bench_clock(
-    scope: Annotated[str, typer.Option(metavar="MODEL|ADDRESS", help="The sound card.")] = "sound",
+    scope: Annotated[str, option("MODEL|ADDRESS", "The sound card.")] = "sound",
     tone: Annotated[
         float | None,
-        typer.Option(
-            metavar="HZ",
-            parser=number("Hz", low=20.0, high=20_000.0),
-            help="Compare with a tone of this frequency at channel 1.",
-        ),
+        quantity("HZ", "Hz", "Compare with a tone of this frequency at channel 1.", low=20.0, high=20_000.0),
     ] = None,
-    u: Annotated[
-        float | None,
-        typer.Option("--u", metavar="HZ", parser=number("Hz", low=0.0), help="Standard uncertainty of the tone."),
-    ] = None,
+    u: Annotated[float | None, quantity("HZ", "Hz", "Standard uncertainty of the tone.", low=0.0)] = None,
     duration: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S",
-            parser=number("s", low=1.0, high=86_400.0),
-            help="How long.",
-            show_default="600, a tone 20, --mock 60",
-        ),
+        float | None, quantity("S", "s", "How long.", low=1.0, high=86_400.0, show_default="600, a tone 20, --mock 60")
     ] = None,
     clock_u: Annotated[
         float | None,
-        typer.Option(
-            metavar="U",
-            parser=number(low=0.0),
-            help="Relative standard uncertainty of the computer's clock: 1e-6 for one that the network sets.",
+        quantity(
+            "U",
+            "",
+            "Relative standard uncertainty of the computer's clock: 1e-6 for one that the network sets.",
+            low=0.0,
             show_default="1e-5",
         ),
     ] = None,
-    bench: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Keep the result there.", show_default="bench.toml")
-    ] = None,
-    mock: Annotated[bool, typer.Option("--mock", help="Use the virtual bench; nothing is kept.")] = False,
-    save: Annotated[bool, typer.Option("--save/--no-save", help="Keep the result in the bench file.")] = True,
+    bench: Annotated[Path | None, option("FILE", "Keep the result there.", show_default="bench.toml")] = None,
+    mock: Annotated[bool, flag("Use the virtual bench; nothing is kept.", "--mock")] = False,
+    save: Annotated[bool, flag("Keep the result in the bench file.", "--save/--no-save")] = True,
     as_json: Json = False,
 ) -> None:
     """Measure how far a sound card's clock is off, by a known tone or else by the computer's clock over a while.
@@ -203,36 +183,30 @@ def bench_clock(
 @bench_app.command("serve", epilog="Example: levilab bench serve --speed 10 --port-base 15000")
 def bench_serve(
     speed: Annotated[
-        float,
-        typer.Option(
-            metavar="X", parser=number(), help="Seconds of the bench per second on the wall; with --scene up to 200."
-        ),
+        float, quantity("X", "", "Seconds of the bench per second on the wall; with --scene up to 200.")
     ] = 1.0,
     models: Annotated[
-        list[str] | None,
-        typer.Option("--model", metavar="KIND=MODEL", help="Choose a model, as counter=CNT-91; repeatable."),
+        list[str] | None, option("KIND=MODEL", "Choose a model, as counter=CNT-91; repeatable.", "--model")
     ] = None,
     scene: Annotated[
-        str | None,
-        typer.Option(metavar="SCENE", help="The top in full motion: a scene's name or file.", show_default="spin only"),
+        str | None, option("SCENE", "The top in full motion: a scene's name or file.", show_default="spin only")
     ] = None,
     host: Annotated[
         str, typer.Option(help="Address of this machine to listen at; 0.0.0.0: all of them.")
     ] = "127.0.0.1",
     port_base: Annotated[
-        int | None,
-        typer.Option(metavar="N", min=1, max=65535, help="The first port, the others follow.", show_default="any free"),
+        int | None, option("N", "The first port, the others follow.", min=1, max=65535, show_default="any free")
     ] = None,
     portmapper: Annotated[
         bool,
-        typer.Option(
-            "--portmapper",
-            help="For programs that take a host and no port: each instrument has an address of its own, 127.0.0.2 and "
+        flag(
+            "For programs that take a host and no port: each instrument has an address of its own, 127.0.0.2 and "
             "on, with a port mapper at port 111.",
+            "--portmapper",
         ),
     ] = False,
     as_json: Annotated[
-        bool, typer.Option("--json", help="Print one line of JSON when all can be reached, and nothing else.")
+        bool, flag("Print one line of JSON when all can be reached, and nothing else.", "--json")
     ] = False,
 ) -> None:
     """Offer the virtual bench to other programs: TCP, HiSLIP, VXI-11, serial.  Prints the resource names to copy.

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from levilab.cli import exit_codes
-from levilab.cli.options import Json, among, existing_paths, place, writable
+from levilab.cli.options import Json, among, existing_paths, flag, option, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.errors import UsageError
 
@@ -33,16 +33,15 @@ def crosscheck(
     ] = None,
     like: Annotated[
         list[Path] | None,
-        typer.Option(
-            metavar="RUN",
-            help="Make up readings with the values, times, scatter and number of runs of this result, not worlds at "
+        option(
+            "RUN",
+            "Make up readings with the values, times, scatter and number of runs of this result, not worlds at "
             "random; repeat it for several runs.  Writes crosscheck.json beside the result, for the report.",
             callback=existing_paths,
         ),
     ] = None,
     trials: Annotated[
-        int | None,
-        typer.Option(min=2, metavar="N", help="How many trials of each.", show_default="40; with --like 200"),
+        int | None, option("N", "How many trials of each.", min=2, show_default="40; with --like 200")
     ] = None,
     seed: Annotated[
         int | None,
@@ -50,10 +49,10 @@ def crosscheck(
     ] = None,
     calibrate: Annotated[
         bool,
-        typer.Option(
-            "--calibrate",
-            help="Judge the whole distribution of the ranks of the truths, which is uniform where values and "
+        flag(
+            "Judge the whole distribution of the ranks of the truths, which is uniform where values and "
             "uncertainties are right, by a simultaneous band; --out writes calibration.png, too.  With 200 trials.",
+            "--calibrate",
         ),
     ] = False,
     out: Annotated[Path | None, place("DIR", "Write crosscheck.json and .png there.", callback=writable)] = None,
@@ -99,11 +98,7 @@ def reproduce(
     ] = None,
     only: Annotated[
         str | None,
-        typer.Option(
-            metavar="CHAPTER,…",
-            help=f"These chapters alone: {', '.join(CHAPTERS)}.",
-            callback=among(CHAPTERS, "only"),
-        ),
+        option("CHAPTER,…", f"These chapters alone: {', '.join(CHAPTERS)}.", callback=among(CHAPTERS, "only")),
     ] = None,
     as_json: Json = False,
 ) -> None:

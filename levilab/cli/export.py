@@ -6,9 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import existing_path, place, writable
+from levilab.cli.options import existing_path, flag, option, place, writable
 from levilab.cli.output import interruptible, message, result
-from levilab.cli.quantities import with_options
 from levilab.errors import UsageError
 from levilab.pipelines.options import OF_REPORT, read_options
 
@@ -31,7 +30,6 @@ def _named_file(file: Path | None) -> Path | None:
 
 @takes_options(OF_REPORT)
 def export_data(
-    context: typer.Context,
     path: Annotated[
         Path | None,
         typer.Argument(
@@ -54,11 +52,9 @@ def export_data(
             callback=_named_file,
         ),
     ] = None,
-    creator: Annotated[str, typer.Option(metavar="NAMES", help="Who measured; by default the run's group.")] = "",
-    licence: Annotated[
-        str, typer.Option(metavar="NAME", help="Under which others may use the data, as CC-BY-4.0 or CC0-1.0.")
-    ] = "",
-    force: Annotated[bool, typer.Option("--force", help="Replace files that are there.")] = False,
+    creator: Annotated[str, option("NAMES", "Who measured; by default the run's group.")] = "",
+    licence: Annotated[str, option("NAME", "Under which others may use the data, as CC-BY-4.0 or CC0-1.0.")] = "",
+    force: Annotated[bool, flag("Replace files that are there.", "--force")] = False,
     **given: Any,
 ) -> None:
     """Export."""
@@ -66,15 +62,11 @@ def export_data(
     from levilab.report.export.write import export
 
     assert path  # else it was refused
-    app, options = context.find_root().command, read_options(given, typed=True)
-
-    def tell(text: str) -> None:
-        message(with_options(text, app))
-
+    options = read_options(given, typed=True)
     target = out or file or Path(f"{path.stem if path.is_file() or path.suffix == '.zarr' else path.name}.zip")
     with interruptible("nothing is written"):
         written = export(
-            lambda: contents_of(path, tell, options), target, creator=creator, licence=licence, force=force
+            lambda: contents_of(path, message, options), target, creator=creator, licence=licence, force=force
         )
     for one in written:
         result(f"wrote {one}")

@@ -5,17 +5,16 @@ from typing import Annotated
 import typer
 
 from levilab.cli import exit_codes
+from levilab.cli.options import flag, option
 from levilab.cli.output import message, result
 
 
 def fuzz(
     seed: Annotated[int, typer.Option(min=0, help="Of the laboratory, or of the first one.")] = 0,
-    number: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="That many laboratories.", show_default="1, or no end")
-    ] = None,
-    seconds: Annotated[float | None, typer.Option(min=0, metavar="S", help="Begin no more after this time.")] = None,
+    number: Annotated[int | None, option("N", "That many laboratories.", min=1, show_default="1, or no end")] = None,
+    seconds: Annotated[float | None, option("S", "Begin no more after this time.", min=0)] = None,
     cores: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="all cores")] = None,
-    trace: Annotated[bool, typer.Option("--trace", help="Print each step of one laboratory.")] = False,
+    trace: Annotated[bool, flag("Print each step of one laboratory.", "--trace")] = False,
 ) -> None:
     """Carry out laboratories, and end with 1 where something is wrong."""
     from levilab.laboratory.explore import explore

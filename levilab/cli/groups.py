@@ -6,9 +6,8 @@ from typing import Annotated, Any
 import typer
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import HEADING, Language, Paths, among, place, writable
+from levilab.cli.options import HEADING, Language, Paths, among, flag, option, place, writable
 from levilab.cli.output import interruptible, message, result
-from levilab.cli.quantities import with_options
 from levilab.pipelines.options import OF_REPORT, read_options
 
 #: Experiments with a worksheet; their room takes too long to import for a help or a refusal.
@@ -17,7 +16,6 @@ SHEETS = ("spin", "limit", "field", "precession")
 
 @takes_options(OF_REPORT, HEADING)
 def of_class(
-    context: typer.Context,
     paths: Paths = None,
     out: Annotated[
         Path, place("FILE", "The file to write; its ending is .html, .pdf or .xlsx.", callback=writable)
@@ -28,13 +26,13 @@ def of_class(
     from levilab.report.groups.document import write_class
     from levilab.report.reproduction import Heading
 
-    app, heading = context.find_root().command, Heading(**{one.name: given.pop(one.name) for one in HEADING})
+    heading = Heading(**{one.name: given.pop(one.name) for one in HEADING})
     with interruptible("nothing is written"):
         written = write_class(
             paths or (),
             out,
             read_options(given, typed=True),
-            lambda text: message(with_options(text, app)),
+            message,
             heading,
         )
     result(f"the class is in {written}")
@@ -51,11 +49,11 @@ def worksheet(
         ),
     ] = None,
     out: Annotated[Path, place("DIR", "Where the files are written.")] = Path("worksheets"),
-    groups: Annotated[int, typer.Option(min=1, max=500, metavar="N", help="How many, each with its seed.")] = 20,
-    seed: Annotated[int, typer.Option(min=0, metavar="N", help="Of the first group; the next ones count up.")] = 1,
+    groups: Annotated[int, option("N", "How many, each with its seed.", min=1, max=500)] = 20,
+    seed: Annotated[int, option("N", "Of the first group; the next ones count up.", min=0)] = 1,
     language: Language = "en",
-    pdf: Annotated[bool, typer.Option("--pdf", help=r"PDF instead of HTML; needs levilab\[pdf].")] = False,
-    keys: Annotated[bool, typer.Option("--key/--no-key", help="Keys for the teacher, beside the worksheets.")] = True,
+    pdf: Annotated[bool, flag(r"PDF instead of HTML; needs levilab\[pdf].", "--pdf")] = False,
+    keys: Annotated[bool, flag("Keys for the teacher, beside the worksheets.", "--key/--no-key")] = True,
 ) -> None:
     """Write worksheets and keys."""
     from levilab.report.worksheets.document import read_language, write_worksheets

@@ -8,7 +8,7 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.importing import importing
-from levilab.cli.options import Language, place
+from levilab.cli.options import Language, flag, option, place
 from levilab.cli.output import message, result
 from levilab.errors import UsageError
 
@@ -20,21 +20,15 @@ def live(
             metavar="[RUN]", readable=False, help="A run folder.", show_default="the newest, one that is running first"
         ),
     ] = None,
-    mock: Annotated[bool, typer.Option("--mock", help="A virtual bench to play with, and to record runs on.")] = False,
-    seed: Annotated[
-        int,
-        typer.Option(metavar="N", min=0, help="With --mock, draws the top; of Group 1, as in levilab worksheet."),
-    ] = 0,
+    mock: Annotated[bool, flag("A virtual bench to play with, and to record runs on.", "--mock")] = False,
+    seed: Annotated[int, option("N", "With --mock, draws the top; of Group 1, as in levilab worksheet.", min=0)] = 0,
     out: Annotated[Path, place("DIR", "The folder with the runs.")] = Path("runs"),
-    port: Annotated[
-        int, typer.Option(metavar="N", min=0, max=65535, help="Of the loopback address; 0: any that is free.")
-    ] = 8765,
+    port: Annotated[int, option("N", "Of the loopback address; 0: any that is free.", min=0, max=65535)] = 8765,
     share: Annotated[
-        bool,
-        typer.Option("--share", help="Let phones in the same network look on, by a second address with a QR code."),
+        bool, flag("Let phones in the same network look on, by a second address with a QR code.", "--share")
     ] = False,
     language: Language = "en",
-    no_open: Annotated[bool, typer.Option("--no-open", help="Open no browser: print the address only.")] = False,
+    no_open: Annotated[bool, flag("Open no browser: print the address only.", "--no-open")] = False,
 ) -> None:
     """Serve the view until Ctrl-C."""
     if seed and not mock:

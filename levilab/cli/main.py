@@ -13,6 +13,7 @@ from levilab.cli import exit_codes
 from levilab.cli.importing import importing
 from levilab.cli.later import Later
 from levilab.cli.output import message, silence
+from levilab.cli.quantities import APPLICATION, in_options
 
 
 class Commands(typer.core.TyperGroup):
@@ -78,6 +79,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+APPLICATION.append(app)
 
 
 def _print_version(asked: bool) -> None:
@@ -275,9 +277,7 @@ def main() -> None:
 
 def _exit_with(error: Exception) -> NoReturn:
     try:
-        from levilab.cli.quantities import in_options  # with the texts, which a help does without
-
-        status, text = exit_codes.exit_status(error), in_options(error, app)
+        status, text = exit_codes.exit_status(error), in_options(error)
         if isinstance(error, PermissionError) and error.filename:
             text = f"{error.filename}: may not be opened by you; change its permissions or choose another place"
     except OSError:  # no file can be opened any more, not even that of a module

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from levilab.cli.analyze import takes_options, write_and_print
-from levilab.cli.options import Json, Language, existing_paths, place, writable
+from levilab.cli.options import Json, Language, existing_paths, flag, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
-from levilab.cli.quantities import with_options
 from levilab.errors import NoneUsable, UsageError
 from levilab.pipelines.options import OF_FILES, read_options
 
@@ -26,7 +25,6 @@ _SHOWN = 3
 
 @takes_options(OF_FILES)
 def open_files(
-    context: typer.Context,
     paths: Annotated[
         list[Path] | None,
         typer.Argument(
@@ -36,15 +34,13 @@ def open_files(
             callback=existing_paths,
         ),
     ] = None,
-    keep: Annotated[
-        bool, typer.Option("--keep", help="Keep the options in FILE.levilab.toml, which every analysis reads.")
-    ] = False,
+    keep: Annotated[bool, flag("Keep the options in FILE.levilab.toml, which every analysis reads.", "--keep")] = False,
     out: Annotated[Path | None, place("FILE", "Write the report, .html or .pdf.", callback=writable)] = None,
     browser: Annotated[
         bool | None,
-        typer.Option(
+        flag(
+            "Show the files in the browser, or in the terminal alone.",
             "--browser/--no-browser",
-            help="Show the files in the browser, or in the terminal alone.",
             show_default="a browser where there is one, but not with --keep, -o or --json",
         ),
     ] = None,
@@ -61,7 +57,7 @@ def open_files(
     if not files and not shows:
         raise UsageError("FILE", "name a data file, as levilab open my.csv: there is no browser here to choose one")
     looks = [look_as_kept(path, options, plots=False) for path in files]
-    _print_looks(context, looks, as_json=as_json)
+    _print_looks(looks, as_json=as_json)
     readable = [look.path for look in looks if not look.problem]
     for path in readable if keep else []:
         message(f"kept in {write_correction(path, options)}")
@@ -70,9 +66,9 @@ def open_files(
     if not readable:
         raise _refusal(looks[0])
     if not as_json:
-        _analyze(context, readable, options)
+        _analyze(readable, options)
     if out:
-        _report(context, readable, options, out)
+        _report(readable, options, out)
 
 
 def _refusal(look: "Look") -> NoneUsable:
@@ -81,23 +77,23 @@ def _refusal(look: "Look") -> NoneUsable:
     return NoneUsable(look.problem if str(look.path) in look.problem else f"{look.path}: {look.problem}")
 
 
-def _analyze(context: typer.Context, paths: "Sequence[Path]", options: "Mapping[str, Any]") -> None:
+def _analyze(paths: "Sequence[Path]", options: "Mapping[str, Any]") -> None:
     from levilab.pipelines.suits import analyze_suiting
 
     left_out: list[str] = []
     with interruptible("nothing is written"):
         results = analyze_suiting(paths, options, left_out.append)
-    write_and_print(context, results, left_out, save=True, out=None, as_json=False, tables=False)
+    write_and_print(results, left_out, save=True, out=None, as_json=False, tables=False)
     same = " with the same options" if options else ""
     message(f"all numbers: levilab analyze {' '.join(map(str, paths))}{same}")
 
 
-def _report(context: typer.Context, paths: "Sequence[Path]", options: "Mapping[str, Any]", output: Path) -> None:
+def _report(paths: "Sequence[Path]", options: "Mapping[str, Any]", output: Path) -> None:
     from levilab.report.page import write_report
 
-    app, place = context.find_root().command, place_of_report(output)
+    place = place_of_report(output)
     with interruptible("no report is written"):
-        write_report(paths, output, options, lambda text: message(with_options(text, app)))
+        write_report(paths, output, options, message)
     result(place)
 
 
@@ -116,14 +112,14 @@ def _serve(files: "list[tuple[Path, Mapping[str, Any]]]", language: str) -> NoRe
     serve("Ctrl-C ends the page", opens=True, port=0, files=tuple(files), language=language)
 
 
-def _print_looks(context: typer.Context, looks: "Sequence[Look]", *, as_json: bool) -> None:
+def _print_looks(looks: "Sequence[Look]", *, as_json: bool) -> None:
     if as_json:
         print_json([look.as_dict() for look in looks])
         return
     for look in looks:
         _print_look(look)
         if look.problem and len(looks) > 1:
-            message(with_options(f"not read: {look.problem}", context.find_root().command))
+            message(f"not read: {look.problem}")
 
 
 def _print_look(look: "Look") -> None:

@@ -33,15 +33,31 @@ def number(unit: str = "", *, low: float = -math.inf, high: float = math.inf) ->
     return read
 
 
-def place(metavar: str, text: str, **more: Any) -> Any:
-    """Return the option for where a command writes, which has one name in all of them.
+def option(metavar: str, text: str, *names: str, **more: Any) -> Any:
+    """Return an option with a value.
 
     Args:
-        metavar: what is written: DIR, FILE.
+        metavar: what is written: DIR, FILE, N.
         text: the help.
+        names: as "--set", where it is not the parameter's.
         more: of typer.Option.
     """
-    return typer.Option("--out", "-o", metavar=metavar, help=text, **more)
+    return typer.Option(*names, metavar=metavar, help=text, **more)
+
+
+def flag(text: str, *names: str, **more: Any) -> Any:
+    """Return an option without a metavar of its own; see `option`."""
+    return typer.Option(*names, help=text, **more)
+
+
+def quantity(metavar: str, unit: str, text: str, *, low: float = -math.inf, high: float = math.inf, **more: Any) -> Any:
+    """Return an option whose value is a number in a unit; see `number` and `option`."""
+    return option(metavar, text, parser=number(unit, low=low, high=high), **more)
+
+
+def place(metavar: str, text: str, **more: Any) -> Any:
+    """Return the option for where a command writes, which has one name in all of them; see `option`."""
+    return option(metavar, text, "--out", "-o", **more)
 
 
 def writable(path: Path | None) -> Path | None:

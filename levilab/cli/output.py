@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import typer
 
 from levilab.cli import exit_codes
+from levilab.cli.quantities import with_options
 from levilab.present.characters import printable
 
 if TYPE_CHECKING:
@@ -30,11 +31,14 @@ def result(text: str) -> None:
 
 
 def message(text: str) -> None:
-    """Print a line on standard error in the person's language; a closed one, as with its terminal, ends nothing."""
+    """Print a line on standard error in the person's language, with options in the place of quantities.
+
+    A closed one, as with its terminal, ends nothing.
+    """
     from levilab.texts.text import in_language  # not for a help
 
     try:
-        typer.echo(printable(in_language(text)), err=True)
+        typer.echo(printable(with_options(in_language(text))), err=True)
     except OSError:
         silence(sys.stderr)
 

@@ -10,7 +10,6 @@ import typer
 
 from levilab.cli.later import Later
 from levilab.errors import UsageError
-from levilab.texts.text import in_language, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -19,18 +18,20 @@ if TYPE_CHECKING:
 _QUANTITY = re.compile(r"`([a-z]\w*)`( = False\b| = True\b| = )?")
 
 
-@cache
-def option_names(app: Any) -> dict[str, tuple[str, str]]:
-    """Return quantity → the options that set it and switch it off (empty if there is none), of all commands.
+#: The application, which `main` adds.
+APPLICATION: list[typer.Typer] = []
 
-    Args:
-        app: the application, or the command of its name.
+
+@cache
+def option_names() -> dict[str, tuple[str, str]]:
+    """Return quantity → the options that set it and switch it off (empty if there is none), of all commands.
 
     A quantity has the name of the parameter by which a command takes it.
     """
     return {
         parameter.name: (parameter.opts[0], next(iter(parameter.secondary_opts), ""))
-        for parameter in _parameters(typer.main.get_command(app) if isinstance(app, typer.Typer) else app)
+        for app in APPLICATION
+        for parameter in _parameters(typer.main.get_command(app))
         if parameter.opts[0].startswith("--")
     }
 
@@ -43,25 +44,22 @@ def _parameters(command: Any) -> Iterator[Any]:
         yield from _parameters(below)
 
 
-def in_options(error: Exception, app: Any) -> str:
+def in_options(error: Exception) -> str:
     """Return the text of an error with options in the place of quantities: "duration = -1: …" is "--duration -1: …"."""
+    from levilab.texts.text import in_language, text_of  # not for a help
+
     if not isinstance(error, UsageError):
-        return with_options(in_language(text_of(error)), app)
-    head = option_names(app).get(error.name, (error.name, ""))[0]
+        return with_options(in_language(text_of(error)))
+    head = option_names().get(error.name, (error.name, ""))[0]
     given = head if error.value is None else f"{head} {error.value}"
-    return f"{given}: {with_options(in_language(error.text), app)}"
+    return f"{given}: {with_options(in_language(error.text))}"
 
 
-def with_options(text: str, app: Any) -> str:
-    """Return a text with options in the place of quantities.
-
-    Args:
-        text: a message.
-        app: see `option_names`, which makes every command, once.
-    """
+def with_options(text: str) -> str:
+    """Return a message with options in the place of quantities."""
     if not _QUANTITY.search(text):
         return text
-    names = option_names(app)
+    names = option_names()
 
     def option(match: re.Match[str]) -> str:
         name, setting = match[1], match[2] or ""

@@ -6,15 +6,13 @@ from typing import Annotated, Any
 import typer
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import HEADING, Json, Paths, existing_path, place, writable
+from levilab.cli.options import HEADING, Json, Paths, existing_path, flag, option, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
-from levilab.cli.quantities import with_options
 from levilab.pipelines.options import OF_REPORT, read_options
 
 
 @takes_options(OF_REPORT, HEADING)
 def report(
-    context: typer.Context,
     paths: Paths = None,
     out: Annotated[
         Path,
@@ -26,27 +24,27 @@ def report(
     ] = Path("report.html"),
     tables: Annotated[
         bool,
-        typer.Option(
-            "--tables",
-            help="Write the tables of results, too, into a folder beside the report, report.tables for report.html: "
+        flag(
+            "Write the tables of results, too, into a folder beside the report, report.tables for report.html: "
             "CSV with all digits, LaTeX as shown.",
+            "--tables",
         ),
     ] = False,
     crosscheck: Annotated[
         bool,
-        typer.Option(
+        flag(
+            "Make a cross-check with the result's own parameters where none is stored and it takes seconds.",
             "--crosscheck/--no-crosscheck",
-            help="Make a cross-check with the result's own parameters where none is stored and it takes seconds.",
         ),
     ] = True,
-    short: Annotated[bool, typer.Option("--short", help="Result, figure and notes alone.")] = False,
+    short: Annotated[bool, flag("Result, figure and notes alone.", "--short")] = False,
     **given: Any,
 ) -> None:
     """Write the report."""
     from levilab.report.page import write_report
     from levilab.report.reproduction import Heading
 
-    app, heading = context.find_root().command, Heading(**{one.name: given.pop(one.name) for one in HEADING})
+    heading = Heading(**{one.name: given.pop(one.name) for one in HEADING})
     place = place_of_report(out)
     message("making the report; what has no result yet is analyzed for it")
     with interruptible("no report is written"):
@@ -54,7 +52,7 @@ def report(
             paths or (),
             out,
             read_options(given, typed=True),
-            lambda text: message(with_options(text, app)),
+            message,
             tables=tables,
             crosscheck=crosscheck,
             short=short,
@@ -73,7 +71,7 @@ def runs(
         typer.Argument(metavar="[DIR]", readable=False, help="The folder to search.", show_default="runs"),
     ] = None,
     out: Annotated[Path | None, place("DIR", "The same, as acquire has it.", readable=False)] = None,
-    last: Annotated[int | None, typer.Option(metavar="N", min=1, help="The latest N runs alone.")] = None,
+    last: Annotated[int | None, option("N", "The latest N runs alone.", min=1)] = None,
     as_json: Json = False,
 ) -> None:
     """List the runs in a folder."""

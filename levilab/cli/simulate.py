@@ -2,20 +2,17 @@
 
 import contextlib
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from levilab.cli.options import Json, Presets, Settings, number, place, writable
+from levilab.cli.options import Json, Presets, Settings, flag, option, place, quantity, writable
 from levilab.cli.output import interruptible, message, print_json
 from levilab.cli.quantities import with_options
 from levilab.errors import UsageError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from levilab.animation.request import AnimationRequest
     from levilab.motion.effects import Effect
     from levilab.motion.summary import Summary
@@ -37,46 +34,29 @@ def chosen_scene(name: str, settings: list[str] | None) -> "Scene":
 
 
 def simulate(
-    context: typer.Context,
     scene: Presets = None,
-    duration: Annotated[
-        float, typer.Option(metavar="S", parser=number("s"), help="How many seconds are simulated.")
-    ] = 30.0,
+    duration: Annotated[float, quantity("S", "s", "How many seconds are simulated.")] = 30.0,
     tolerance: Annotated[
         float,
-        typer.Option(
-            metavar="X",
-            parser=number(),
-            help="Error that is accepted at the end, of the place in m and of the axis in rad.  The step is chosen for "
+        quantity(
+            "X",
+            "",
+            "Error that is accepted at the end, of the place in m and of the axis in rad.  The step is chosen for "
             "it; the error may be far smaller.",
         ),
     ] = 1e-7,
-    rate: Annotated[
-        float, typer.Option(metavar="HZ", parser=number("Hz"), help="States per second that are written.")
-    ] = 100.0,
+    rate: Annotated[float, quantity("HZ", "Hz", "States per second that are written.")] = 100.0,
     settings: Settings = None,
-    explain: Annotated[
-        bool, typer.Option("--explain", help="Tell what is left out, and how much each of it would change.")
-    ] = False,
+    explain: Annotated[bool, flag("Tell what is left out, and how much each of it would change.", "--explain")] = False,
     out: Annotated[Path | None, place("DIR", "Make a run folder there: states.csv, run.json, motion.png.")] = None,
     animate: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Show the top in slow motion: a page to turn and to scrub (.html), or a film (.gif, .mp4).",
-        ),
+        option("FILE", "Show the top in slow motion: a page to turn and to scrub (.html), or a film (.gif, .mp4)."),
     ] = None,
-    animate_from: Annotated[
-        float | None,
-        typer.Option(metavar="S", parser=number("s"), help="When it begins; a fall is shown unless you say."),
-    ] = None,
-    animate_to: Annotated[
-        float | None,
-        typer.Option(metavar="S", parser=number("s"), help="When it ends; usually 10 s later, 1 s for a film."),
-    ] = None,
+    animate_from: Annotated[float | None, quantity("S", "s", "When it begins; a fall is shown unless you say.")] = None,
+    animate_to: Annotated[float | None, quantity("S", "s", "When it ends; usually 10 s later, 1 s for a film.")] = None,
     animate_speed: Annotated[
-        float | None,
-        typer.Option(metavar="X", parser=number(), help="Part of the real speed; 0.1, for a film 0.05 unless you say."),
+        float | None, quantity("X", "", "Part of the real speed; 0.1, for a film 0.05 unless you say.")
     ] = None,
     as_json: Json = False,
 ) -> None:
@@ -98,14 +78,13 @@ def simulate(
         done = run_simulation(request, message, share)
     if done.folder:
         message(f"wrote {done.folder}")
-    app = context.find_root().command
-    summary = replace(done.summary, notes=tuple(with_options(note, app) for note in done.summary.notes))
+    summary = replace(done.summary, notes=tuple(map(with_options, done.summary.notes)))
     if not as_json:  # at once: what explains it takes longer
         from levilab.motion.table import print_motion
 
         print_motion(summary)
     if film:
-        _animate(film, done.summary, partial(with_options, app=app))
+        _animate(film, done.summary)
     with interruptible("the effects are not known"):
         effects = _switch_effects(chosen, duration) if explain else ()
     if as_json:
@@ -134,12 +113,12 @@ def _animation_request(
     return AnimationRequest(path, start, stop, speed)
 
 
-def _animate(request: "AnimationRequest", summary: "Summary", in_words: "Callable[[str], str]") -> None:
+def _animate(request: "AnimationRequest", summary: "Summary") -> None:
     from levilab.animation.request import animate
     from levilab.present.progress import ShareBar
 
     with interruptible("no animation was written"), contextlib.closing(ShareBar("drawing")) as share:
-        shown = animate(request, summary, lambda text: message(in_words(text)), share)
+        shown = animate(request, summary, message, share)
     message(f"wrote {request.path}: {shown}")
 
 
@@ -154,20 +133,14 @@ def stability(
     scene: Presets = None,
     settings: Settings = None,
     survival: Annotated[
-        bool, typer.Option("--map", help="Simulate a map of survival over spin and mass, too; 10 s or more.")
+        bool, flag("Simulate a map of survival over spin and mass, too; 10 s or more.", "--map")
     ] = False,
-    spins: Annotated[
-        str | None, typer.Option(metavar="LOW:HIGH:STEP", help="Spins of the map in Hz, 18:90:0.5 unless given.")
-    ] = None,
+    spins: Annotated[str | None, option("LOW:HIGH:STEP", "Spins of the map in Hz, 18:90:0.5 unless given.")] = None,
     masses: Annotated[
-        str | None,
-        typer.Option(metavar="LOW:HIGH:STEP", help="Masses of the map in kg, unless given 61 around those that float."),
+        str | None, option("LOW:HIGH:STEP", "Masses of the map in kg, unless given 61 around those that float.")
     ] = None,
     duration: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S", parser=number("s"), help="How long a top of the map has to stay up.", show_default="30"
-        ),
+        float | None, quantity("S", "s", "How long a top of the map has to stay up.", show_default="30")
     ] = None,
     out: Annotated[
         Path | None, place("DIR", "Where the map is written: survival.png and survival.csv.", show_default=".")
@@ -228,7 +201,7 @@ def _simulate_map(
 
 @benchmark_app.command("simulator", epilog="Example: levilab benchmark simulator --out speed")
 def benchmark_simulator(
-    quick: Annotated[bool, typer.Option("--quick", help="Fewer points and repetitions: a first look.")] = False,
+    quick: Annotated[bool, flag("Fewer points and repetitions: a first look.", "--quick")] = False,
     out: Annotated[
         Path | None, place("DIR", "Write simulator.json and simulator.png there.", callback=writable)
     ] = None,
@@ -246,12 +219,8 @@ def benchmark_simulator(
 
 @benchmark_app.command("estimators", epilog="Example: levilab benchmark estimators --trials 50 --out speed")
 def benchmark_estimators(
-    trials: Annotated[
-        int, typer.Option(metavar="N", min=10, help="Traces of each kind; 400 take about ten minutes.")
-    ] = 400,
-    case: Annotated[
-        list[str] | None, typer.Option(metavar="NAME", help="Only this hard case, as '50 Hz'; repeatable.")
-    ] = None,
+    trials: Annotated[int, option("N", "Traces of each kind; 400 take about ten minutes.", min=10)] = 400,
+    case: Annotated[list[str] | None, option("NAME", "Only this hard case, as '50 Hz'; repeatable.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Other traces of the same kinds.")] = 2026,
     out: Annotated[
         Path | None, place("DIR", "Write estimators.json and estimators.png there.", callback=writable)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from levilab.cli.options import SCENES, Json, Settings, named_scene, number, place
+from levilab.cli.options import SCENES, Json, Settings, flag, named_scene, option, place, quantity
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.errors import DataError, UsageError, WorkersLost
 
@@ -32,66 +32,50 @@ def sweep(
     ] = None,
     sweep: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="KEY=FROM:TO:N",
-            help="An axis: N values of a key of the scene, in its unit; :log behind N spaces them logarithmically.  "
+        option(
+            "KEY=FROM:TO:N",
+            "An axis: N values of a key of the scene, in its unit; :log behind N spaces them logarithmically.  "
             "Repeatable, up to three.",
         ),
     ] = None,
     points: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE.csv",
-            help="A table of points instead: its columns are named by keys, its rows are points.",
-        ),
+        option("FILE.csv", "A table of points instead: its columns are named by keys, its rows are points."),
     ] = None,
     observe: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME,…",
-            help="What is observed: survived, lifetime_s, fall_spin_hz, end_spin_hz, energy_error, position_error_m, "
+        option(
+            "NAME,…",
+            "What is observed: survived, lifetime_s, fall_spin_hz, end_spin_hz, energy_error, position_error_m, "
             "highest_spin_hz, height_spread_m, locked, lines.",
             show_default="survived,lifetime_s",
         ),
     ] = None,
     duration: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S", parser=number("s"), help="Seconds that are simulated at each point.", show_default="30"
-        ),
+        float | None, quantity("S", "s", "Seconds that are simulated at each point.", show_default="30")
     ] = None,
     tolerance: Annotated[
         float | None,
-        typer.Option(
-            metavar="X",
-            parser=number(),
-            help="Wanted error at the end, of the place in m and of the axis in rad.",
-            show_default="1e-6",
-        ),
+        quantity("X", "", "Wanted error at the end, of the place in m and of the axis in rad.", show_default="1e-6"),
     ] = None,
     settings: Settings = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Seed of the points that --adaptive checks at random.", show_default="0")
     ] = None,
     out: Annotated[Path | None, place("STORE.zarr", "Where the results go.", show_default="NAME.zarr")] = None,
-    cores: Annotated[
-        int | None, typer.Option(metavar="N", min=1, help="Processes on this machine.", show_default="one a core")
-    ] = None,
+    cores: Annotated[int | None, option("N", "Processes on this machine.", min=1, show_default="one a core")] = None,
     scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS", help=r"Compute on a Dask cluster, as tcp://10.0.0.1:8786; needs levilab\[cluster]."
-        ),
+        str | None, option("ADDRESS", r"Compute on a Dask cluster, as tcp://10.0.0.1:8786; needs levilab\[cluster].")
     ] = None,
     adaptive: Annotated[
         bool,
-        typer.Option(
-            "--adaptive",
-            help="Compute points along the boundary of survival (or of the first observable that is yes or no), "
+        flag(
+            "Compute points along the boundary of survival (or of the first observable that is yes or no), "
             "fill in the rest, and say what that may have missed.",
+            "--adaptive",
         ),
     ] = False,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue a store that was interrupted.")] = False,
+    resume: Annotated[bool, flag("Continue a store that was interrupted.", "--resume")] = False,
     as_json: Json = False,
 ) -> None:
     """Map a scene over its parameters."""

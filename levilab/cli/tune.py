@@ -6,10 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
-import typer
-
 from analysis.numbers import how_many
-from levilab.cli.options import Json, existing_path
+from levilab.cli.options import Json, existing_path, flag, option
 from levilab.cli.output import message, print_json, result
 from levilab.errors import UsageError
 
@@ -23,38 +21,28 @@ _RESULT = "What did it do: floats, rises, sinks, sideways?  A new temperature, a
 
 def tune(
     temperature: Annotated[
-        str | None, typer.Option(metavar="T", help="Of the magnets today, by a thermometer beside them, as 21.5.")
+        str | None, option("T", "Of the magnets today, by a thermometer beside them, as 21.5.")
     ] = None,
-    top: Annotated[str | None, typer.Option(metavar="MASS", help="The top without washers, as 24.9 g.")] = None,
-    washers: Annotated[
-        str | None, typer.Option(metavar="MASSES", help="All washers that you have, as 0.06,0.06,0.1 in g.")
-    ] = None,
+    top: Annotated[str | None, option("MASS", "The top without washers, as 24.9 g.")] = None,
+    washers: Annotated[str | None, option("MASSES", "All washers that you have, as 0.06,0.06,0.1 in g.")] = None,
     trial: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="TRIAL",
-            help="A top that you let go: its mass or its washers, the temperature, and whether it floats, rises, sinks "
+        option(
+            "TRIAL",
+            "A top that you let go: its mass or its washers, the temperature, and whether it floats, rises, sinks "
             "or slides sideways; repeatable.",
         ),
     ] = None,
     scan: Annotated[
-        Path | None,
-        typer.Option(metavar="PATH", readable=False, help="A Hall scan of the base.", callback=existing_path),
+        Path | None, option("PATH", "A Hall scan of the base.", readable=False, callback=existing_path)
     ] = None,
     device: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            readable=False,
-            help="Describes base and top for the scan, as in analyze field.",
-        ),
+        Path | None, option("FILE", "Describes base and top for the scan, as in analyze field.", readable=False)
     ] = None,
-    scan_temperature: Annotated[
-        str | None, typer.Option(metavar="T", help="Of the base at the scan.", show_default="the run's")
-    ] = None,
-    file: Annotated[Path, typer.Option(metavar="FILE", readable=False, help="Keeps your answers.")] = Path("tune.toml"),
+    scan_temperature: Annotated[str | None, option("T", "Of the base at the scan.", show_default="the run's")] = None,
+    file: Annotated[Path, option("FILE", "Keeps your answers.", readable=False)] = Path("tune.toml"),
     ask: Annotated[
-        bool | None, typer.Option("--ask/--no-ask", help="Ask for what is missing.", show_default="at a terminal")
+        bool | None, flag("Ask for what is missing.", "--ask/--no-ask", show_default="at a terminal")
     ] = None,
     as_json: Json = False,
 ) -> None:

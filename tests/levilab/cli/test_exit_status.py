@@ -8,7 +8,7 @@ import re
 import pytest
 
 from levilab.cli import exit_codes
-from levilab.cli.main import app, main
+from levilab.cli.main import main
 from levilab.cli.quantities import in_options, option_names
 from levilab.errors import LevilabError, UsageError
 from support.commands import command
@@ -263,13 +263,13 @@ def test_a_quantity_in_a_message_becomes_its_option():
         "the `nonsense` stays": "the `nonsense` stays",
     }
     for text, shown in texts.items():
-        assert in_options(LevilabError(text), app) == shown
-    assert in_options(UsageError("reading_u", "above 0", value=-1.0), app) == "--reading-u -1: above 0"
-    assert in_options(UsageError("survival", "is a map"), app) == "--map: is a map"
+        assert in_options(LevilabError(text)) == shown
+    assert in_options(UsageError("reading_u", "above 0", value=-1.0)) == "--reading-u -1: above 0"
+    assert in_options(UsageError("survival", "is a map")) == "--map: is a map"
 
 
 def test_one_quantity_has_one_option_in_all_commands():
-    names = option_names(app)
+    names = option_names()
     assert names["settings"] == ("--set", "")
     assert names["save"] == ("--save", "--no-save")
     assert names["out"] == ("--out", "")
@@ -282,7 +282,7 @@ ROOMS = ("runs", "formats", "motion", "stability")
 
 @pytest.mark.parametrize("room", ROOMS)
 def test_messages_below_the_command_line_name_quantities_not_options(room):
-    names = option_names(app)
+    names = option_names()
     for path in (ROOT / "levilab" / room).glob("*.py"):
         text = path.read_text(encoding="utf-8")
         assert not re.findall(r'"[^"\n]*--[a-z]+[^"\n]*"', text), path
