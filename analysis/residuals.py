@@ -122,11 +122,11 @@ def gross_errors(t: Array, n_parameters: int) -> NDArray[np.intp]:
     return found[np.argsort(-np.abs(t[found]))]
 
 
-def gross_limit(n: int, n_parameters: int, p: float = 1e-3) -> float:
-    """Return the studentised residual that one of n has by noise with probability p, two-sided (Bonferroni)."""
+def gross_limit(n: int, n_parameters: int) -> float:
+    """Return the studentised residual that one of n has by noise once in 1000 times, two-sided (Bonferroni)."""
     from scipy.special import stdtrit
 
-    return -float(stdtrit(n - n_parameters - 1, p / n / 2))
+    return -float(stdtrit(n - n_parameters - 1, 1e-3 / n / 2))
 
 
 # --- changes ---------------------------------------------------------------------------------------------

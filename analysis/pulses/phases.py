@@ -49,14 +49,9 @@ class Phase:
     windows: tuple[int, int]
 
 
-def phases(track: Windows, *, still: float = STILL) -> tuple[Phase, ...]:
-    """Cut a track into phases.
-
-    Args:
-        track: of `track_of_times` or `track_of_blocks`, or of a magnetometer.
-        still: relative slope [1/s] below which a top counts as held at its frequency, as by a drive that it follows.
-    """
-    kinds = _kinds(track, still)
+def phases(track: Windows) -> tuple[Phase, ...]:
+    """Cut a track of `track_of_times` or `track_of_blocks`, or of a magnetometer, into phases."""
+    kinds = _kinds(track)
     found: list[Phase] = []
     first = 0
     for i in range(1, len(kinds) + 1):
@@ -69,9 +64,9 @@ def phases(track: Windows, *, still: float = STILL) -> tuple[Phase, ...]:
     return tuple(_extend_to_gaps(sorted(found, key=lambda phase: phase.start)))
 
 
-def _kinds(track: Windows, still: float) -> list[Kind]:
+def _kinds(track: Windows) -> list[Kind]:
     slope = np.array([_slope(track, i) for i in range(track.time.size)]) / track.frequency
-    kinds: list[Kind] = ["speeding-up" if s > still else "coasting" if s < -still else "held" for s in slope]
+    kinds: list[Kind] = ["speeding-up" if s > STILL else "coasting" if s < -STILL else "held" for s in slope]
     first = 0
     while first < len(kinds):
         end = first

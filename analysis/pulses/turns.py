@@ -116,10 +116,10 @@ class Windows:
     sharpness: Array
 
 
-def windows_of(times: Array, size: int = WINDOW) -> Windows:
+def windows_of(times: Array) -> Windows:
     """Return frequency and phase of overlapping windows of pulses."""
     n = times.size
-    size = min(size, n)
+    size = min(WINDOW, n)
     starts = np.arange(0, max(n - size, 0) + 1, max(size // 2, 1))
     if starts[-1] + size < n:
         starts = np.append(starts, n - size)

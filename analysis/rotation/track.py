@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.errors import AnalysisError, NotPositive
+from analysis.errors import AnalysisError
 from analysis.rotation.errors import NoLine
 from analysis.rotation.folds import Evidence, evidence_of, images_between, weigh
 from analysis.rotation.line import UNDER_DRAG, LineFit, fit_line
@@ -103,26 +103,21 @@ class _Window:
     follows: bool
 
 
-def track_of_field(
-    times: ArrayLike, field: ArrayLike, *, window: float = WINDOW_S, near: float | None = None
-) -> FieldTrack:
+def track_of_field(times: ArrayLike, field: ArrayLike, *, near: float | None = None) -> FieldTrack:
     """Follow the frequency through a long record.
 
     Args:
         times: shape (n,), not decreasing [s].
         field: shape (n, k) or (n,), k = 1 to 3 axes [T].
-        window: length of a window [s].
         near: about where the spin is at first, to 10 % [Hz].
 
     Raises:
-        TooFewReadings, ShapesDiffer, NotFinite, TimesNotIncreasing, NotPositive: see `analysis.errors`.
+        TooFewReadings, ShapesDiffer, NotFinite, TimesNotIncreasing: see `analysis.errors`.
         NoLine: nothing stands out of the noise in any window.
     """
-    if not (math.isfinite(window) and window > 0):
-        raise NotPositive(quantity="window", unit="s", index=0, value=window)
     t, b = read_samples(times, field)
     low, high = limits_near(near)
-    edges = np.linspace(t[0], t[-1], max(round(float(t[-1] - t[0]) / window), 1) + 1)
+    edges = np.linspace(t[0], t[-1], max(round(float(t[-1] - t[0]) / WINDOW_S), 1) + 1)
     cuts = np.searchsorted(t, edges)
     cuts[-1] = t.size
     found: list[_Window] = []

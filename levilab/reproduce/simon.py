@@ -73,7 +73,7 @@ def row(number: str) -> Simon:
     return Simon(top, (flux[0], flux[1], 2 * flux[2]))
 
 
-def base_like(simon: Simon, ratio: float = RATIO) -> tuple[float, float, float]:
+def base_like(simon: Simon) -> tuple[float, float, float]:
     """Return a thin ring whose field has these B, B′, B″ at some height: inner radius [m], strength [T m], height [m].
 
     With lengths in parts of the inner radius, B B″/B′² is a function of the height alone; there the radius follows
@@ -85,14 +85,14 @@ def base_like(simon: Simon, ratio: float = RATIO) -> tuple[float, float, float]:
     from scipy.optimize import brentq
 
     b, slope, second = simon.flux
-    unit = field_of(1.0, ratio, 1.0, "exact")
+    unit = field_of(1.0, RATIO, 1.0, "exact")
     wanted = b * second / slope**2
 
     def off(z: float) -> float:
         f, s, c = on_axis(unit, z)[:, 0]
         return float(f * c / s**2) - wanted
 
-    heights = np.linspace(1.2 * ratio**0.5, 4.0 * ratio, 400)
+    heights = np.linspace(1.2 * RATIO**0.5, 4.0 * RATIO, 400)
     values = np.array([off(z) for z in heights])
     for k in np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))[::-1]:
         z = float(brentq(off, heights[k], heights[k + 1]))
@@ -100,17 +100,17 @@ def base_like(simon: Simon, ratio: float = RATIO) -> tuple[float, float, float]:
         a = b / slope * s / f
         if a > 0:
             return a, b / f * a, z * a
-    raise ValueError(f"no ring with b = {ratio} a has B, B', B'' = {simon.flux}")
+    raise ValueError(f"no ring with b = {RATIO} a has B, B', B'' = {simon.flux}")
 
 
-def scene_of(simon: Simon, start: tuple[float, float], ratio: float = RATIO) -> Scene:
+def scene_of(simon: Simon, start: tuple[float, float]) -> Scene:
     """Return the top over a ring with the paper's field at its height, to r² in the potential, as the paper has it."""
-    a, strength, height = base_like(simon, ratio)
+    a, strength, height = base_like(simon)
     return preset("undriven").changed(
         {
             "gravity_m_s2": simon.gravity,
             "base.inner_radius_m": a,
-            "base.outer_radius_m": ratio * a,
+            "base.outer_radius_m": RATIO * a,
             "base.strength_t_m": strength,
             "top.mass_kg": simon.top.mass,
             "top.inertia_transverse_kg_m2": simon.top.transverse,

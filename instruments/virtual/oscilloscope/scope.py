@@ -339,11 +339,11 @@ class VirtualOscilloscope(VirtualInstrument):
         self.busy_until(self._ready + len(data) / self.transfer)
         return block_text(data, self.digits)
 
-    def on_screen(self, channel: int, points: int = 50_000) -> Measured:
+    def on_screen(self, channel: int) -> Measured:
         """Return the trace on the screen, from its codes.  Raises ScpiError if there is none."""
         record = self.record()
         start, length = record.screen
-        points = max(2, min(points, round(length * record.rate)))
+        points = max(2, min(50_000, round(length * record.rate)))
         step = length / points
         codes = record.codes(channel, 0, points, of=points, start=start, step=step)
         return Measured(record.inputs[channel].shown(codes), step, start)

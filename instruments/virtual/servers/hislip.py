@@ -393,15 +393,10 @@ _ASYNC_HANDLERS: dict[int, Callable[[Client, Channel, Message], None]] = {
 
 
 class HislipServer:
-    """Both channels of all clients of one instrument, on one port.
+    """Both channels of all clients of one instrument, on one port, whose only subaddress is hislip0."""
 
-    Args:
-        instrument: to serve.
-        subaddress: the only one that it accepts.
-    """
-
-    def __init__(self, instrument: ServedInstrument, *, subaddress: str = "hislip0") -> None:
-        self._instrument, self._subaddress = instrument, subaddress
+    def __init__(self, instrument: ServedInstrument) -> None:
+        self._instrument = instrument
         self._clients: dict[int, Client] = {}
         self._numbers = itertools.count(1)
         self.listener = Listener(instrument, self._talk, most=2 * MOST_CLIENTS)
@@ -424,8 +419,8 @@ class HislipServer:
     async def _serve_synchronous(self, channel: Channel, first: Message) -> None:
         """Serve a synchronous channel, from Initialize (6.1) on."""
         asked = first.payload.decode("latin-1").lower()
-        if asked not in {"", self._subaddress}:
-            await channel.fail(Fatal.BAD_INITIALIZATION, f"the only subaddress here is {self._subaddress}")
+        if asked not in {"", "hislip0"}:
+            await channel.fail(Fatal.BAD_INITIALIZATION, "the only subaddress here is hislip0")
         if len(self._clients) >= MOST_CLIENTS:
             await channel.fail(Fatal.TOO_MANY_CLIENTS, f"at most {MOST_CLIENTS} clients")
         number = next(number for number in (n % 0xFFFF for n in self._numbers) if number not in self._clients)

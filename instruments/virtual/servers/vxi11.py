@@ -76,15 +76,10 @@ def _program(number: int, procedures: Mapping[int, Procedure]) -> Program:
 
 
 class Vxi11Server:
-    """The core and the abort channel of one instrument.
+    """The core and the abort channel of one instrument, whose only device is inst0."""
 
-    Args:
-        instrument: to serve.
-        device: the only device name that it accepts.
-    """
-
-    def __init__(self, instrument: ServedInstrument, *, device: str = "inst0") -> None:
-        self._instrument, self._device = instrument, device
+    def __init__(self, instrument: ServedInstrument) -> None:
+        self._instrument = instrument
         self.links: dict[int, OpenLink] = {}
         self._numbers = itertools.count(1)
         self.core, self.abort = Listener(instrument, self._talk), Listener(instrument, self._talk_abort)
@@ -113,7 +108,7 @@ class Vxi11Server:
 
     def create(self, device: str) -> tuple[Error, int]:
         """Create a link to the device.  Returns an error code, and the number of the link."""
-        if device.lower() not in {"", self._device}:
+        if device.lower() not in {"", "inst0"}:
             return Error.NOT_ACCESSIBLE, 0
         if len(self.links) >= MOST_CLIENTS:
             return Error.OUT_OF_RESOURCES, 0
