@@ -47,13 +47,11 @@ class FigureText:
     Attributes:
         title: what it is, in a few words.
         caption: what is to be seen, in sentences.
-        alt: the same in one line, for readers who do not see it.
         points: what answers to the pointer; of many runs, whose figure is a picture of dots, there are none.
     """
 
     title: str
     caption: str
-    alt: str
     points: tuple[Points, ...] = ()
 
 

@@ -167,10 +167,12 @@ def draw(table: Table) -> RichTable:
     drawn.show_header = any(table.heads)
     for k in table.numbers:
         drawn.columns[k].justify = "right"
+    before = ""
     for row in table.rows:
-        if row.kind == "together":
+        if row.kind == "together" != before:
             drawn.add_section()
         drawn.add_row(*map(escape, row.cells))
+        before = row.kind
     return drawn
 
 

@@ -161,7 +161,7 @@ def picture_of(analysis: Analysis[A], found: A, part: ReportPart) -> Picture:
         name=analysis.name,
         title=part.figure.title,
         caption=part.figure.caption,
-        alt=part.figure.alt,
+        alt=part.figure.title.rstrip("."),
         draw=partial(analysis.figure, found),
         points=() if many else part.figure.points,
         raster=many,

@@ -158,7 +158,6 @@ def field_part(analysis: FieldAnalysis) -> ReportPart:
                 "Flux density against height with the fitted ring, what the fit leaves over, and the masses and spins "
                 "of tops that float in this field."
             ),
-            alt="Flux density against height with its fit, residuals, masses and spins of tops that float",
             points=points_of(analysis, _points, "readings", "residuals"),
         ),
         runs_title="Scan by scan" if several else "The base",

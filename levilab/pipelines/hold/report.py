@@ -87,7 +87,6 @@ def hold_part(analysis: HoldAnalysis) -> ReportPart:
                 "The drag that the amplitude balanced at each held spin, with its u, and the drag laws through it; "
                 "below, both over the best law."
             ),
-            alt="Drag against spin, with the drag laws",
             points=points_of(analysis, _points, "readings", *(["ratios"] if analysis.combined.best else [])),
         ),
         inputs=input_parts(analysis, _in_words, lambda *_: (), text_of),

@@ -137,7 +137,6 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
                 "The limits top by top with their mean, their scatter and what theory says, and how they are "
                 "distributed."
             ),
-            alt="Limits top by top with mean, scatter and theory, and how they are distributed",
             points=_points(analysis),
         ),
         runs_title="Beside theory",

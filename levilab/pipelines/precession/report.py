@@ -244,7 +244,6 @@ def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
                 "The points with the line and its bands of 95 %; departures from the drive; how far the line follows "
                 "each point, and what each does to the slope."
             ),
-            alt="Precession against drive with the line, departures from the drive, influence of each point",
             points=points_of(analysis, _figure_points, "readings", "residuals"),
         ),
         runs_title="Phase of the laser's pulses",

@@ -266,7 +266,6 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
                 "Traces with the turns found in them, turns laid over each other, what the fit leaves over, and the "
                 "frequency in time."
             ),
-            alt="Traces with the turns found in them, turns laid over each other, residuals, frequency in time",
             points=_points(analysis),
         ),
         runs_title="The line" if all(run.line for run in analysis.runs) else "The pulses",

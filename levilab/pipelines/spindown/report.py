@@ -42,7 +42,6 @@ from levilab.present.numbers import (
     without_unit,
 )
 from levilab.present.tables import Row, Table, table
-from levilab.present.units import unit
 from levilab.present.units import unit as unit_row
 from levilab.runs.events import RunEvent
 
@@ -223,7 +222,10 @@ def spindown_tables(analysis: SpinDownAnalysis) -> tuple[Table, ...]:
     """Return the runs, the laws, how well they fit, the straight lines.  Each fits a terminal of 80 columns."""
     quality = quality_table(analysis, QUALITY)
     count = count_table(analysis, symbols=True)
-    return _runs_table(analysis), _laws_table(analysis), quality, *([count] if count else []), _lines_table(analysis)
+    best, *lines = _of_laws(analysis)
+    title = f"Run by run: the fit of the {analysis.combined.best} law, and unweighted straight lines"
+    by_run = _by_run_table(analysis, title, [best[0], *(one for columns in lines for one in columns)])
+    return _runs_table(analysis), _constants_table(analysis), quality, *([count] if count else []), by_run
 
 
 def _runs_table(analysis: SpinDownAnalysis) -> Table:
@@ -239,19 +241,6 @@ def _runs_table(analysis: SpinDownAnalysis) -> Table:
     ]
     heads = ("run", "readings", *(one.head for one in OF_RUN), "spin [Hz]", "best law")
     return table(title_of("Spin-down", analysis.sources), heads, rows, numbers=["readings"])
-
-
-def _laws_table(analysis: SpinDownAnalysis) -> Table:
-    of = "" if len(analysis.runs) == 1 else f", means over {len(analysis.runs)} runs, u from their scatter"
-    rows = [
-        (
-            fit.name,
-            "best" if is_best(analysis, fit.name) else "",
-            "\n".join(_equations(law_constants(analysis, fit.name))),
-        )
-        for fit in analysis.combined.fits
-    ]
-    return table(f"Drag laws{of}", ("law", "", "constants"), rows)
 
 
 def laws_of(analysis: SpinDownAnalysis) -> list[str]:
@@ -341,41 +330,6 @@ def tilt_part(fit: LawFit, time: Array) -> Array:
     return fit.spin_frequency(time) - spin
 
 
-def _lines_table(analysis: SpinDownAnalysis) -> Table:
-    """Return the thesis's straight lines, run by run, beside the fit of the favoured law."""
-    best = analysis.combined.fit(analysis.combined.best)
-    lines = [fit for fit in analysis.combined.fits if fit.linearised]
-    heads = [f"{STRAIGHT_LINES[fit.name].quantity}\n{_head(fit.linearised or {})}" for fit in lines]
-    means = [_first(fit.linearised or {}) for fit in lines] + [_first(best.constants)]
-    of_runs = [
-        [_first(run.fit(fit.name).linearised or {}) for fit in lines]
-        + [run.fit(best.name).parameters[next(iter(best.constants))]]
-        for run in analysis.runs
-    ]
-    several = len(analysis.runs) > 1
-    columns = [column(cells) for cells in zip(*of_runs, *([means] if several else []), strict=True)]
-    names = [*(short_name(source.name) for source in analysis.sources), *(["mean"] if several else [])]
-    rows = [
-        Row((name, *cells), "together" if several and name is names[-1] else "")
-        for name, *cells in zip(names, *columns, strict=True)
-    ]
-    title = f"Run by run: unweighted straight lines, and the fit of the {best.name} law"
-    return table(title, ("run", *heads, f"{best.name} fit\n{_head(best.constants)}"), rows)
-
-
-def _equations(estimates: Mapping[str, Estimate]) -> list[str]:
-    return [f"{SYMBOLS[name]} = {with_uncertainty(estimate)}" for name, estimate in estimates.items()]
-
-
-def _head(estimates: Mapping[str, Estimate]) -> str:
-    name, estimate = next(iter(estimates.items()))
-    return f"{SYMBOLS[name]} [{unit(estimate.unit).text}]"
-
-
-def _first(estimates: Mapping[str, Estimate]) -> Estimate:
-    return next(iter(estimates.values()))
-
-
 # --- readings as columns of tables for programs ---
 
 
@@ -448,7 +402,6 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
                 "The readings with all drag laws; what each law leaves over, which is noise about zero where the law "
                 "holds; and the straight lines that one draws on paper, straight where their law holds."
             ),
-            alt="Readings with all drag laws, residuals of each law, and straight lines",
             points=_points(analysis),
         ),
         runs_title="Run by run",
@@ -535,17 +488,22 @@ def _run_by_run(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
     )
     several = " s: standard deviation of one run's constant from another's; the uncertainty of the mean is s/√N."
     note = f"ν₀: the spin at the first reading.{several if len(analysis.runs) > 1 else ''}"
-    shown = Tabular("spindown-runs", _by_run_table(analysis), note, first_column_wraps=True)
-    return Paragraph(paper), shown
+    constants = [one for columns in _of_laws(analysis) for one in columns]
+    starts = tuple(run.fit(combined.best).parameters["start_frequency"] for run in analysis.runs)
+    start = _Column(_head_of(f"{combined.best} fit", "start_frequency", starts[0].unit), starts)
+    times = [_Column(one.head, one.show_all(analysis.runs)) for one in OF_RUN]
+    found = _by_run_table(analysis, "", [*constants, start, *times])
+    return Paragraph(paper), Tabular("spindown-runs", found, note, first_column_wraps=True)
 
 
 def _constants_table(analysis: SpinDownAnalysis) -> Table:
     several = len(analysis.runs) > 1
     heads = ("law", "mean over the runs", "scatter s between the runs") if several else ("law", "constants")
+    title = "Drag laws, u of the means from the scatter" if several else "Drag laws"
     rows = [
         Row(_law_cells(analysis, law), "best" if is_best(analysis, law.name) else "") for law in analysis.combined.fits
     ]
-    return table("", heads, rows)
+    return table(title, heads, rows)
 
 
 def _law_cells(analysis: SpinDownAnalysis, law: CombinedLaw) -> tuple[str, ...]:
@@ -574,35 +532,32 @@ class _Column:
         return ["" if cell == "—" else cell for cell in column([*self.estimates, *together])]
 
 
-def _by_run_table(analysis: SpinDownAnalysis) -> Table:
-    columns = _columns(analysis)
-    heads = ("run", "readings\nused", *(one.head for one in columns))
-    names = [
-        (short_name(source.name), str(len(run.time)), "")
-        for source, run in zip(analysis.sources, analysis.runs, strict=True)
-    ]
+def _by_run_table(analysis: SpinDownAnalysis, title: str, columns: Sequence[_Column]) -> Table:
+    names = [(short_name(source.name), "") for source in analysis.sources]
     if len(analysis.runs) > 1:
-        names += [("mean", "", "together"), ("scatter s", "", "together")]
+        names += [("mean", "together"), ("scatter s", "together")]
     rows = [
-        Row((name, count, *cells), kind)
-        for (name, count, kind), *cells in zip(names, *(one.cells for one in columns), strict=True)
+        Row((name, *cells), kind) for (name, kind), *cells in zip(names, *(one.cells for one in columns), strict=True)
     ]
-    return table("", heads, rows, numbers=heads[1:2])
+    return table(title, ("run", *(one.head for one in columns)), rows)
 
 
-def _columns(analysis: SpinDownAnalysis) -> list[_Column]:
-    """Return the constants of the best law's fit, those of the straight lines, and when each run was."""
-    combined = analysis.combined
-    best = combined.fit(combined.best)
+def _of_laws(analysis: SpinDownAnalysis) -> list[list[_Column]]:
+    """Return the constants of the best law's fit, and then those of each straight line."""
+    best = analysis.combined.fit(analysis.combined.best)
     fits = [run.fit(best.name).parameters for run in analysis.runs]
-    starts = tuple(fit["start_frequency"] for fit in fits)
-    columns = _of_law(f"{best.name} fit", best.constants, fits)
-    columns.append(_Column(_head_of(f"{best.name} fit", "start_frequency", starts[0].unit), starts))
-    for law in combined.fits:
-        if law.linearised:
-            lines = [run.fit(law.name).linearised or {} for run in analysis.runs]
-            columns += _of_law(f"{STRAIGHT_LINES[law.name].quantity} against t", law.linearised, lines)
-    return columns + [_Column(one.head, one.show_all(analysis.runs)) for one in OF_RUN]
+    lines = [
+        (law, [run.fit(law.name).linearised or {} for run in analysis.runs])
+        for law in analysis.combined.fits
+        if law.linearised
+    ]
+    return [
+        _of_law(f"{best.name} fit", best.constants, fits),
+        *(
+            _of_law(f"{STRAIGHT_LINES[law.name].quantity} against t", law.linearised or {}, found)
+            for law, found in lines
+        ),
+    ]
 
 
 def _of_law(of: str, means: Mapping[str, Mean], runs: Sequence[Mapping[str, Estimate]]) -> list[_Column]:
@@ -630,7 +585,7 @@ def _in_words(source: Source[SpinReadings], fit: SpinDown, options: SpinDownOpti
     count, outliers = len(source.readings), len(fit.outliers)
     text = how_many(count, "reading")
     if outliers:
-        text += f", {how_many(outliers, 'outlier')} of them {'kept' if options.keep_outliers else 'left out'}"
+        text += f", {how_many(outliers, 'outlier')} among them, {'kept' if options.keep_outliers else 'left out'}"
     t, nu = fit.time, fit.frequency
     span = f"{with_decimals(t[0], 1)} s to {with_decimals(t[-1], 1)} s, {nu[0]:.2f} Hz to {nu[-1]:.2f} Hz"
     return f"{text}; {span}", _uncertainty(source, fit, options)

@@ -113,7 +113,6 @@ def sway_part(analysis: SwayAnalysis) -> ReportPart:
                 "How far the slow swings are split, against the spin, with the prediction and with no split at all; "
                 "and the spectrum of one window, whose negative frequencies turn against the spin."
             ),
-            alt="Split of the slow swings against the spin, and the signed spectrum of a window",
             points=points_of(analysis, _points, "readings"),
         ),
         runs_title="Window by window",

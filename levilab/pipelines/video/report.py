@@ -74,7 +74,6 @@ def video_part(analysis: VideoAnalysis) -> ReportPart:
         figure=FigureText(
             title="First picture.",
             caption="Rim, mark, base, and the path of the rim's middle, drawn over the first picture.",
-            alt="First picture of the film with rim, mark, base and path drawn over it",
         ),
         runs_title="Readings of the spin",
         runs=tuple(_spins(run, k) for k, run in enumerate(analysis.runs)),

@@ -73,7 +73,7 @@ def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data
     analysis = SPINDOWN.analyze([sample_data], SpinDownOptions())
     combined = analysis.combined
     lines = spindown_tables(analysis)[-1]
-    assert [row.kind for row in lines.rows] == ["", "", "", "", "together"]
+    assert [row.kind for row in lines.rows] == ["", "", "", "", "together", "together"]
     tables = [block for block in spindown_part(analysis).result if isinstance(block, Tabular)]
     (laws,) = (one.table for one in tables if one.name == "spindown-laws")
     cells = {row.cells[0]: row.cells[2] for row in laws.rows}
