@@ -16,7 +16,7 @@ from analysis.uncertainty import Estimate
 from levilab.files import stamp
 from levilab.pipelines.result import RESULT, beside
 from levilab.present.numbers import with_uncertainty
-from levilab.texts.text import Text
+from levilab.texts.text import Text, text_from
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -35,8 +35,8 @@ _PATIENCE_S = 5.0
 _APART: dict[str, Any] = {
     "start_new_session": True, "creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)
 }  # fmt: skip
-#: What a page shows of a result at most [characters].
-_LONGEST_TEXT = 2000
+#: What a page shows of a result at most: texts of a kind, and characters of each.
+_MOST_TEXTS, _LONGEST_TEXT = 12, 2000
 
 
 class Analyses:
@@ -166,13 +166,20 @@ def _result(path: Path) -> dict[str, Any]:
         found = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(found, dict):
         return {}
-    text = found.get("text")
-    warnings = found.get("warnings")
+    doubts = _texts(found.get("doubts"))
     return {
         "analysis": str(found.get("analysis", ""))[:40],
-        "verdict": [text[:_LONGEST_TEXT]] if isinstance(text, str) and text else _values(found.get("values")),
-        "warnings": [str(text)[:600] for text in warnings][:10] if isinstance(warnings, list) else [],
+        "verdict": _texts(found.get("sentences") or [found.get("text")]) or _values(found.get("values")),
+        "doubts": doubts,
+        "warnings": [text for text in _texts(found.get("warnings")) if text not in doubts],
     }
+
+
+def _texts(found: Any) -> list[str]:
+    """Return the first of a list of texts, each as levilab.texts.text.as_tables writes it."""
+    found = found[:_MOST_TEXTS] if isinstance(found, list) else []
+    texts = [text_from(one) if isinstance(one, dict) else one for one in found]
+    return [text for text in texts if isinstance(text, str) and 0 < len(text) <= _LONGEST_TEXT]
 
 
 def _values(values: Any) -> list[str]:

@@ -134,8 +134,8 @@ def spin_down(columns: Mapping[str, Array], size: int, *_: object) -> Running:
     others = [name for name in found.verdict.indistinguishable if name != found.best]
     lines = [
         Text("{constants:n}", constants=tuple(constants)),
-        Text("as good: {laws}", laws=", ".join(others)) if others else "",
-        Text("excluded: {laws}", laws=", ".join(found.verdict.excluded)) if found.verdict.excluded else "",
+        Text("as good: {laws}", laws=tuple(others)) if others else "",
+        Text("excluded: {laws}", laws=tuple(found.verdict.excluded)) if found.verdict.excluded else "",
     ]
     return Running(
         Text("{law} law, the best so far   {equation}", law=found.best, equation=LAWS[found.best].equation),

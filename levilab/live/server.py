@@ -301,8 +301,11 @@ class Pages:
     async def analysis(self, request: Request) -> Response:
         """Return the progress of an input's analysis, and its answer."""
         path = self._input(request)
-        about = self.hall.analyses.about(path) if path else {"failed": ""}
-        return self._json(about | {"failed": in_language(about["failed"], _language(request, self.hall))})
+        about: dict[str, Any] = self.hall.analyses.about(path) if path else {"failed": ""}
+        language = _language(request, self.hall)
+        for what in ("verdict", "doubts"):
+            about[what] = [unquote_names(in_language(text, language)) for text in about.get(what, ())]
+        return self._json(about | {"failed": in_language(about["failed"], language)})
 
     async def take(self, request: Request) -> Response:
         """Keep a file that is dropped into a page, and open it."""

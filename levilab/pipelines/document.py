@@ -34,6 +34,7 @@ from levilab.pipelines.sources import Needs, Skipped, collect
 from levilab.present.units import name_with_unit, split
 from levilab.runs.find import find_run
 from levilab.software import software_versions
+from levilab.texts.text import Sentences, as_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -276,6 +277,8 @@ class Analysis(Needs[Any], Generic[A]):
             "software": software_versions(),
             "settings": self.settings(found.options),
             "text": found.text,
+            "sentences": as_tables(found.text.each if isinstance(found.text, Sentences) else (found.text,)),
+            "doubts": as_tables(found.doubts),
             "models": [],
             "runs": [
                 {

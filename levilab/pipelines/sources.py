@@ -29,6 +29,7 @@ from levilab.present.clock import local
 from levilab.present.numbers import list_in_words, short_name
 from levilab.runs.find import RECORD, find_runs, no_such_path
 from levilab.runs.run import READINGS, Run
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -46,10 +47,18 @@ SKIP = ".levilab-skip"
 SAME = 5e-5
 
 
-class Doubt(str):
+class Doubt(Text):
     """A warning that makes the numbers worthless where it is right, as of a wrong unit or of loose washers."""
 
     __slots__ = ()
+
+    def __new__(cls, text: str) -> Self:
+        """Make it of a text."""
+        return super().__new__(cls, "{text}", text=text)
+
+    def __reduce__(self) -> Any:
+        """Return how it is made again in another process."""
+        return Doubt, (self.values["text"],)
 
 
 #: Kinds of remarks that are doubts.

@@ -102,7 +102,7 @@ def enumeration(names: Sequence[str]) -> str:
     >>> enumeration(["disc"]), enumeration(["disc", "stokes", "newton"])
     ('disc', 'disc, stokes and newton')
     """
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    return names[0] if len(names) == 1 else Text("{first} and {last}", first=tuple(names[:-1]), last=names[-1])
 
 
 def pulses_too_many(pulses: int) -> str:

@@ -23,6 +23,7 @@ from levilab.runs.events import RunEvent
 from levilab.runs.find import RECORD
 from levilab.runs.traces import load_traces
 from levilab.settings import in_one_line
+from levilab.texts.text import Text, text_from
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -215,11 +216,12 @@ class Run:
 
 def _warnings_of(events: list[dict[str, Any]]) -> tuple[str, ...]:
     """Return each warning once; of those that differ only in their numbers the first, with a count."""
-    texts = [str(event["text"]) for event in events if event["kind"] == RunEvent.WARNING]
+    texts = [text_from(one.get("says"), one["text"]) for one in events if one["kind"] == RunEvent.WARNING]
     alike = Counter(_NUMBERS.sub("#", text) for text in texts)
     firsts = {_NUMBERS.sub("#", text): text for text in reversed(texts)}
     return tuple(
-        f"{firsts[kind]} (the first of {n} such warnings)" if n > 1 else firsts[kind] for kind, n in alike.items()
+        Text("{first} (the first of {n} such warnings)", first=firsts[kind], n=n) if n > 1 else firsts[kind]
+        for kind, n in alike.items()
     )
 
 

@@ -18,7 +18,7 @@ from levilab.errors import UsageError
 from levilab.files import parse_toml
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Iterable, Mapping
 
 FOLDER = Path(__file__).parent
 ENGLISH = "en"
@@ -92,6 +92,22 @@ class Text(str):
         return {"template": self.template, "values": {name: _plain(one) for name, one in self.values.items()}}
 
 
+class Sentences(Text):
+    """Sentences as one text; each that is a Text is said in a language by itself, and an empty one is left out."""
+
+    __slots__ = ()
+
+    def __new__(cls, *texts: str) -> Self:
+        """Put them one after the other."""
+        kept = {f"s{k}": text for k, text in enumerate(texts) if text}
+        return super().__new__(cls, " ".join(f"{{{name}}}" for name in kept), **kept)
+
+    @property
+    def each(self) -> tuple[str, ...]:
+        """One by one."""
+        return tuple(self.values.values())
+
+
 def text_from(table: Any, otherwise: str = "") -> str:
     """Return the text of a table that `Text.as_table` made; another text where it is none."""
     try:
@@ -161,6 +177,11 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return [_plain(one) for one in value] if isinstance(value, tuple) else value
+
+
+def as_tables(texts: Iterable[str]) -> list[Any]:
+    """Return texts as plain values, which `text_from` reads."""
+    return [_plain(text) for text in texts]
 
 
 def _from_plain(value: Any) -> Any:

@@ -1,13 +1,15 @@
-// What an analysis says, always in one order: its sentences, figures, notes, and the link to the report.
+// What an analysis says, always in one order: doubts, the answer, figures, all else in a fold, the link to the report.
 
 import {GONE, read} from "./connection.js";
 import {LANGUAGE, by, make, phrase, put, typeset, write} from "./words.js";
 
+/** Sentences that are the answer: the value with its uncertainty, and what it means; the others are in the fold. */
+const ANSWER = 2;
 /** What is under way, by the step that the server names; "" once all is there. */
 const STEPS = {analyze: phrase("Analyzing…"), report: phrase("The report is being written…"), "": ""};
 
 /**
- * Ask for an analysis, and show its answer in the elements "verdict", "figures", "notes" and "report".  Nothing is shown
+ * Ask for an analysis, and show its answer in the elements of the page's part "result".  Nothing is shown
  * before it is whole: sentences, figures and notes once the analysis is over, the link once the report is written.
  *
  * @param {() => Promise<string>} begin asks for it; what is wrong, or "".
@@ -16,13 +18,18 @@ const STEPS = {analyze: phrase("Analyzing…"), report: phrase("The report is be
  * @param {() => void} analyzed is called once there is an answer.
  */
 export async function showResult(begin, at, wanted, analyzed) {
-  const clear = (texts, step) => {
-    by("verdict").replaceChildren(...texts.map((text) => {
-      const paragraph = make("p");
-      typeset(paragraph, text);
-      return paragraph;
-    }));
-    for (const id of ["figures", "results-notes"]) by(id).replaceChildren();
+  const fill = (id, tag, texts) => by(id).replaceChildren(...texts.map((text) => {
+    const one = make(tag);
+    typeset(one, text);
+    return one;
+  }));
+  const clear = (texts, step, {doubts = [], warnings = []} = {}) => {
+    fill("doubts", "li", doubts);
+    fill("verdict", "p", texts.slice(0, ANSWER));
+    fill("verdict-more", "p", texts.slice(ANSWER));
+    fill("results-notes", "li", warnings);
+    by("figures").replaceChildren();
+    put(by("more"), {hidden: texts.length <= ANSWER && !warnings.length, open: false});
     put(by("report"), {hidden: true});
     say(step);
   };
@@ -37,11 +44,10 @@ export async function showResult(begin, at, wanted, analyzed) {
     if (found.step !== "analyze" && !isShown) {
       isShown = true;
       analyzed();
-      clear(found.verdict || [], found.step);
+      clear(found.verdict, found.step, found);
       by("figures").append(...found.figures.map((figure) => Object.assign(make("img"), {
         src: `${at}/${figure}?${Date.now()}`, alt: phrase("figure of the {analysis} analysis", {analysis: found.analysis}),
       })));
-      by("results-notes").append(...(found.warnings || []).map((text) => make("li", text)));
     }
     say(found.step);
     if (found.step) continue;

@@ -13,7 +13,7 @@ import numpy as np
 from analysis import stability
 from analysis.errors import AnalysisError
 from analysis.limits import Comparison, Sample, Statistics, combine, compare, nearest_edge, spins_of_window, summarize
-from analysis.numbers import digits, how_many
+from analysis.numbers import digits
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.limit.readings import LimitReadings
@@ -25,6 +25,7 @@ from levilab.simulator.keys import SceneError
 from levilab.simulator.published.printed import published
 from levilab.simulator.scene import Scene, scene_of
 from levilab.stability.thesis import is_thesis_device
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -70,6 +71,12 @@ ENDS: Mapping[str, str] = {
     RunEvent.TOP_LOST: "fell under the drive",
     RunEvent.LEVELS_OFF: "got no faster under the drive",
 }
+#: What became of one top and of several, at which spin, and what such spins are called.
+_LOST = {"lower": ("The top fell at", "The tops fell at"),
+         "upper": ("The drive lost the top at", "The drive lost the tops at")}  # fmt: skip
+_NO_FASTER = "The top went no faster than", "The tops went no faster than"
+_NAMES = {"lower": ("lower limit", "lower limits"), "upper": ("upper limit", "upper limits")}
+_SPINS = "spin", "spins"
 #: Waveforms of a drive in words.
 _WAVEFORMS = {"SIN": "sine", "SQU": "square", "TRI": "triangle"}
 #: Names of what theory says, of each limit.
@@ -158,7 +165,7 @@ class Conditions:
             "" if self.creep_hz_per_s is None else f"{self.creep_hz_per_s:g} Hz/s",
             "" if self.step_hz is None else f"a look each {self.step_hz:g} Hz",
         ]
-        return ", ".join([*filter(None, drive), self.top])
+        return Text("{parts}", parts=(*filter(None, drive), self.top))
 
 
 @dataclass(frozen=True)
@@ -201,7 +208,7 @@ class Limits:
     @property
     def text(self) -> str:
         """What the limits say, in a few sentences."""
-        return " ".join(_sentences(self))
+        return Sentences(*_sentences(self))
 
 
 class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOptions]):
@@ -215,7 +222,7 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
     @property
     def text(self) -> str:
         """What the data say, in a few sentences."""
-        return "  ".join(group.text for group in self.groups)
+        return Sentences(*(one for group in self.groups for one in _sentences(group)))
 
     @property
     def averaged(self) -> Sequence[Sequence[Source[LimitReadings]]]:
@@ -393,7 +400,7 @@ def device_of(source: Source[LimitReadings]) -> Device:
         return described_device(Scene(), "the thesis's top, 25.26 g")
     try:
         scene = scene_of(table)
-        return described_device(scene, f"the scene {scene.name}, {1000 * scene.top.mass_kg:g} g")
+        return described_device(scene, f"scene {scene.name}, {1000 * scene.top.mass_kg:g} g")
     except (SceneError, AnalysisError) as error:
         raise DataError(f"{source.path}/run.json: configuration.scene: {error}") from error
 
@@ -440,48 +447,66 @@ def warnings_of(statistics: Statistics) -> list[str]:
 
 def _sentences(limits: Limits) -> Iterable[str]:
     found, levels_off = limits.statistics, limits.conditions.levels_off
-    tops = "top" if found.n == 1 else "tops"
-    lost = f"The {tops} fell" if limits.which == "lower" else f"The drive lost the {tops}"
-    lost = f"The {tops} went no faster than" if levels_off else f"{lost} at"
-    spread = f", which scatter by {with_uncertainty(found.scatter)}" if found.scatter and found.scatter.value else ""
-    spread = spread or ", which do not scatter" * (found.scatter is not None)
-    average = " on average" * (found.n > 1)
-    count = how_many(found.n, "spin" if levels_off else f"{limits.which} limit")
-    yield f"{lost} {with_uncertainty(found.mean)}{average}: {count}{spread} ({limits.conditions_text})."
+    several = found.n > 1
+    spread: str = ", which do not scatter" * (found.scatter is not None)
+    if found.scatter and found.scatter.value:
+        spread = Text(", which scatter by {scatter:n}", scatter=with_uncertainty(found.scatter))
+    yield Text(
+        "{lost} {mean:n}{average}: {n} {name}{spread} ({conditions:n}).",
+        lost=(_NO_FASTER if levels_off else _LOST[limits.which])[several],
+        mean=with_uncertainty(found.mean),
+        average=" on average" if several else "",
+        n=found.n,
+        name=(_SPINS if levels_off else _NAMES[limits.which])[several],
+        spread=spread,
+        conditions=limits.conditions_text,
+    )
+    yield from () if levels_off else _beside_theory(limits)
     if found.between:
         beyond = with_uncertainty(found.between) if found.between.value else "no more than their tops do"
-        yield f"They are of {found.runs} runs, which differ by {beyond}."
+        yield Text("They are of {n} runs, which differ by {beyond:n}.", n=found.runs, beyond=beyond)
     if limits.ends and found.n > 1:
-        yield "The top " + ", ".join(f"{ENDS[kind]} {_times(n)}" for kind, n in limits.ends.items()) + "."
+        ends = tuple(_times(ENDS[kind], n) for kind, n in limits.ends.items())
+        yield Text("The top {ends}.", ends=ends)
     if levels_off:
         yield "The pull of the drive equals the drag there: a stronger drive gets higher, this is no limit of the top."
-        return
-    if limits.causes:
-        told = ", ".join(f"{cause} {_times(n)}" if found.n > 1 else cause for cause, n in sorted(limits.causes.items()))
-        yield f"{'Causes' if limits.conditions.triggered else 'The phase before each loss tells why'}: {told}."
-    yield from _beside_theory(limits)
+    elif limits.causes:
+        told = tuple(_times(cause, n) if found.n > 1 else cause for cause, n in sorted(limits.causes.items()))
+        how = "Causes" if limits.conditions.triggered else "The phase before each loss tells why"
+        yield Text("{how}: {causes}.", how=how, causes=told)
 
 
-def _times(n: int) -> str:
-    return {1: "once", 2: "twice"}.get(n, f"{n} times")
+def _times(what: str, n: int) -> str:
+    times = {1: "once", 2: "twice"}.get(n) or Text("{n} times", n=n)
+    return Text("{what} {times}", what=what, times=times)
 
 
 def _beside_theory(limits: Limits) -> Iterable[str]:
-    """Yield with which limit of theory the mean is compared, how far it lies from it, and why tops are lost sooner."""
+    """Yield how far the mean lies from a limit of theory, why tops are lost sooner, and whether chance explains it."""
     theory = {one.name: one for one in limits.comparisons}
     edge = theory.get(LOWER_EDGE) or theory.get(UPPER_EDGE)
     if edge is None:
         return
     off = edge.difference.value or 0.0
-    lower, mean = limits.which == "lower", "that" if limits.statistics.n == 1 else "the mean"
-    p = "" if edge.p is None else f"p = {digits(edge.p)}" if edge.p >= 1e-6 else "p < 10⁻⁶"
-    chance = p and (f", which chance explains ({p})" if edge.agrees else f", more than chance makes ({p})")
-    yield (
-        f"In theory an upright top at rest floats {'down' if lower else 'up'} to {edge.expected:.2f} Hz "
-        f"(the {edge.name}); {mean} lies {abs(off):.2f} Hz {'above' if off > 0 else 'below'} it{chance}."
-    )
+    lower = limits.which == "lower"
+    why, one = "", theory.get(RESONANCE)
     if (off > 0) == lower:
-        one = theory.get(RESONANCE)
-        leans = f", and leans ever more towards {one.expected:.2f} Hz, the {one.name}" if one else ""
-        real = f"is tilted and moves{leans}: it falls" if lower else "is tilted, moves and needs a drive: it is lost"
-        yield f"A real top {real} sooner."
+        why = ": a real top is tilted and moves, and is lost sooner"
+        if lower and one:
+            why = Text(": a real top is tilted, leans ever more towards {hz:.2f} Hz, the {name}, and falls sooner",
+                       hz=one.expected, name=one.name)  # fmt: skip
+    yield Text(
+        "In theory an upright top at rest floats {way} to {edge:.2f} Hz (the {name}); {mean} lies {off:.2f} Hz {side} "
+        "it{why}.",
+        way="down" if lower else "up",
+        edge=edge.expected,
+        name=edge.name,
+        mean="that" if limits.statistics.n == 1 else "the mean",
+        off=abs(off),
+        side="above" if off > 0 else "below",
+        why=why,
+    )
+    if edge.p is not None:
+        p = f"p = {digits(edge.p)}" if edge.p >= 1e-6 else "p < 10⁻⁶"
+        chance = "Chance explains the difference ({p:n})." if edge.agrees else "Chance does not explain it ({p:n})."
+        yield Text(chance, p=p)

@@ -12,6 +12,7 @@ from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Quantity, columns_of, entry, statistic
 from levilab.pipelines.sources import warning
 from levilab.present.numbers import plain, pulses_too_many, with_uncertainty
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -33,8 +34,9 @@ def intercept_of(fit: SweepFit) -> Estimate:
 
 def verdict(fit: SweepFit) -> str:
     """Return what a sweep says, in a few sentences."""
-    line = f"Slope {with_uncertainty(slope_of(fit))}, intercept {with_uncertainty(intercept_of(fit))}."
-    return " ".join((_about_lock(fit), line, *([_about_power(fit.power)] if fit.power else [])))
+    slope, intercept = with_uncertainty(slope_of(fit)), with_uncertainty(intercept_of(fit))
+    line = Text("Slope {slope:n}, intercept {intercept:n}.", slope=slope, intercept=intercept)
+    return Sentences(_about_lock(fit), line, _about_power(fit.power) if fit.power else "")
 
 
 def _about_lock(fit: SweepFit) -> str:
@@ -42,15 +44,19 @@ def _about_lock(fit: SweepFit) -> str:
     if p is None:
         return "Whether the top was locked to the drive cannot be tested without the u of the points."
     if p >= EXCLUDED_P:
-        return (
-            f"The stem goes round once for each turn of the drive: slope 1 and intercept 0 agree with the {fit.line.n} "
-            f"points (p = {plain(p, 2)})."
+        return Text(
+            "The stem goes round once for each turn of the drive: slope 1 and intercept 0 agree with the {n} points "
+            "(p = {p:n}).",
+            n=fit.line.n,
+            p=plain(p, 2),
         )
-    return (
-        "The stem does not go round once for each turn of the drive: slope 1 and intercept 0 are excluded "
-        f"(p = {plain(p, 1)}), and the precession that was counted lies "
-        f"{digits(abs(_offset(fit)))} Hz {'above' if _offset(fit) > 0 else 'below'} the drive at "
-        f"{fit.line.centre:.4g} Hz."
+    return Text(
+        "The stem does not go round once for each turn of the drive: slope 1 and intercept 0 are excluded (p = {p:n}), "
+        "and the precession that was counted lies {off:n} Hz {side} the drive at {drive:.4g} Hz.",
+        p=plain(p, 1),
+        off=digits(abs(_offset(fit))),
+        side="above" if _offset(fit) > 0 else "below",
+        drive=fit.line.centre,
     )
 
 
@@ -59,18 +65,27 @@ def _offset(fit: SweepFit) -> float:
 
 
 def _about_power(power: Power) -> str:
-    aim = f"a slope of {power.slope:g} from 1"
     if power.enough:
-        return (
-            f"These points distinguish {aim} with a probability of {at_most(power.now)}; the smallest difference "
-            f"that they show in nine cases of ten is {plain(power.smallest_difference, 2)}."
+        return Text(
+            "These points distinguish a slope of {slope:g} from 1 with a probability of {p:n}; the smallest difference "
+            "that they show in nine cases of ten is {smallest:n}.",
+            slope=power.slope,
+            p=at_most(power.now),
+            smallest=plain(power.smallest_difference, 2),
         )
-    points = "more than a million points" if power.points_needed is None else f"{power.points_needed} points"
-    return (
-        f"These points would distinguish {aim} in {100 * power.now:.0f} % of cases only. It takes {points} such as "
-        f"these ({power.points} now), a range of {plain(power.range_needed_hz, 2)} Hz ({plain(power.range_hz, 2)} Hz "
-        f"now), or a u of {plain(power.u_needed_hz, 2)} Hz a point ({plain(power.u_hz, 2)} Hz now), for nine cases of "
-        "ten."
+    points = "more than a million" if power.points_needed is None else str(power.points_needed)
+    return Text(
+        "These points would distinguish a slope of {slope:g} from 1 in {percent:.0f} % of cases only. It takes "
+        "{points} points such as these ({now} now), a range of {range:n} Hz ({range_now:n} Hz now), or a u of {u:n} Hz "
+        "a point ({u_now:n} Hz now), for nine cases of ten.",
+        slope=power.slope,
+        percent=100 * power.now,
+        points=points,
+        now=power.points,
+        range=plain(power.range_needed_hz, 2),
+        range_now=plain(power.range_hz, 2),
+        u=plain(power.u_needed_hz, 2),
+        u_now=plain(power.u_hz, 2),
     )
 
 

@@ -18,6 +18,7 @@ from levilab.pipelines.row import Column, Quantity, columns_of, entry, estimate,
 from levilab.pipelines.sources import warning
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.units import name_with_unit
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -193,58 +194,73 @@ def _verdict(
 
     def names(laws: Sequence[str]) -> str:
         exponent = constants.get("power", {}).get("exponent")
-        return enumeration([f"power ({_exponent(exponent)})" if name == "power" else name for name in laws])
+        power = Text("power ({exponent:n})", exponent=_exponent(exponent))
+        return enumeration([power if name == "power" else name for name in laws])
 
-    simple = _simple(said)
-    grows = f"the drag of the air grows as {drag}" if (drag := _DRAGS.get(said.best)) else ""
-    how = ", with ".join(filter(None, (grows, _constants(constants[said.best]))))
-    others, advice = said.indistinguishable[1:], ""
+    simple, law = _simple(said), said.best
+    how, others, advice = _how(law, constants[law]), said.indistinguishable[1:], ""
     if not said.describes:
         first = _no_law(found, runs, digits(best.rms_residual))
     elif said.decided:
-        first = f"The {said.best} law fits best" + (f": {how}" if how else "")
-        first += f". {names(others)} cannot be distinguished from it" if others else ""
+        start = "The {law} law fits best: {how}." if how else "The {law} law fits best."
+        first = Text(start, law=law, how=how)
     elif len(simple) == 1:
-        first = (
-            f"The laws {names(said.indistinguishable)} cannot be distinguished: {said.best} has the fewest constants"
-        )
-        advice = "More runs, or a longer fall of the spin, can decide"
+        alike = names(said.indistinguishable)
+        first = Text("The laws {alike} cannot be distinguished: {law} has the fewest constants.", alike=alike, law=law)
+        advice = "More runs, or a longer fall of the spin, can decide."
     else:
         fall = max(float(1 - run.frequency[-1] / run.frequency[0]) for run in runs)
-        first = (
-            f"These {best.n} readings cannot distinguish {enumeration(simple) if len(simple) > 1 else 'the laws'}: "
-            f"over a fall of the spin by {digits(100 * fall)} % they differ too little for readings of this number "
-            "and precision"
+        first = Text(
+            "These {n} readings cannot distinguish {laws}: over a fall of the spin by {percent:n} % they differ too "
+            "little for readings of this number and precision.",
+            n=best.n,
+            laws=enumeration(simple) if len(simple) > 1 else "the laws",
+            percent=digits(100 * fall),
         )
-        advice = "Let the top fall further, or read it more often"
-    misses = [f"{digits(stats[name].rms_residual)} Hz" for name in said.excluded]
-    sentences = [
+        advice = "Let the top fall further, or read it more often."
+    misses = [Text("{rms:n} Hz", rms=digits(stats[name].rms_residual)) for name in said.excluded]
+    excluded = Text(
+        "The readings exclude {laws}, off by {rms} (rms); {law} is off by {least:n} Hz.",
+        laws=enumeration(said.excluded or [""]),
+        rms=enumeration(misses or [""]),
+        law=law,
+        least=digits(best.rms_residual),
+    )
+    weak = Text("They speak against {laws}, not strongly enough to exclude.", laws=enumeration(said.weak or [""]))
+    return Sentences(
         first,
-        f"If the {said.best} law holds, {how}" if how and said.describes and not said.decided else "",
+        Text("If the {law} law holds, {how}.", law=law, how=how) if how and said.describes and not said.decided else "",
+        excluded if misses else "",
+        Text("{laws} cannot be distinguished from it.", laws=names(others)) if others and said.decided else "",
         advice,
-        f"The readings exclude {enumeration(said.excluded)}, which {'misses' if len(misses) == 1 else 'miss'} them by "
-        f"{enumeration(misses)} (rms); {said.best} misses them by {digits(best.rms_residual)} Hz"
-        if misses
-        else "",
-        f"They speak against {enumeration(said.weak)}, without excluding {'them' if len(said.weak) > 1 else 'it'}"
-        if said.weak
-        else "",
+        weak if said.weak else "",
         _needless(said, names(said.needless))
         if said.needless and (said.decided or len(simple) == 1) and said.describes
         else "",
         _wobble(tilt),
-    ]
-    return " ".join(f"{text}." for text in sentences if text)
+    )
+
+
+def _how(law: str, constants: Mapping[str, Estimate]) -> str:
+    """Return how the drag grows by a law, and its constants; empty where neither is known."""
+    drag, known = _DRAGS.get(law), _constants(constants)
+    if not drag:
+        return known
+    grows = Text("the drag of the air grows as {drag}", drag=drag)
+    return Text("{grows}, with {constants}", grows=grows, constants=known) if known else grows
 
 
 def _constants(of: Mapping[str, Estimate]) -> str:
     """Return the constants of a law with their u, of a single one also its relative u; empty where none has a u."""
     known = {name: one for name, one in of.items() if one.value is not None and one.u}
-    texts = [f"{SYMBOLS[name]} = {with_uncertainty(one)}" for name, one in known.items()]
+    texts = [
+        Text("{symbol} = {value:n}", symbol=SYMBOLS[name], value=with_uncertainty(one)) for name, one in known.items()
+    ]
     if len(known) != 1 or len(of) != 1:
         return enumeration(texts) if texts else ""
     (one,) = known.values()
-    return f"{texts[0]}, known to {digits(100 * (one.u or 0.0) / abs(one.value or 1.0), 2)} %"
+    percent = digits(100 * (one.u or 0.0) / abs(one.value or 1.0), 2)
+    return Text("{constant}, known to {percent:n} %", constant=texts[0], percent=percent)
 
 
 def _wobble(tilt: Estimate | None) -> str:
@@ -252,28 +268,39 @@ def _wobble(tilt: Estimate | None) -> str:
     if tilt is None or tilt.value is None or not tilt.u:
         return ""
     if is_seen(tilt):
-        return f"The counter sees the wobble of the top: its moment is tilted against its axis by {_value(tilt)} rad"
-    most = digits(max(tilt.value, 0.0) + 2 * tilt.u, 2)
-    return f"The readings show no wobble of the top: its moment is tilted against its axis by less than {most} rad"
+        seen = "The counter sees the wobble of the top: its moment is tilted against its axis by {tilt:n} rad."
+        return Text(seen, tilt=_value(tilt))
+    return Text(
+        "The readings show no wobble of the top: its moment is tilted against its axis by less than {most:n} rad.",
+        most=digits(max(tilt.value, 0.0) + 2 * tilt.u, 2),
+    )
 
 
 def _needless(said: Verdict, names: str) -> str:
-    fit, need = ("fit", "need") if len(said.needless) > 1 else ("fits", "needs")
-    return f"{names} {fit} as well as {said.best}, but {need} more constants"
+    if len(said.needless) > 1:
+        return Text("{laws} fit as well as {law}, but need more constants.", laws=names, law=said.best)
+    return Text("{laws} fits as well as {law}, but needs more constants.", laws=names, law=said.best)
 
 
 def _no_law(found: SpinDown | Combined, runs: Sequence[SpinDown], rms: str) -> str:
     change = found.verdict.change
     if change is None:
         numbers = [str(k + 1) for k in found.verdict.changed]
-        what = f"none describes the runs {enumeration(numbers)} of {len(runs)}"
+        what = Text("none describes the runs {numbers} of {n}", numbers=enumeration(numbers), n=len(runs))
     else:
-        time, way = runs[0].time, "rise" if change.size > 0 else "fall"
-        where = f"between {time[change.first]:.4g} s and {time[change.last]:.4g} s"
-        what = f"they {way} by {digits(abs(change.size))} Hz beyond any drag {where}, or bend there"
-    return (
-        f"No law describes these readings: {what}; the best one, {found.best}, leaves {rms} Hz rms. Its constants and "
-        "their uncertainties are those of a curve through the readings, not of a drag"
+        what = Text(
+            "they {way} by {hz:n} Hz beyond any drag between {first:.4g} s and {last:.4g} s, or bend there",
+            way="rise" if change.size > 0 else "fall",
+            hz=digits(abs(change.size)),
+            first=float(runs[0].time[change.first]),
+            last=float(runs[0].time[change.last]),
+        )
+    return Text(
+        "No law describes these readings: {what}; the best one, {law}, leaves {rms:n} Hz rms. Its constants and their "
+        "uncertainties are those of a curve through the readings, not of a drag.",
+        what=what,
+        law=found.best,
+        rms=rms,
     )
 
 

@@ -14,6 +14,7 @@ import pytest
 
 from levilab.live.opened import LONGEST_NAME, MOST_FILES, Opened, OpenedFile, plain_name
 from levilab.pipelines.correction import read_correction
+from levilab.texts.text import Text, as_tables
 from support.browser import PHONE
 from support.live_pages import PATIENCE_S, address, request, serving, until, wait_for
 
@@ -97,11 +98,12 @@ def test_who_has_no_file_tries_one(hall: Hall, watched: Callable[..., Page], nam
     assert Path(page.evaluate("levilab.look.path")).read_bytes() == (SAMPLES / same).read_bytes()
 
 
-#: What an answer shows: sentences, figures, notes, whether there is a link, and whether they stand in this order.
+#: Of an answer, in order: doubts, sentences, figures, the other sentences, notes, whether there is a link; is it so?
 ANSWER = """(() => {
-  const parts = ['verdict', 'figures', 'results-notes', 'report'].map((id) => document.getElementById(id));
+  const ids = ['doubts', 'verdict', 'figures', 'verdict-more', 'results-notes', 'report'];
+  const parts = ids.map((id) => document.getElementById(id));
   const inOrder = parts.slice(1).every((part, k) => parts[k].compareDocumentPosition(part) & 4);
-  return [...parts.slice(0, 3).map((part) => part.children.length), !parts[3].hidden, inOrder];
+  return [...parts.slice(0, 5).map((part) => part.children.length), !parts[5].hidden, inOrder];
 })()"""
 
 
@@ -114,7 +116,9 @@ def test_an_answer_is_shown_in_one_order_and_nothing_before_it_is_whole(
     def carry_out(words: list[str]) -> tuple[int, str]:
         """Write first, and end later: what is there is not all yet."""
         if words[0] == "analyze":
-            answer = {"text": "The disc law fits.", "warnings": ["one run"]}
+            value = Text("C = {value:n}.", value="2.34(1)")
+            answer = {"sentences": as_tables(["The disc law fits.", value, "Others do not."])}
+            answer |= {"doubts": ["LOOSE WASHERS"], "warnings": ["LOOSE WASHERS", "one run"]}
             file.with_name("steps.csv.result.json").write_text(json.dumps(answer))
             shutil.copy(FIGURE, file.with_name("steps.csv.spindown.png"))
         else:
@@ -129,14 +133,16 @@ def test_an_answer_is_shown_in_one_order_and_nothing_before_it_is_whole(
     until(page, "document.getElementById('writing').textContent === 'Analyzing…'")
     with page.expect_response("**/analysis?*"), page.expect_response("**/analysis?*"):
         pass
-    assert page.evaluate(ANSWER) == [0, 0, 0, False, True]
+    assert page.evaluate(ANSWER) == [0, 0, 0, 0, 0, False, True]
     go_on["analyze"].set()
     until(page, "document.getElementById('writing').textContent.startsWith('The report is being')")
-    assert page.evaluate(ANSWER) == [1, 1, 1, False, True]
+    assert page.evaluate(ANSWER) == [1, 2, 1, 1, 1, False, True]
+    assert page.inner_text("#verdict") == "The disc law fits.\n\nC = 2.34(1)."
+    assert not page.locator("#verdict-more").is_visible()  # in a fold
     assert page.locator("#progress").is_visible()
     go_on["report"].set()
     until(page, "!document.getElementById('report').hidden")
-    assert page.evaluate(ANSWER) == [1, 1, 1, True, True]
+    assert page.evaluate(ANSWER) == [1, 2, 1, 1, 1, True, True]
     assert not page.locator("#progress").is_visible()
 
 

@@ -50,7 +50,7 @@ def test_theory_beside_them_is_that_of_the_thesis_top(sample_data, tmp_path):
     (highest,) = (one for one in upper.comparisons if one.name == THESIS_HIGHEST)
     assert highest.difference.u > 0.28  # 61 is printed without decimals, 0.5/√3
     assert "21.65 Hz (the lower edge of the linear window); the mean lies 0.21 Hz above it" in lower.text
-    assert "towards 22.15 Hz, the resonance of the wobble: it falls sooner." in lower.text
+    assert "towards 22.15 Hz, the resonance of the wobble, and falls sooner." in lower.text
 
 
 def test_both_kinds_together_have_values_of_both(sample_data, tmp_path):
@@ -321,7 +321,7 @@ def test_a_scene_that_was_measured_is_the_one_compared_with(sample_data, tmp_pat
     (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
     (run,) = LIMIT.analyze([folder], LimitOptions()).runs
     assert run.device
-    assert run.device.name == "the scene mine, 25 g"
+    assert run.device.name == "scene mine, 25 g"
     record["configuration"]["scene"]["top"]["mass_kg"] = 0.03  # floats nowhere
     (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
     with pytest.raises(DataError, match=r"configuration\.scene: no spin keeps this top up"):

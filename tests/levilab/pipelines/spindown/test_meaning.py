@@ -34,7 +34,7 @@ def test_text_figure_and_tables_have_one_verdict(tmp_path):
     assert len(LAWS[first.name].constants) > 1
     assert analysis.combined.best == "disc"
     assert "cannot be distinguished: disc has the fewest constants" in analysis.text
-    assert "disc misses them by" in analysis.text
+    assert "; disc is off by" in analysis.text
     figure = spindown_figure(analysis)
     written = [text.get_text() for text in figure.findobj(Text)]
     assert any("cannot be distinguished; disc has the fewest constants" in " ".join(one.split()) for one in written)
