@@ -203,6 +203,7 @@ def analyze(
     keep_outliers: bool = False,
     tilt: Tilt = "auto",
     between: tuple[float, float] | str | None = None,
+    laws: Sequence[str] | str | None = None,
     method: Method = "auto",
     orthogonal: bool = False,
     device: str | PathLike[str] | None = None,
@@ -251,6 +252,7 @@ def analyze(
         tilt: whether counts hold the tilt of the top's moment: "auto" as "fitted", but for a mock run whose top only
             spins; "none" for a top that only spins (spindown).
         between: fit only the readings between two spins [Hz], as (30, 24) (spindown).
+        laws: fit only these drag laws, as ("disc", "stokes") (spindown).
         method: how pulses are found: edges is the fastest, likelihood for weak ones (spin).
         orthogonal: let the uncertainty of the drive's frequency count, too (precession).
         device: file that describes base and top, as sample_data/device.toml (spindown, field, sway).

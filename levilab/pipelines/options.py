@@ -102,6 +102,16 @@ def _read_between(given: str | Sequence[float]) -> tuple[float, float]:
     return low, high
 
 
+def _read_laws(given: str | Sequence[str]) -> tuple[str, ...]:
+    """Return names of drag laws, in the order of their table.  Raises UsageError."""
+    from analysis.spindown.drag import LAWS
+
+    names = {name.strip() for name in (given.split(",") if isinstance(given, str) else given)}
+    if not names or not names <= LAWS.keys():
+        raise UsageError("laws", f"some of {', '.join(LAWS)} are expected, as disc,stokes", value=given)
+    return tuple(name for name in LAWS if name in names)
+
+
 def _read_device(path: str | PathLike[str]) -> Device:
     from levilab.formats.device import read_device
 
@@ -178,6 +188,9 @@ class SpinDownOptions(RecordOptions):
     ))  # fmt: skip
     between: tuple[float, float] | None = field(default=None, metadata=_about(
         "Fit only the readings between two spins, as 30:24.", metavar="HZ:HZ", unit="Hz", read=_read_between,
+    ))  # fmt: skip
+    laws: tuple[str, ...] | None = field(default=None, metadata=_about(
+        "Fit only these drag laws, as disc,stokes.", metavar="LAW,…", default_text="all", read=_read_laws,
     ))  # fmt: skip
     device: Device | None = field(default=None, metadata=_DEVICE)
     clock_u: float | None = field(default=None, metadata=_CLOCK_U)

@@ -144,13 +144,13 @@ def _option(name: str, value: Any) -> list[str]:
 
     >>> _option("keep_outliers", True), _option("columns", {"t": "1", "f": "a b"}), _option("rate", None)
     (['--keep-outliers'], ['--columns', "'t=1,f=a b'"], [])
-    >>> _option("between", (24.0, 30.0))
-    ['--between', '24:30']
+    >>> _option("between", (24.0, 30.0)), _option("laws", ("stokes", "disc"))
+    (['--between', '24:30'], ['--laws', 'stokes,disc'])
     """
     if value is None or value is False:
         return []
     if isinstance(value, tuple):
-        value = ":".join(f"{one:g}" for one in value)
+        value = ",".join(value) if isinstance(value[0], str) else ":".join(f"{one:g}" for one in value)
     text = _columns(value) if name == "columns" else str(value)
     return [_flag(name)] if value is True else [_flag(name), shlex.quote(text)] if text else []
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from analysis.errors import AnalysisError
 from analysis.spindown.combine import Combined, combine
+from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown, fit_spin_down
 from analysis.spindown.tilt import THESIS_TOP, Top
 from levilab.errors import DataError
@@ -17,6 +18,7 @@ from levilab.pipelines.field.device import THESIS, inertias
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.readings import SpinReadings
 from levilab.pipelines.spindown.words import TILT_ALLOWED, is_seen, remark, verdict_of_all
+from levilab.present.numbers import enumeration
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -39,10 +41,12 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
         return verdict_of_all(self.combined, self.runs)
 
     def about_all(self) -> Iterable[str]:
-        """Return remarks on the means, and on the laws that are not excluded."""
-        remarks = (*map(remark, self.combined.remarks), *self._left_out(), *self._of_laws(self.combined.fits))
-        tilted = any(run.has_tilt for run in self.runs) and not is_seen(self.combined.tilt)
-        return (*remarks, TILT_ALLOWED) if tilted else remarks
+        """Yield remarks on the means, on the laws that are not excluded, and on what was asked for."""
+        yield from (*map(remark, self.combined.remarks), *self._left_out(), *self._of_laws(self.combined.fits))
+        if self.options.laws:
+            yield f"as asked, the other drag laws than {enumeration(self.options.laws)} are left out"
+        if any(run.has_tilt for run in self.runs) and not is_seen(self.combined.tilt):
+            yield TILT_ALLOWED
 
     def _left_out(self) -> Iterable[str]:
         """Yield which runs the means leave out, since their unit is in doubt."""
@@ -67,6 +71,7 @@ def fit_source(source: Source[SpinReadings], options: SpinDownOptions) -> SpinDo
             readings.time,
             readings.frequency,
             readings.u if options.reading_u is None else options.reading_u,
+            laws=options.laws or tuple(LAWS),
             keep_outliers=options.keep_outliers,
             tilt=options.tilt == "fitted" or (options.tilt == "auto" and not readings.upright),
             driven=readings.driven,

@@ -105,8 +105,8 @@ def _of_law(law: DragLaw) -> Iterator[Column]:
     """Yield the columns of a law: its constants with their uncertainties, and how well it fits."""
 
     def model(part: Mapping[str, Any]) -> Mapping[str, Any]:
-        found: Mapping[str, Any] = next(model for model in part["models"] if model["name"] == law.name)
-        return found
+        found: Iterator[Mapping[str, Any]] = (model for model in part["models"] if model["name"] == law.name)
+        return next(found, {"parameters": {}, "statistics": {}})  # a law that was not to be fitted
 
     for name, unit in zip(law.parameters, law.parameter_units, strict=True):
         yield from estimate(
@@ -116,7 +116,7 @@ def _of_law(law: DragLaw) -> Iterator[Column]:
     for name, heading, unit, meaning in _STATISTICS:
         yield Column(
             name_with_unit(f"{law.name}_{heading}", unit), "number", f"of the law {law.name}: {meaning}",
-            lambda part, name=name: model(part)["statistics"][name],  # type: ignore[misc]
+            lambda part, name=name: model(part)["statistics"].get(name),  # type: ignore[misc]
         )  # fmt: skip
 
 

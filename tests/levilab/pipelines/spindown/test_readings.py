@@ -106,6 +106,19 @@ def test_readings_between_two_spins_are_fitted_and_the_result_says_so(tmp_path):
             read_options({"between": wrong})
 
 
+def test_the_laws_that_are_asked_for_are_fitted_and_the_others_have_no_numbers(tmp_path):
+    path = spin_down_csv(tmp_path / "a.csv")
+    found = SPINDOWN.analyze([path], SpinDownOptions(tilt="none", **read_options({"laws": "disc,stokes"})))
+    assert [fit.name for fit in found.combined.fits] == ["stokes", "disc"]
+    assert "as asked, the other drag laws than stokes and disc are left out" in found.all_warnings
+    part = SPINDOWN.document(found, tmp_path)["runs"][0]
+    values = {column.name: column.read(part) for column in SPINDOWN.row}
+    assert values["disc_c32_per_sqrt_rad_s"] == pytest.approx(2.34e-4, rel=0.01)  # 0.15 % by 0.03 Hz
+    assert values["newton_c2_per_rad"] is None
+    with pytest.raises(UsageError):
+        read_options({"laws": "disk"})
+
+
 def test_a_result_says_that_a_tilt_was_allowed_for_and_what_leaves_it_out(tmp_path):
     path = spin_down_csv(tmp_path / "a.csv")
     said = {
