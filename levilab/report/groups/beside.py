@@ -286,7 +286,8 @@ def finding(of: Class) -> str:
 def verdict(of: Class) -> str:
     """Return what the class found, quantity by quantity, and how well it met the truth."""
     if len(of.groups) == 1:
-        return " ".join([f"{of.groups[0].source.name} alone measured this.", *([_truth(of)] if of.knows_truth else [])])
+        (group,), (mark,) = of.groups, marks(of)
+        return f"{group.source.name} alone measured this: {mark.word}."
     texts = [f"{_mean(one)} is the mean of {_count(of, one)}{_spread(one)}." for one in of.quantities]
     return "  ".join([_count_marks(of), *_scenes(of), *texts, *([_truth(of)] if of.knows_truth else [])])
 

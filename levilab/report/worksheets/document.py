@@ -139,14 +139,14 @@ def worksheet(sheet: Sheet, language: Language, seeds: Mapping[str, int]) -> Doc
     listed = table("", (words["group"], words["seed"]), [(name, str(k)) for name, k in seeds.items()])
     spoken = "" if language.code == ENGLISH else f" --language {language.code}"
     live = (Code(f"levilab live --mock --seed {seed}{spoken} --out class"),) * (sheet.clicks == "with_clicks")
+    clicks = Paragraph(words[sheet.clicks], f"{words['clicks']}:")
     return Document(
         title=texts.title,
         lead=words["worksheet"],
         byline=f"{words['name']} {_BLANK}  {words['date']} {_BLANK[:7]}",
         blocks=(
-            Section(words["aim"], (Paragraph(texts.aim),)),
-            Section(words["commands"], (Code("\n".join(sheet.commands(group, seed))),)),
-            Section(words["clicks"], (*live, Paragraph(words[sheet.clicks]))),
+            Paragraph(texts.aim),
+            Section(words["commands"], (Code("\n".join(sheet.commands(group, seed))), clicks, *live)),
             Section(words["seeds"], (Paragraph(told), Listing("seeds", listed, rows_in_a_piece=5))),
             Section(words["tasks"], tuple(Question(f"{k}.", task) for k, task in enumerate(texts.tasks, start=1))),
         ),

@@ -141,7 +141,7 @@ def test_page_and_pdf_begin_with_the_result(of_three, tmp_path):
 def test_every_analysis_can_be_compared(sample, tmp_path):
     page = write_class([SAMPLE_DATA / sample], tmp_path / "class.html").read_text(encoding="utf-8")
     assert ">Result<" in page
-    assert (">Figure<" in page) is (sample == "hold") or "alone measured this." in page
+    assert (">Figure<" in page) is (sample == "hold") or "alone measured this:" in page
 
 
 def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
