@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import re
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
 
 
 class LevilabError(Exception):
@@ -24,6 +28,19 @@ def unquote(text: str) -> str:
     'f.csv: say columns = "t=1,f=2"; `levilab analyze` reads it then'
     """
     return _QUANTITY.sub(r"\1", text)
+
+
+def list_known(name: str, known: Iterable[str]) -> str:
+    """Return the end of a message about an unknown name: the one that was probably meant, and all.
+
+    >>> list_known("spindon", ["spin", "spindown"]), list_known("x", ["spin", "spindown"])
+    ('did you mean spindown? Known are spin, spindown', 'known are spin, spindown')
+    """
+    from difflib import get_close_matches  # not for every help
+
+    names = [*known]
+    near = get_close_matches(name, names, n=1)
+    return f"{f'did you mean {near[0]}? Known' if near else 'known'} are {', '.join(names)}"
 
 
 class RequestError(LevilabError):

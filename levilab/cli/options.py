@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from levilab.errors import UsageError
+from levilab.errors import UsageError, list_known
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
@@ -94,13 +94,9 @@ def among(known: Sequence[str], what: str) -> Callable[[Any], Any]:
     """
 
     def check(given: Any) -> Any:
-        from difflib import get_close_matches  # not for every help
-
         for name in [one.strip() for one in given.split(",")] if isinstance(given, str) else given or ():
             if name not in known:
-                near = get_close_matches(name, known, n=1)
-                advice = f"did you mean {near[0]}? Known are" if near else "known are"
-                raise UsageError(what, f"{advice} {', '.join(known)}", value=name or "''")
+                raise UsageError(what, list_known(name, known), value=name or "''")
         return given
 
     return check

@@ -106,7 +106,7 @@ def read_mass(text: str) -> float:
         grams = read_number(text, "g")
     except ValueError:
         raise ValueError(f"{expected} is expected{hint_about(text) if ',' in text else ''}") from None
-    return round(_in_range(grams * 1e-3, _LIGHTEST, _HEAVIEST, expected), 9)
+    return round(_in_range(grams * 1e-3, _LIGHTEST, _HEAVIEST, expected, "kg"), 9)
 
 
 def read_temperature(text: str) -> float:
@@ -120,7 +120,7 @@ def read_temperature(text: str) -> float:
     scale = _TEMPERATURES.get(found[2] or "°C") if found else None
     if found is None or scale is None:
         raise ValueError(f"{expected} is expected{hint_about(text) if ',' in text else ''}")
-    return round(_in_range(float(found[1]) * scale[0] + scale[1], _COLDEST, _WARMEST, expected), 2)
+    return round(_in_range(float(found[1]) * scale[0] + scale[1], _COLDEST, _WARMEST, expected, "°C"), 2)
 
 
 def read_masses(text: str) -> tuple[float, ...]:
@@ -149,7 +149,7 @@ def read_masses(text: str) -> tuple[float, ...]:
     )
 
 
-def _in_range(value: float, low: float, high: float, expected: str) -> float:
+def _in_range(value: float, low: float, high: float, expected: str, unit: str) -> float:
     if not low <= value <= high:
-        raise ValueError(f"{expected} is expected")
+        raise ValueError(f"{expected} is expected, from {low:g} to {high:g} {unit}")
     return value

@@ -18,6 +18,7 @@ from instruments.virtual.core.device import VirtualInstrument
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
 from levilab.bench.person import FloatTop, PlaceProbe, ShieldProbe
 from levilab.bench.wiring import Wiring
+from levilab.errors import list_known
 from levilab.world.pose import FLOATS_M
 from levilab.world.spin_world import SpinScene, SpinWorld
 
@@ -38,8 +39,8 @@ def virtual_settings(kind: str, name: str) -> InstrumentSettings:
         raise ConfigError(f"there is no virtual {kind!r}: known are {', '.join(CATALOGUE)}")
     model = next((model for model in CATALOGUE[kind] if model.name.upper() == name.upper()), None)
     if model is None:
-        known = ", ".join(model.name for model in CATALOGUE[kind])
-        raise ConfigError(f"there is no virtual {kind} {name!r}: known are {known}")
+        known = list_known(name.upper(), (model.name for model in CATALOGUE[kind]))
+        raise ConfigError(f"there is no virtual {kind} {name!r}: {known}")
     address = f"TCPIP0::{kind}.levilab::inst0::INSTR"
     if model.scheme:
         address = f"{model.scheme}://{kind}.levilab"
