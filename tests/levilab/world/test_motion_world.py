@@ -25,10 +25,9 @@ from levilab.simulator.scene import presets
 from levilab.simulator.start import start_of
 from levilab.world.base import Base
 from levilab.world.bursts import TriggerWire, mean_pull
-from levilab.world.flight import RATE, SAMPLED, Flight, _cubic
+from levilab.world.flight import RATE, Flight, _cubic
 from levilab.world.light import Tape
 from levilab.world.motion_world import MotionWorld
-from levilab.world.spin_world import KEPT_S
 
 TURN = 2 * math.pi
 TILTED = preset("tilted")
@@ -383,27 +382,28 @@ def test_the_probe_sees_the_field_of_the_scenes_base():
     "look", [lambda top: top.light(top.clock.now(), 1e-3, 10), lambda top: top.catch_up()], ids=["light", "keep up"]
 )
 def test_a_bench_that_runs_for_hours_drops_old_history(look, monkeypatch):
-    monkeypatch.setattr("levilab.world.timeline._AT_ONCE", 100)
+    monkeypatch.setattr("levilab.world.timeline._AT_ONCE", 10)
+    monkeypatch.setattr("levilab.world.motion_world.KEPT_S", 1500.0)
     top = world(FALLING, put_back_after_s=60.0)
     for _ in range(7):
-        top.clock.sleep(3600.0)
+        top.clock.sleep(360.0)
         look(top)
-    kept = len(top._flight._pieces)
-    # a life and a fall each minute, of which there were 840, and a hundred that are not let go yet
-    assert kept < 2 * KEPT_S / 60 + 200
+    # a life and a fall each minute, of which there were 84, and ten that are not let go yet
+    assert len(top._flight._pieces) < 2 * 1500 / 60 + 20
 
 
-def test_a_bench_that_runs_for_hours_keeps_the_samples_of_the_last_minutes_alone():
+def test_a_bench_that_runs_for_hours_keeps_the_samples_of_the_last_minutes_alone(monkeypatch):
+    monkeypatch.setattr("levilab.world.flight.SAMPLED", 200)
     top = world(TILTED)
     top.clock.sleep(20.0)
     before = top.light(5.0, 1e-4, 10_000), top.laser(5.0, 1e-4, 10_000)
     tables = sum(type(one) is Top for one in gc.get_objects())
-    for k in range(12):
+    for k in range(4):
         top.drive(top.clock.now(), Output("SIN", 30.0 + 0.01 * k, amplitude=1e-6, offset=0.0))
         top.clock.sleep(100.0)
         top.catch_up()
-    assert len(top._flight._pieces) > 1200
-    assert len(top._flight._samples) == SAMPLED
+    assert len(top._flight._pieces) > 400
+    assert len(top._flight._samples) == 200
     assert sum(type(one) is Top for one in gc.get_objects()) <= tables + 1  # however often the drive was changed
     again = top.light(5.0, 1e-4, 10_000), top.laser(5.0, 1e-4, 10_000)
     assert np.array_equal(before, again)  # simulated once more, to the bit
