@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
 
 
+#: Distance in u beyond which a value is far off: one in four hundred is by chance.
+FAR = 3.0
 #: Quantities that are compared where an analysis names none and has no model.
 _MOST_QUANTITIES = 3
 
@@ -58,7 +60,8 @@ class Compared:
         unit: of results.
         estimates: of each group; None where it has no value with u.
         truths: of each group; None where it is not known.
-        together: of those with a value; None where there are none.
+        together: of those that are used; None where there are none.
+        used: whether a group has a value that is neither doubtful nor far from its truth, or no group has.
         widths: by which u of each group grows in comparisons, as it is known from few repetitions alone.
     """
 
@@ -68,6 +71,7 @@ class Compared:
     estimates: tuple[Estimate | None, ...]
     truths: tuple[float | None, ...]
     together: Comparison | None
+    used: tuple[bool, ...]
     widths: tuple[float, ...]
 
     @property
@@ -88,7 +92,7 @@ class Compared:
     @property
     def truth(self) -> tuple[float, float] | None:
         """The mean of the truths, and the distance of the class's mean from it in u; None where one is not known."""
-        known = [truth for one, truth in zip(self.estimates, self.truths, strict=True) if one]
+        known = [truth for use, truth in zip(self.used, self.truths, strict=True) if use]
         if self.together is None or None in known:
             return None
         mean = sum(known) / len(known)  # type: ignore[arg-type]
@@ -98,7 +102,7 @@ class Compared:
     def from_class(self) -> tuple[float | None, ...]:
         """The distance of each group from the mean of the others, in u."""
         others = iter(self.together.distances if self.together else ())
-        return tuple(None if one is None else next(others) for one in self.estimates)
+        return tuple(next(others) if use else None for use in self.used)
 
     @property
     def from_truth(self) -> tuple[float | None, ...]:
@@ -152,7 +156,8 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
         for source, part, texts in zip(found.sources, parts, said, strict=True)
     )
     names = analysis.compared or (_constants(document, model) if parts[0]["models"] else []) or _common(parts)
-    quantities = (_quantity(name, analysis, model, parts, truths) for name in (*names, *more))
+    doubts = [bool(group.doubts) for group in groups]
+    quantities = (_quantity(name, analysis, model, parts, truths, doubts=doubts) for name in (*names, *more))
     others = {
         group.source.name: truth.model
         for group, truth in zip(groups, truths, strict=True)
@@ -192,23 +197,35 @@ def _has_u(value: Mapping[str, Any]) -> bool:
 
 
 def _quantity(
-    name: str, analysis: Analysis[Any], model: str, parts: Sequence[Mapping[str, Any]], truths: Sequence[Truth]
+    name: str,
+    analysis: Analysis[Any],
+    model: str,
+    parts: Sequence[Mapping[str, Any]],
+    truths: Sequence[Truth],
+    *,
+    doubts: Sequence[bool],
 ) -> Compared:
     found = [_model(part, model).get("parameters", {}).get(name) or part["values"].get(name) for part in parts]
     good = [one if one and _has_u(one) else None for one in found]
-    estimates = tuple(Estimate(one["value"], one["u"], one["unit"]) if one else None for one in good)
     widths = tuple(_width((part.get("result", {}).get("statistics") or {}).get("freedom")) for part in parts)
-    known = [one for one in good if one]
-    u = [one["u"] * width for one, width in zip(good, widths, strict=True) if one]
-    return Compared(
+    of = Compared(
         name,
         analysis.symbols.get(name, name.replace("_", " ")),
-        known[0]["unit"] if known else "1",
-        estimates,
+        next((one["unit"] for one in good if one), "1"),
+        tuple(Estimate(one["value"], one["u"], one["unit"]) if one else None for one in good),
         tuple(truth.values.get(name) if truth.model in {"", model} else None for truth in truths),
-        compare([one["value"] for one in known], u) if known else None,
+        None,
+        tuple(one is not None for one in good),
         widths,
     )
+    far = [distance is not None and abs(distance) > FAR for distance in of.from_truth]
+    used = tuple(bool(one) and not (doubt or off) for one, doubt, off in zip(good, doubts, far, strict=True))
+    used = used if any(used) else of.used
+    known = [
+        (one["value"], one["u"] * width) for one, width, use in zip(good, widths, used, strict=True) if one and use
+    ]
+    together = compare([value for value, _ in known], [u for _, u in known]) if known else None
+    return replace(of, used=used, together=together)
 
 
 def _width(freedom: float | None) -> float:
@@ -219,8 +236,6 @@ def _width(freedom: float | None) -> float:
     return 1.0 if freedom is None else math.sqrt(max(freedom, 3.0) / (max(freedom, 3.0) - 2.0))
 
 
-#: Distance in u beyond which a value is far off: one in four hundred is by chance.
-FAR = 3.0
 GOOD, LOOK, REPEAT = "good", "look", "repeat"
 
 
@@ -315,8 +330,8 @@ def _mean(of: Compared) -> str:
 
 
 def _count(of: Class, one: Compared) -> str:
-    """Return the number of groups with a value, and that of their runs where it is another one."""
-    found = [group.source for group, estimate in zip(of.groups, one.estimates, strict=True) if estimate]
+    """Return the number of groups in the mean, and that of their runs where it is another one."""
+    found = [group.source for group, use in zip(of.groups, one.used, strict=True) if use]
     n = len({source.group or source.name for source in found})
     groups = how_many(n, "group")
     return groups if len(found) == n else f"{how_many(len(found), 'run')} of {groups}"
@@ -334,7 +349,7 @@ def _chi_square(of: Compared) -> str:
     if together is None or together.scatter is None:
         return "there is no other group to compare it with"
     p = "p < 10⁻⁶" if together.p < 1e-6 else f"p = {plain(together.p, 2)}"
-    freedom = f"{together.freedom} degree{'s' * (together.freedom > 1)} of freedom"
+    freedom = f"{how_many(together.freedom, 'degree')} of freedom"
     scatter, how = _scatter(of, together), f"χ² = {plain(together.chi_square)} for {freedom}, {p}"
     if together.p < DIFFER:
         return (
@@ -366,7 +381,7 @@ def _truth(of: Class) -> str:
     distances = [one for quantity in of.quantities for one in quantity.from_truth if one is not None]
     near = sum(abs(one) <= 2 for one in distances)
     return (
-        f"On the virtual bench the truth is known: {near} of {len(distances)} value{'s' * (len(distances) > 1)} "
+        f"On the virtual bench the truth is known: {near} of {how_many(len(distances), 'value')} "
         f"lie{'s' * (len(distances) == 1)} within 2 u of it, "
         f"{100 * _WITHIN_2_U:.0f} % are expected."
     )

@@ -94,7 +94,7 @@ def _marks(of: Class) -> Iterator[Tabular]:
     )
     if rows:
         shown = table("", ["group", "result", "why"], rows)
-        yield Tabular(f"{of.analysis.name}-marks", shown, note, first_column_wraps=True, wraps=("why",))
+        yield Tabular(f"{of.analysis.name}-marks", shown, note, first_column_wraps=True, wraps=("why",), narrow="stack")
 
 
 def _values(of: Class, quantity: Compared) -> Tabular:
@@ -116,6 +116,8 @@ def _values(of: Class, quantity: Compared) -> Tabular:
     rows = [Row(cells, kind) for kind, cells in zip(kinds, zip(names, *columns, strict=True), strict=True)]
     rows = rows if len(of.groups) > 1 else rows[:1]
     note = "value(u): the digits in parentheses are u of the last digits. Green: good; red: to repeat."
+    if any(one and not use for one, use in zip(quantity.estimates, quantity.used, strict=True)):
+        note += " The mean is without results to repeat."
     name = f"{of.analysis.name}-{quantity.name.replace('_', '-')}"
     return Tabular(name, table("", heads, rows, numbers=heads[1:]), note, first_column_wraps=True, narrow="turn")
 

@@ -109,7 +109,7 @@ def test_a_run_given_twice_and_runs_of_several_scenes_are_named(of_three, tmp_pa
 @pytest.mark.parametrize(("value", "u"), [(1.0, float("nan")), (1.0, 0.0), (1.0, None), (float("nan"), 1.0)])
 def test_a_value_without_a_finite_u_is_not_compared(value, u):
     parts = [{"values": {"mean": {"value": one, "u": of, "unit": "Hz"}}} for one, of in [(1.0, 0.1), (value, u)]]
-    quantity = _quantity("mean", ANALYSES["limit"], "", parts, [Truth(), Truth()])
+    quantity = _quantity("mean", ANALYSES["limit"], "", parts, [Truth(), Truth()], doubts=[False, False])
     assert [one is None for one in quantity.estimates] == [False, True]
     assert quantity.together
     assert quantity.together.mean == 1.0
@@ -157,6 +157,8 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
         HOSTILE: GOOD, "Group 2": REPEAT, "Group 10": GOOD,
     }  # fmt: skip
     assert verdict(of).startswith("2 of 3 results are good. To repeat: Group 2.")
+    assert of.quantities[0].used == tuple(group.source.name != "Group 2" for group in of.groups)
+    assert of.quantities[0].together.mean == pytest.approx(2.4e-4, rel=0.03)  # the halved spins have 3.3e-4
     page = Page(write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")).text
     assert re.search(r"skipped \S*Group 4.csv, line 3: 'abc'", page)
     assert re.search(r"Group 2 repeat C₃/₂: \+\d+\.\d u from its truth", page)
