@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -36,8 +37,6 @@ def list_known(name: str, known: Iterable[str]) -> str:
     >>> list_known("spindon", ["spin", "spindown"]), list_known("x", ["spin", "spindown"])
     ('did you mean spindown? Known are spin, spindown', 'known are spin, spindown')
     """
-    from difflib import get_close_matches  # not for every help
-
     names = [*known]
     near = get_close_matches(name, names, n=1)
     return f"{f'did you mean {near[0]}? Known' if near else 'known'} are {', '.join(names)}"
