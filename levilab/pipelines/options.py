@@ -190,7 +190,7 @@ class SpinDownOptions(RecordOptions):
         "Fit only the readings between two spins, as 30:24.", metavar="HZ:HZ", unit="Hz", read=_read_between,
     ))  # fmt: skip
     laws: tuple[str, ...] | None = field(default=None, metadata=_about(
-        "Fit only these drag laws, as disc,stokes.", metavar="LAW,…", default_text="all", read=_read_laws,
+        'Fit only these drag laws, as "disc,stokes".', metavar="LAW,…", default_text="all", read=_read_laws,
     ))  # fmt: skip
     device: Device | None = field(default=None, metadata=_DEVICE)
     clock_u: float | None = field(default=None, metadata=_CLOCK_U)
