@@ -5,7 +5,6 @@ from __future__ import annotations
 import shutil
 import tempfile
 import weakref
-from contextlib import contextmanager
 from dataclasses import fields, replace
 from functools import partial
 from glob import glob
@@ -16,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DataError, DoesNotSuit, LevilabError, UsageError
 from levilab.notebook.frame import (
+    FRAME,
     are_arrays,
     frame_of,
     has_numbers_for_titles,
@@ -35,15 +35,10 @@ from levilab.runs.find import find_run
 from levilab.runs.run import Run
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
     from levilab.pipelines.document import Analysis
-    from levilab.pipelines.sources import Source
     from levilab.pipelines.suits import Suiting
-
-
-#: What DataFrames are called, in messages and beside saved results.
-_FRAME = "DataFrame"
 
 
 def analyze_data(data: Any, kind: Any, given: Mapping[str, Any]) -> AnalysisResult:
@@ -76,55 +71,54 @@ def analyze_data(data: Any, kind: Any, given: Mapping[str, Any]) -> AnalysisResu
         raise UsageError("data", "a run, a path or a DataFrame is expected", value="nothing")
     frames = [item for item in items if is_frame(item)]
     if not frames:
-        return _analyze_paths([_path(item) for item in items], kind, options, str)
+        return _analyze_paths([_path(item) for item in items], kind, options)
     folder = Path(tempfile.mkdtemp(prefix="levilab-"))
-    in_words = partial(_in_rows, folder=folder, titles=0 if any(map(has_numbers_for_titles, frames)) else 1)
+    in_words = partial(in_rows, folder=folder, titles=0 if any(map(has_numbers_for_titles, frames)) else 1)
     try:
         paths = [_path(item, folder, str(k) * (len(items) > 1)) for k, item in enumerate(items, 1)]
-        result = _analyze_paths(
-            paths, kind, options, in_words, folder=folder, called=called if len(items) == 1 else _FRAME
-        )
-    except BaseException:
+        result = _analyze_paths(paths, kind, options)
+    except BaseException as error:
         shutil.rmtree(folder, ignore_errors=True)
+        if isinstance(error, LevilabError):
+            error.args = (in_words(str(error)),)
         raise
+    result = _of_frames(result, folder, called if len(items) == 1 else FRAME, in_words)
     weakref.finalize(result, shutil.rmtree, folder, ignore_errors=True)  # a long record is read when it is drawn
     return result
 
 
-def _analyze_paths(
-    paths: Sequence[Path],
-    kind: str | None,
-    options: Mapping[str, Any],
-    in_words: Callable[[str], str],
-    *,
-    folder: Path | None = None,
-    called: str = "",
-) -> AnalysisResult:
-    """Analyze paths by a kind of analysis, or by the one that suits them all.
+def _analyze_paths(paths: Sequence[Path], kind: str | None, options: Mapping[str, Any]) -> AnalysisResult:
+    """Analyze paths by a kind of analysis, or by the one that suits them all."""
+    if kind:
+        analysis = ANALYSES[kind]
+        _refuse_foreign(analysis, options)
+        return AnalysisResult(analysis, analysis.analyze(paths, analysis.options_from(options)))
+    one = _only_suiting(paths, options)
+    _refuse_foreign(one.analysis, options)
+    chosen = one.analysis.options_from(options)
+    refuse_columns_of_runs(one.found, chosen)
+    return AnalysisResult(one.analysis, one.analysis.analyze_found(one.paths, one.found, chosen))
 
-    in_words: a message as the caller reads it; folder: of the files written from DataFrames; called: their name.
+
+def _of_frames(result: AnalysisResult, folder: Path, called: str, in_words: Callable[[str], str]) -> AnalysisResult:
+    """Return a result in the words of a caller who gave no files.
+
+    Args:
+        result: of files some of which stand for data.
+        folder: of these.
+        called: the type of the data; of several, a number follows.
+        in_words: from a message about the files to one about the data.
     """
-    with _errors(in_words):
-        if kind:
-            analysis = ANALYSES[kind]
-            _refuse_foreign(analysis, options)
-            found = analysis.analyze(paths, analysis.options_from(options))
-        else:
-            one = _only_suiting(paths, options)
-            analysis = one.analysis
-            _refuse_foreign(analysis, options)
-            chosen = analysis.options_from(options)
-            refuse_columns_of_runs(one.found, chosen)
-            found = analysis.analyze_found(one.paths, one.found, chosen)
-    copies = tuple(path for path in paths if path.parent == folder)
-    found = replace(found, sources=tuple(_renamed(one, called) if one.path in copies else one for one in found.sources))
-    return AnalysisResult(analysis, _translate_warnings(found, in_words), copies)
-
-
-def _renamed(source: Source[Any], called: str) -> Source[Any]:
-    """Return a source that was no file, by its type, and its number among several."""
-    number = source.path.stem.removeprefix(_FRAME)
-    return replace(source, name=f"{called} {number}".strip())
+    sources, copies = [], []
+    for source in result.found.sources:
+        own = replace(source, warnings=tuple(reword(text, in_words(text)) for text in source.warnings))
+        if source.path.parent == folder:
+            copies.append(source.path)
+            own = replace(own, name=f"{called} {source.path.stem.removeprefix(FRAME)}".strip())
+        sources.append(own)
+    warnings = tuple(map(in_words, result.found.warnings))
+    found = replace(result.found, sources=tuple(sources), warnings=warnings)
+    return AnalysisResult(result.analysis, found, tuple(copies))
 
 
 def _check_kind(kind: object) -> None:
@@ -161,7 +155,7 @@ def _path(item: Any, folder: Path = Path(), number: str = "") -> Path:
     if isinstance(item, str | PathLike):
         return find_run(Path(item))
     if is_frame(item):
-        file = folder / f"{_FRAME}{number}.csv"
+        file = folder / f"{FRAME}{number}.csv"
         write_frame(item, file)
         return file
     raise UsageError("data", "a run, a path, a DataFrame or several of them are expected", value=_name_type(item))
@@ -214,30 +208,3 @@ def _only_suiting(paths: Sequence[Path], options: Mapping[str, Any]) -> Suiting:
         together.setdefault(" and ".join(one.analysis.name for one in taken if path in one.paths), []).append(path.name)
     seen = [f"{names}: {list_in_words(inputs)}" for names, inputs in together.items()]
     raise DoesNotSuit(f"no analysis takes all of these together ({'; '.join(seen)}): analyze each kind by itself")
-
-
-# --- messages ------------------------------------------------------------------------------------------
-
-
-def _in_rows(text: str, folder: Path, titles: int) -> str:
-    """Return a message about a DataFrame with rows in the place of a file's lines."""
-    return in_rows(text, folder, titles=titles) if _FRAME in text else text
-
-
-def _translate_warnings(found: Any, in_words: Callable[[str], str]) -> Any:
-    """Replace the warnings about inputs by the caller's words."""
-    sources = [
-        replace(source, warnings=tuple(reword(text, in_words(text)) for text in source.warnings))
-        for source in found.sources
-    ]
-    return replace(found, sources=tuple(sources), warnings=tuple(map(in_words, found.warnings)))
-
-
-@contextmanager
-def _errors(in_words: Callable[[str], str]) -> Iterator[None]:
-    """Give errors the text that the caller reads."""
-    try:
-        yield
-    except LevilabError as error:
-        error.args = (in_words(str(error)),)
-        raise

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+#: What DataFrames are called, in messages and beside saved results.
+FRAME = "DataFrame"
 #: Analysis → names of one, two or three arrays that are given without names; "": no analysis was chosen.
 ARRAYS: dict[str, tuple[str, ...]] = {
     "": ("time_s", "spin_frequency_hz", "spin_frequency_u_hz"),
@@ -266,9 +268,11 @@ def in_rows(text: str, folder: Path, *, titles: int) -> str:
     >>> in_rows("folder/DataFrame.csv, line 1: no title is known", Path("folder"), titles=1)
     'the data: no title is known'
     """
+    if FRAME not in text:
+        return text
     for separator in ("/", "\\"):
         text = text.replace(f"{folder}{separator}", "")
-    text = re.sub(r"\bDataFrame(\d*)\.csv\b", lambda name: f"DataFrame {name[1]}" if name[1] else "the data", text)
+    text = re.sub(rf"\b{FRAME}(\d*)\.csv\b", lambda name: f"{FRAME} {name[1]}" if name[1] else "the data", text)
     if titles:
         text = re.sub(r", line 1\b", "", text)
 
