@@ -49,19 +49,30 @@ def _app() -> Any:
     return typer.main.get_command(app)
 
 
-def _described(command: Any, name: str, parent: Any = None) -> Iterator[str]:
+def _described(command: Any, name: str, parent: Any = None, above: frozenset[str] = frozenset()) -> Iterator[str]:
+    """Yield what stands in the help of a command and those below it; options that all of these have stand once."""
     command = getattr(command, "command", command)  # of a stand-in, see levilab.cli.later
     context = command.context_class(command, info_name=name.rpartition(" ")[2] if parent else name, parent=parent)
     yield f"{'#' * (1 + name.count(' '))} `{name}`"
     yield f"```text\n{' '.join(command.get_usage(context).removeprefix('Usage:').split())}\n```"
     yield _in_plain_text(command.help or "")
-    rows = [row for parameter in command.get_params(context) if (row := _row(parameter, context))]
-    if rows:
-        yield "\n".join(rows)
+    below = {sub: command.commands[sub] for sub in sorted(getattr(command, "commands", {}))}
+    yield "\n".join(row for row in _rows(command, context) if row not in above)
+    common = [_rows(sub, context) for sub in below.values()]
+    shared = frozenset.intersection(*map(frozenset, common)) if len(common) > 1 else frozenset[str]()
+    if shared:
+        yield "Options that all of them have:"
+        yield "\n".join(row for row in common[0] if row in shared)
     if command.epilog:
         yield _example(command.epilog)
-    for sub in sorted(getattr(command, "commands", {})):
-        yield from _described(command.commands[sub], f"{name} {sub}", context)
+    for sub, one in below.items():
+        yield from _described(one, f"{name} {sub}", context, shared)
+
+
+def _rows(command: Any, context: Any) -> list[str]:
+    """Return the options and arguments of a command, each a term and its definition."""
+    command = getattr(command, "command", command)
+    return [row for parameter in command.get_params(context) if (row := _row(parameter, context))]
 
 
 def _row(parameter: Any, context: Any) -> str:

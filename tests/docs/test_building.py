@@ -20,6 +20,7 @@ def test_the_pages_of_commands_have_each_command_with_its_options():
     ] == []
     assert "### `levilab acquire spin`" in reference("reference/commands-acquire")
     assert "```text\nlevilab acquire spin [OPTIONS]\n```" in reference("reference/commands-acquire")
+    assert reference("reference/commands-acquire").count("`--resume RUN`") == 1  # of all, said once
     assert "`--tolerance X`\n: Error that is accepted" in reference("reference/commands-simulate")
     assert "| [`levilab sweep`](commands-simulate.md#levilab-sweep) | Map a scene" in overview()
 
