@@ -98,7 +98,8 @@ class Analysis(Needs[Any], Generic[A]):
         finding, combination: types of what is found of one input and of all together, frozen dataclasses; None: as the
             base has it.
         base: of the model of result.json, with the entries that no other analysis has.
-        entries: its own entries at the top of result.json, for people: `values`, `models`.
+        entries: its own entries at the top of result.json, for people: `values`, `models`; None: those of the only
+            input, and of several none.
         run_entries: likewise those of one input.
         check: raises ValueError for what was read of one input and cannot have been found.
         outdated: why this version cannot use what was read of one input, so that it is analyzed again; empty: it can.
@@ -129,7 +130,7 @@ class Analysis(Needs[Any], Generic[A]):
     finding: Any
     combination: Any = None
     base: type[Result] = Result
-    entries: Callable[[A], dict[str, Any]]
+    entries: Callable[[A], dict[str, Any]] | None = None
     run_entries: Callable[[Any], dict[str, Any]]
     check: Callable[[Any], None] = lambda _: None
     outdated: Callable[[Any], str] = lambda _: ""
@@ -296,7 +297,9 @@ class Analysis(Needs[Any], Generic[A]):
             "warnings": [unquote(text) for text in found.all_warnings],
             "combined": found.combined,
         }
-        return self.model.model_validate(finite(document | _budget(found.budget) | self.entries(found)))
+        alone = self.run_entries(found.runs[0]) if len(found.runs) == 1 else {"values": {}}
+        entries = self.entries(found) if self.entries else alone
+        return self.model.model_validate(finite(document | _budget(found.budget) | entries))
 
     def settings(self, options: Any) -> Part:
         """Return the options as they stand in the file."""

@@ -144,7 +144,6 @@ def _entries(analysis: FieldAnalysis) -> dict[str, Any]:
         "values": {name: _value(estimate) for name, estimate in analysis.values.items()},
         # of several scans there is no fit together: the scan's own stand with each
         "models": [_model(analysis.runs[0])] if len(analysis.runs) == 1 else [],
-        "text": analysis.text,
     }
 
 

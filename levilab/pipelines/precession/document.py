@@ -167,14 +167,6 @@ def _of_clocks(
         yield time_base(source, "counter", value, options.clock_u)
 
 
-def _entries(analysis: PrecessionAnalysis) -> dict[str, Any]:
-    return _about(analysis.combined)
-
-
-def _run_entries(run: PrecessionRun) -> dict[str, Any]:
-    return _about(run.fit)
-
-
 def _about(fit: SweepFit) -> dict[str, Any]:
     return {
         "values": values_of(find_all(QUANTITIES, fit)),
@@ -246,8 +238,8 @@ PRECESSION = Analysis(
     budget_of_all=budget_of_all,
     finding=PrecessionRun,
     combination=SweepFit,
-    entries=_entries,
-    run_entries=_run_entries,
+    entries=lambda analysis: _about(analysis.combined),
+    run_entries=lambda run: _about(run.fit),
     tables=precession_tables,
     part=precession_part,
     columns=precession_columns,

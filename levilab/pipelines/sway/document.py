@@ -57,11 +57,6 @@ def budget_of_run(_: Source[SwayReadings], run: SwayRun, __: SwayOptions) -> tup
     )
 
 
-def _entries(analysis: SwayAnalysis) -> dict[str, Any]:
-    alone = _run_entries(analysis.runs[0]) if len(analysis.runs) == 1 else {"values": {}, "models": []}
-    return alone | {"text": analysis.text}
-
-
 def _run_entries(run: SwayRun) -> dict[str, Any]:
     found = run.geometry
     values = values_of(find_all(QUANTITIES, found))
@@ -89,7 +84,6 @@ SWAY = Analysis(
     skips=True,
     budget_of_run=budget_of_run,
     finding=SwayRun,
-    entries=_entries,
     run_entries=_run_entries,
     tables=sway_tables,
     part=sway_part,

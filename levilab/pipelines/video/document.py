@@ -41,11 +41,6 @@ def budget_of_run(_: Source[FilmReadings], run: Video, __: VideoOptions) -> tupl
     )
 
 
-def _entries(analysis: VideoAnalysis) -> dict[str, Any]:
-    alone = _run_entries(analysis.runs[0]) if len(analysis.runs) == 1 else {"values": {}}
-    return alone | {"text": analysis.text}
-
-
 def _run_entries(run: Video) -> dict[str, Any]:
     return {"values": values_of(find_all(QUANTITIES, run)), "choices_hz": [abs(f) for f in run.choices]}
 
@@ -63,7 +58,6 @@ VIDEO = Analysis(
     skips=True,
     budget_of_run=budget_of_run,
     finding=Video,
-    entries=_entries,
     run_entries=_run_entries,
     tables=video_tables,
     part=video_part,
