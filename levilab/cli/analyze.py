@@ -10,7 +10,7 @@ import typer
 
 from analysis.numbers import how_many
 from levilab.cli.later import Later, NamedLast
-from levilab.cli.options import Json, Paths, existing_path, number, place
+from levilab.cli.options import Json, Paths, existing_path, flag, number, option, place
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError
@@ -103,28 +103,23 @@ def _command(kind: str) -> Callable[..., None]:
         paths: Paths = None,
         save: Annotated[
             bool | None,
-            typer.Option(
+            flag(
+                "Write the result and figures beside the run; with --table the results alone.",
                 "--save/--no-save",
-                help="Write the result and figures beside the run; with --table the results alone.",
                 show_default="save; with --table no-save",
             ),
         ] = None,
         out: Annotated[Path | None, place("DIR", "Write them there instead.")] = None,
         table: Annotated[
             Path | None,
-            typer.Option(
-                metavar="FILE",
-                help="For many runs: analyze each by itself, in parallel, and write a row for each, .csv or .parquet.",
+            option(
+                "FILE",
+                "For many runs: analyze each by itself, in parallel, and write a row for each, .csv or .parquet.",
             ),
         ] = None,
-        cores: Annotated[
-            int | None, typer.Option(metavar="N", min=1, help="Processes for --table.", show_default="all of them")
-        ] = None,
+        cores: Annotated[int | None, option("N", "Processes for --table.", min=1, show_default="all of them")] = None,
         resume: Annotated[
-            bool,
-            typer.Option(
-                "--resume", help="Keep the rows of an earlier --table; analyze what is new, changed or failed."
-            ),
+            bool, flag("Keep the rows of an earlier --table; analyze what is new, changed or failed.", "--resume")
         ] = False,
         as_json: Json = False,
         **given: Any,

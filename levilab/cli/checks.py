@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from levilab.cli import exit_codes
-from levilab.cli.options import Json, among, existing_paths, flag, option, place, writable
+from levilab.cli.options import Json, among, argument, existing_paths, flag, option, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.errors import UsageError
 
@@ -24,12 +24,7 @@ CHAPTERS = (
 def crosscheck(
     subjects: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="[SUBJECT]…",
-            help=f"Of {', '.join(SUBJECTS)}.",
-            show_default="all",
-            callback=among(SUBJECTS, "subject"),
-        ),
+        argument("[SUBJECT]…", f"Of {', '.join(SUBJECTS)}.", show_default="all", callback=among(SUBJECTS, "subject")),
     ] = None,
     like: Annotated[
         list[Path] | None,

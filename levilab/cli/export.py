@@ -3,10 +3,8 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import existing_path, flag, option, place, writable
+from levilab.cli.options import argument, existing_path, flag, option, place, writable
 from levilab.cli.output import interruptible, message, result
 from levilab.errors import UsageError
 from levilab.pipelines.options import OF_REPORT, read_options
@@ -32,17 +30,15 @@ def _named_file(file: Path | None) -> Path | None:
 def export_data(
     path: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="PATH",
+        argument(
+            "PATH",
+            "A run folder, a data file, a sweep's NAME.zarr.",
             readable=False,
-            help="A run folder, a data file, a sweep's NAME.zarr.",
             show_default=False,
             callback=_named_path,
         ),
     ] = None,
-    file: Annotated[
-        Path | None, typer.Argument(metavar="FILE", readable=False, help="The same as --out.", callback=_named_file)
-    ] = None,
+    file: Annotated[Path | None, argument("FILE", "The same as --out.", readable=False, callback=_named_file)] = None,
     out: Annotated[
         Path | None,
         place(

@@ -3,10 +3,8 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import HEADING, Language, Paths, among, flag, option, place, writable
+from levilab.cli.options import HEADING, Language, Paths, among, argument, flag, option, place, writable
 from levilab.cli.output import interruptible, message, result
 from levilab.pipelines.options import OF_REPORT, read_options
 
@@ -41,12 +39,7 @@ def of_class(
 def worksheet(
     experiments: Annotated[
         list[str] | None,
-        typer.Argument(
-            metavar="[EXPERIMENT]…",
-            help=f"Of {', '.join(SHEETS)}.",
-            show_default="all",
-            callback=among(SHEETS, "experiment"),
-        ),
+        argument("[EXPERIMENT]…", f"Of {', '.join(SHEETS)}.", show_default="all", callback=among(SHEETS, "experiment")),
     ] = None,
     out: Annotated[Path, place("DIR", "Where the files are written.")] = Path("worksheets"),
     groups: Annotated[int, option("N", "How many, each with its seed.", min=1, max=500)] = 20,

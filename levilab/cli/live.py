@@ -8,7 +8,7 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.importing import importing
-from levilab.cli.options import Language, flag, option, place
+from levilab.cli.options import Language, argument, flag, option, place
 from levilab.cli.output import message, result
 from levilab.errors import UsageError
 
@@ -16,9 +16,7 @@ from levilab.errors import UsageError
 def live(
     run: Annotated[
         Path | None,
-        typer.Argument(
-            metavar="[RUN]", readable=False, help="A run folder.", show_default="the newest, one that is running first"
-        ),
+        argument("[RUN]", "A run folder.", readable=False, show_default="the newest, one that is running first"),
     ] = None,
     mock: Annotated[bool, flag("A virtual bench to play with, and to record runs on.", "--mock")] = False,
     seed: Annotated[int, option("N", "With --mock, draws the top; of Group 1, as in levilab worksheet.", min=0)] = 0,

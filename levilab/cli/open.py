@@ -5,10 +5,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
-import typer
-
 from levilab.cli.analyze import takes_options, write_and_print
-from levilab.cli.options import Json, Language, existing_paths, flag, place, writable
+from levilab.cli.options import Json, Language, argument, existing_paths, flag, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.errors import NoneUsable, UsageError
 from levilab.pipelines.options import OF_FILES, read_options
@@ -27,11 +25,8 @@ _SHOWN = 3
 def open_files(
     paths: Annotated[
         list[Path] | None,
-        typer.Argument(
-            metavar="FILE…",
-            readable=False,
-            help="Data files, or sheets and runs in them: FILE/SHEET.",
-            callback=existing_paths,
+        argument(
+            "FILE…", "Data files, or sheets and runs in them: FILE/SHEET.", readable=False, callback=existing_paths
         ),
     ] = None,
     keep: Annotated[bool, flag("Keep the options in FILE.levilab.toml, which every analysis reads.", "--keep")] = False,

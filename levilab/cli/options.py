@@ -45,6 +45,11 @@ def option(metavar: str, text: str, *names: str, **more: Any) -> Any:
     return typer.Option(*names, metavar=metavar, help=text, **more)
 
 
+def argument(metavar: str, text: str, **more: Any) -> Any:
+    """Return an argument without a name; see `option`."""
+    return typer.Argument(metavar=metavar, help=text, **more)
+
+
 def flag(text: str, *names: str, **more: Any) -> Any:
     """Return an option without a metavar of its own; see `option`."""
     return typer.Option(*names, help=text, **more)

@@ -3,10 +3,8 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import HEADING, Json, Paths, existing_path, flag, option, place, writable
+from levilab.cli.options import HEADING, Json, Paths, argument, existing_path, flag, option, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.pipelines.options import OF_REPORT, read_options
 
@@ -67,8 +65,7 @@ def report(
 
 def runs(
     folder: Annotated[
-        Path | None,
-        typer.Argument(metavar="[DIR]", readable=False, help="The folder to search.", show_default="runs"),
+        Path | None, argument("[DIR]", "The folder to search.", readable=False, show_default="runs")
     ] = None,
     out: Annotated[Path | None, place("DIR", "The same, as acquire has it.", readable=False)] = None,
     last: Annotated[int | None, option("N", "The latest N runs alone.", min=1)] = None,
@@ -92,10 +89,10 @@ def runs(
 def top(
     device: Annotated[
         Path,
-        typer.Argument(
-            metavar="FILE",
+        argument(
+            "FILE",
+            "Describes the top's parts, as sample_data/device.toml does.",
             readable=False,
-            help="Describes the top's parts, as sample_data/device.toml does.",
             callback=existing_path,
         ),
     ],

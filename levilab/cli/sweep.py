@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from levilab.cli.options import SCENES, Json, Settings, flag, named_scene, option, place, quantity
+from levilab.cli.options import SCENES, Json, Settings, argument, flag, named_scene, option, place, quantity
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.errors import DataError, UsageError, WorkersLost
 
@@ -22,12 +22,12 @@ LINE_EVERY_S = 60.0
 def sweep(
     scene: Annotated[
         str | None,
-        typer.Argument(
-            metavar="SCENE|STORE",
+        argument(
+            "SCENE|STORE",
+            f"The scene: {SCENES}, or a file.  "
+            "Or the store of a sweep, NAME.zarr, which is shown, and with --resume continued.",
             show_default=False,
             callback=named_scene,
-            help=f"The scene: {SCENES}, or a file.  "
-            "Or the store of a sweep, NAME.zarr, which is shown, and with --resume continued.",
         ),
     ] = None,
     sweep: Annotated[
