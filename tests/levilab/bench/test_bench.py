@@ -400,6 +400,7 @@ def test_an_empty_description_is_a_bench_without_instruments(tmp_path):
         ("[spin\n", "not readable as TOML"),
         ("[spin]\ngate_s = 1,0", "; write a decimal point, not a comma"),
         ("[spin]\ngate_s = 1 s", "; write the number without its unit"),
+        ("[spin]\ngate_s = 12", "gate_s = 12 must be shorter than interval_s = 10"),
     ],
 )
 def test_what_is_wrong_with_a_description_is_reported_in_one_line_with_its_path(tmp_path, text, says):
@@ -444,11 +445,6 @@ def test_a_described_virtual_bench_keeps_to_the_wall_clock(monkeypatch):
         bench.counter.prepare(gate_s=0.05, trigger_level_v=0.6)
         assert bench.counter.frequency() == pytest.approx(30, abs=3)
     assert 1000.05 < wall[0] < 1060.0
-
-
-def test_a_gate_must_fit_into_the_interval(tmp_path):
-    with pytest.raises(ConfigError, match=r"gate_s = 12 must be shorter than interval_s = 10"):
-        read_bench(written(tmp_path, "[spin]\ngate_s = 12\ninterval_s = 10\n"), Configuration)
 
 
 def test_a_gaussmeter_is_left_alone_between_two_messages_on_the_clock_of_its_bench(world):
