@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import UsageError
+from levilab.errors import UsageError, list_known
 from levilab.reproduce import (
     beyond,
     dipole,
@@ -115,7 +115,7 @@ def choose(only: str | None) -> list[Chapter]:
     names = [name.strip() for name in only.split(",") if name.strip()]
     for name in names or [only]:
         if name not in CHAPTERS:
-            raise UsageError("only", f"chapters are {', '.join(CHAPTERS)}", value=name or "''")
+            raise UsageError("only", list_known(name, CHAPTERS), value=name or "''")
     return [chapter for chapter in CHAPTERS.values() if chapter.name in names]
 
 

@@ -24,8 +24,8 @@ def test_chapters_come_in_their_order_and_a_wrong_name_is_refused(tmp_path):
     assert [one.name for one in run.choose("gans,limits")] == ["limits", "gans"]
     ended = command("reproduce", "--only", "limit", cwd=tmp_path)
     assert ended.status == 2
-    assert "--only limit: chapters are stability, limits" in ended.err
-    with pytest.raises(UsageError, match="chapters are stability, limits"):  # and not everything, which takes a minute
+    assert "--only limit: did you mean limits? Known are stability, limits" in ended.err
+    with pytest.raises(UsageError, match="known are stability, limits"):  # and not everything, which takes a minute
         run.choose("")
 
 
