@@ -259,7 +259,7 @@ export function openStage(THREE, OrbitControls, canvas, parts, {changed, ratio =
   const renderer = new THREE.WebGLRenderer({canvas, antialias: !soft, powerPreference: "low-power"});
   renderer.setPixelRatio(soft ? ratio : Math.min(devicePixelRatio || 1, 2));
   const camera = buildCamera(THREE, parts, 1), controls = new OrbitControls(camera, canvas);
-  Object.assign(controls, {enablePan: false, minDistance: NEAREST, maxDistance: FARTHEST, maxPolarAngle: 1.62});
+  Object.assign(controls, {enablePan: false, zoomToCursor: true, minDistance: NEAREST, maxDistance: FARTHEST, maxPolarAngle: 1.62});
   let view = buildScene(THREE, parts, theme()), placed = null;
 
   function reset() {

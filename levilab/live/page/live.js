@@ -261,7 +261,7 @@ function show() {
   write("empty", {
     none: phrase("No run yet: levilab acquire starts one, here or in another terminal, and it appears."),
     idle: practice?.guest ? phrase("No run yet: it appears here once one is recorded.") : phrase("No run yet: the guide says how to record one."),
-    setup: " ",
+    setup: phrase("Here the spin and the drive of the last minutes are drawn."),
   }[state] || (about?.status === "running" ? phrase("No reading yet: the top is being driven up.") : phrase("This run has no readings.")));
   put(document, {title: `${state === "running" && data.count ? `${phrase("{count} readings", {count: data.count})} · ` : ""}levilab live`});
   if (isReady) practice?.show(bench, about, data.count, down);

@@ -114,7 +114,7 @@ def test_a_language_that_is_a_new_file_says_everything_of_a_page(hall: Hall, wat
     assert page.inner_text("#event-list li:last-child span") in {"⟦the top follows the drive up⟧"} | {
         "⟦the top follows the drive at 30·50 Hz⟧"
     }
-    assert page.inner_text("#fit-head").startswith("⟦disc law")  # raised figures stand in elements of their own
+    assert page.inner_text("#fit-head").startswith("⟦⟦disc⟧ law")  # raised figures stand in elements of their own
     assert [one for one in outside(page) if NAME not in one and one not in {"note of a person", "2026-11-22"}] == []
     page.goto(f"{address(hall)}open")
     until(page, "document.getElementById('kept-in').textContent")
