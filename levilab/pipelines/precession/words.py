@@ -66,13 +66,8 @@ def _offset(fit: SweepFit) -> float:
 
 def _about_power(power: Power) -> str:
     if power.enough:
-        return Text(
-            "These points distinguish a slope of {slope:g} from 1 with a probability of {p:n}; the smallest difference "
-            "that they show in nine cases of ten is {smallest:n}.",
-            slope=power.slope,
-            p=at_most(power.now),
-            smallest=plain(power.smallest_difference, 2),
-        )
+        said = "A slope of {slope:g} would have shown with a probability of {p:n}."
+        return Text(said, slope=power.slope, p=at_most(power.now))
     points = "more than a million" if power.points_needed is None else str(power.points_needed)
     return Text(
         "These points would distinguish a slope of {slope:g} from 1 in {percent:.0f} % of cases only. It takes "

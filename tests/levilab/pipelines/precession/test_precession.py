@@ -50,7 +50,7 @@ def test_a_file_of_ones_own_is_analyzed_without_naming_its_columns(tmp_path):
     assert values["intercept"]["unit"] == "Hz"
     assert 0.01 < values["p_locked"]["value"] <= 1
     assert values["power"]["value"] > 0.99
-    assert "the smallest difference that they show in nine cases of ten is 0.00" in found.text
+    assert "A slope of 1.05 would have shown with a probability of more than 0.999." in found.text
     assert "half the frequency was counted, left out of the line" in document["warnings"][0]
     weighted, robust = document["models"]
     (a, b), (_, c) = weighted["covariance"]
