@@ -11,7 +11,7 @@ from levilab.report.export.contents import attributes_of, variables_of
 from levilab.software import how_to_install
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Mapping
 
     import pandas as pd
     import xarray
@@ -45,34 +45,31 @@ def as_dataset(frame: pd.DataFrame, dimension: str) -> xarray.Dataset:
     Raises:
         MissingXarray: xarray is not installed.
     """
-    columns = {str(name): frame[name].to_numpy() for name in frame}
     if "time_s" in frame and frame["time_s"].is_monotonic_increasing and frame["time_s"].is_unique:
         dimension = "time_s"
-    return dataset_of(columns, (dimension,)).set_coords({"time_s", "input", dimension} & set(columns))
+    units = {str(name): unit.si for name in frame if (unit := split(str(name))[1])}
+    variables = {
+        str(name): ((dimension,), frame[name].to_numpy(), {"units": units[name]} if name in units else {})
+        for name in frame
+    }
+    return dataset_of(variables).set_coords({"time_s", "input", dimension} & set(variables))
 
 
 def dataset_of_contents(contents: Contents) -> xarray.Dataset:
     """Return what is exported as xarray reads it from the file.  Raises MissingXarray."""
-    written = {one.name: (one.dimensions, one.values, dict(one.attributes)) for one in variables_of(contents)}
-    data: xarray.Dataset = _import_xarray().decode_cf(_import_xarray().Dataset(written, attrs=attributes_of(contents)))
-    return data
+    variables = {one.name: (one.dimensions, one.values, one.attributes) for one in variables_of(contents)}
+    data = dataset_of(variables, attributes_of(contents))
+    import xarray  # it is there
+
+    decoded: xarray.Dataset = xarray.decode_cf(data)
+    return decoded
 
 
-def _import_xarray() -> Any:
+def dataset_of(variables: Mapping[str, tuple[Any, ...]], about: Mapping[str, str] | None = None) -> xarray.Dataset:
+    """Return name → (dimensions, values, attributes) as a Dataset with attributes.  Raises MissingXarray."""
     try:
         import xarray
     except ImportError:
         advice = f"{how_to_install('xarray')}; to_dataframe() does without"
         raise MissingXarray(f"xarray is not installed: {advice}") from None
-    return xarray
-
-
-def dataset_of(variables: Mapping[str, Any], dimensions: Sequence[str]) -> xarray.Dataset:
-    """Return arrays over the same dimensions as a Dataset with units.  Raises MissingXarray."""
-    units = {name: unit.si for name in variables if (unit := split(name.rstrip(".0123456789"))[1])}
-    described = {
-        name: (tuple(dimensions), values, {"units": units[name]} if name in units else {})
-        for name, values in variables.items()
-    }
-    data: xarray.Dataset = _import_xarray().Dataset(described)
-    return data
+    return xarray.Dataset(variables, attrs=about)

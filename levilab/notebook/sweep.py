@@ -111,15 +111,16 @@ class SimulatedMap(Helpful):
     def to_xarray(self) -> xarray.Dataset:
         """Return a Dataset with the axes as coordinates, and units; needs xarray.  Raises MissingXarray."""
         contents = contents_of(self.store)
-        rows = contents.tables[0].columns
         keys = [axis.name for axis in contents.axes] or [ROWS]
-        data = dataset_of({one.name: one.values for one in contents.arrays or rows}, keys)
-        data = data.assign_coords({axis.name: axis.values for axis in contents.axes})
+        places = [([axis.name], axis) for axis in contents.axes]
+        places += [(keys, one) for one in contents.arrays or contents.tables[0].columns]
+        variables = {
+            one.name: (over, one.values, {"units": one.unit, "long_name": one.meaning}) for over, one in places
+        }
+        data = dataset_of(variables, attributes_of(contents))
         for axis in contents.axes:
             data[axis.name].encoding["_FillValue"] = None  # CF: coordinates are never missing
-        for one in (*contents.axes, *contents.arrays) or rows:
-            data[one.name].attrs = {"units": one.unit, "long_name": one.meaning}
-        return data.assign_attrs(attributes_of(contents))
+        return data
 
     def plot(self, column: str | None = None) -> Figure:
         """Draw a map of an observable, by default of the first one, over two axes or more.  Raises UsageError."""
