@@ -1,9 +1,6 @@
 """Faults of links and instruments: each raises the error that names it, and the next question gets its own answer."""
 
-import contextlib
-
 import pytest
-import pyvisa_py.protocols.rpc
 
 from instruments.clock import VirtualClock
 from instruments.drivers.scpi import ScpiInstrument, parse_reading
@@ -15,8 +12,6 @@ from instruments.virtual.bench.faults import AWAY, FAULTS, LATE, Fault
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.rows import Ask, Number
-from instruments.virtual.servers.server import BenchServer
-from support.waiting import HANG_GUARD_S as AT_MOST
 
 MESSAGES, STREAM = "TCPIP0::box.levilab::inst0::INSTR", "TCPIP0::box.levilab::5025::SOCKET"
 DATA = bytes(range(256)) * 3
@@ -189,102 +184,3 @@ def test_a_lock_keeps_another_program_out_and_is_gone_with_its_link(box):
     other.close()
     box.transport.lock()
     assert box.reading() == 25.0
-
-
-# --- the same at the servers, with other people's client ---
-
-#: How long an answer is waited for that cannot come [s].
-UNANSWERED_S = 0.05
-LOST = {"disconnected", "away for 5 s"}
-#: What differs from READING.  pyvisa-py waits on at a bare socket that was closed; over HiSLIP it does not end a
-#: message at a line feed, so what comes behind one is seen; a lock holds back questions, not an answer on its way,
-#: but for VXI-11, where it is an I/O error.
-SERVED = {
-    ("socket", "disconnected"): (NoAnswer, "no answer"),
-    ("socket", "away for 5 s"): (NoAnswer, "no answer"),
-    ("hislip", "two answers at once"): (BadAnswer, "expected a number"),
-    ("hislip", "garbage after"): (BadAnswer, "expected a number"),
-    ("socket", "taken by another"): 25.0,
-    ("hislip", "taken by another"): 25.0,
-    ("vxi11", "taken by another"): (NotConnected, "no link at"),
-}
-
-
-class StandingClock(VirtualClock):
-    """Stands still until the test lets time pass; a server looks again and again what time it is."""
-
-    jumps = False
-
-    def wall_duration(self, duration):
-        return 0.01
-
-
-class PatientLink(VisaTransport):
-    """Waits as long as it takes, but briefly for a reading that cannot come before the test lets time pass."""
-
-    is_silent = False
-
-    def query(self, message, *, patience=0.0):
-        brief = self.is_silent and message == "READ?"
-        return super().query(message, patience=UNANSWERED_S - self.timeout if brief else patience)
-
-
-def received_before_the_end(sock, timeout, receive=pyvisa_py.protocols.rpc._recvrecord, **more):
-    """A record of a remote procedure call; the end of the connection is the same failure as a time-out, at once."""
-
-    def read(size):
-        if data := sock.recv(size):
-            return data
-        raise TimeoutError
-
-    return receive(sock, timeout, read, **more)
-
-
-@contextlib.contextmanager
-def served_box(way):
-    clock = StandingClock()
-    box = VirtualBox(clock)
-    box.pace = 0.0
-    bench = VirtualBench({MESSAGES: box})
-    with BenchServer(bench) as server:
-        box = Box(PatientLink(server.endpoints[0].resources[way], library="@py", timeout=AT_MOST))
-        box.bench, box.clock = bench, clock
-        try:
-            yield box
-        finally:
-            box.close()
-
-
-@pytest.mark.parametrize("what", FAULTS)
-@pytest.mark.parametrize("way", ["socket", "hislip", "vxi11"])
-def test_a_fault_over_a_server_raises_and_the_next_answer_is_right(way, what, monkeypatch):
-    monkeypatch.setattr("instruments.virtual.servers.hislip.FIRST_WORDS", AT_MOST)  # a busy machine delays the client
-    monkeypatch.setattr("instruments.virtual.servers.hislip.SECOND_CHANNEL", AT_MOST)
-    if what in LOST:  # pyvisa-py looks until its time-out for more on a connection that has ended, and at its farewell
-        monkeypatch.setattr("pyvisa_py.protocols.rpc._recvrecord", received_before_the_end)
-        monkeypatch.setattr("pyvisa_py.tcpip.Vxi11CoreClient.destroy_link", lambda *_: 0)
-    with served_box(way) as box:
-        box.identity()
-        box.bench.faults.append(Fault(what, question=r"READ\?"))
-        expected = SERVED.get((way, what), READING[what])
-        if isinstance(expected, tuple):
-            error, message = expected
-            box.transport.is_silent = error is NoAnswer
-            with pytest.raises(error, match=message.partition(" within")[0]) as caught:
-                box.reading()
-            assert caught.value.address == box.transport.address
-        else:
-            assert box.reading() == expected
-        if what == "late answer":
-            box.clock.sleep(LATE)
-        if what == "taken by another":
-            release(box)
-        if what in LOST:
-            box.clock.sleep(AWAY)
-            box.transport.reopen()
-        box.transport.is_silent = False
-        box.forget_errors()
-        for _ in range(3):
-            assert box.level == 1.5
-            assert box.reading() == 25.0
-            assert box.data() == DATA
