@@ -182,6 +182,7 @@ function markFall() {
 function forgetFall() {
   fellAt = NaN;
   put(by("replay"), {hidden: true});
+  space.endReplay?.();
 }
 
 /** What is drawn of the top that is shown. */

@@ -154,6 +154,8 @@ export async function openSpace(canvas, description) {
 
   return {
     add, keepFall, replay,
+    /** Go on with what is now. */
+    endReplay: () => { film = live; },
     get replays() { return film === fall && fall !== null; },
     get parts() { return parts; },
     setParts: (described) => {

@@ -371,6 +371,10 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(
     with page.expect_download() as saved:
         page.click("#png")
     assert saved.value.path().read_bytes().startswith(b"\x89PNG")
+    assert page.evaluate("levilab.space.replays")
+    publish(watch, Poses(3.0, 1 / 400, position[:300], upright[:300], up[:300]))  # another top floats
+    until(page, "levilab.data.up")
+    assert not page.evaluate("levilab.space.replays")
 
 
 #: When the lamp flashed last before some times, of a drive that goes on at 1 s with 30 Hz, and to 40 Hz at 2.01 s.
