@@ -299,16 +299,24 @@ def finding(of: Class) -> str:
 
 
 def verdict(of: Class) -> str:
-    """Return what the class found, quantity by quantity, and how well it met the truth."""
+    """Return whose results are good, and the mean of each quantity beside the truth."""
     if len(of.groups) == 1:
         (group,), (mark,) = of.groups, marks(of)
         return f"{group.source.name} alone measured this: {mark.word}."
-    texts = [f"{_mean(one)} is the mean of {_count(of, one)}{_spread(one)}." for one in of.quantities]
-    return "  ".join([_count_marks(of), *_scenes(of), *texts, *([_truth(of)] if of.knows_truth else [])])
+    texts = [f"{_mean(one)} is the mean of {_count(of, one)}{_beside_truth(one)}." for one in of.quantities]
+    return "  ".join([_count_marks(of), *_scenes(of), *texts])
 
 
-def _spread(of: Compared) -> str:
-    return (f", {with_sign(of.truth[1], 1)} u from the truth" if of.truth else "") + f"; {_chi_square(of)}"
+def _beside_truth(of: Compared) -> str:
+    return f", {with_sign(of.truth[1], 1)} u from the truth" if of.truth else ""
+
+
+def agreement(of: Class) -> str:
+    """Return how far the groups agree, quantity by quantity, and how well they met the truth; empty for one group."""
+    if len(of.groups) == 1:
+        return ""
+    texts = [f"{one.symbol}: {_chi_square(one)}." for one in of.quantities]
+    return "  ".join([*texts, *([_truth(of)] if of.knows_truth else [])])
 
 
 def _scenes(of: Class) -> list[str]:

@@ -12,11 +12,22 @@ from analysis.numbers import how_many
 from levilab.errors import unquote
 from levilab.files import check_writable, replace_atomically
 from levilab.pipelines.suits import recall_suiting
-from levilab.present.document.blocks import Document, Fact, Facts, Note, Picture, Section, Tabular, Verdict, Warnings
+from levilab.present.document.blocks import (
+    Document,
+    Fact,
+    Facts,
+    Note,
+    Paragraph,
+    Picture,
+    Section,
+    Tabular,
+    Verdict,
+    Warnings,
+)
 from levilab.present.numbers import column, enumeration, plain, with_sign, without_unit
 from levilab.present.tables import Row, table
 from levilab.report.document import banner_of, count_inputs
-from levilab.report.groups.beside import FAR, GOOD, LOOK, REPEAT, class_of, finding, marks, verdict
+from levilab.report.groups.beside import FAR, GOOD, LOOK, REPEAT, agreement, class_of, finding, marks, verdict
 from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, writing_report
 from levilab.report.reproduction import Heading
@@ -73,7 +84,8 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
         return Section(title, blocks, anchor=f"{of.analysis.name}-{anchor}" if deeper else anchor)
 
     tables = (_values(of, one) for one in of.quantities)
-    yield section("Result", "result", Verdict(verdict(of)), *_marks(of), *tables, _groups(of))
+    agree = [Paragraph(text)] if (text := agreement(of)) else []
+    yield section("Result", "result", Verdict(verdict(of)), *_marks(of), *tables, *agree, _groups(of))
     if of.quantities and len(of.groups) > 1:
         yield section("Figure", "figure", _picture(of))
     if any(group.source.note for group in of.groups):
