@@ -5,17 +5,15 @@ from __future__ import annotations
 import contextlib
 import glob
 import json
-import math
 import re
 import subprocess
 import sys
 import threading
 from typing import TYPE_CHECKING, Any
 
-from analysis.uncertainty import Estimate
+from levilab.errors import unquote
 from levilab.files import stamp
 from levilab.pipelines.result import RESULT, beside
-from levilab.present.numbers import with_uncertainty
 from levilab.texts.text import Text, text_from
 
 if TYPE_CHECKING:
@@ -167,11 +165,12 @@ def _result(path: Path) -> dict[str, Any]:
     if not isinstance(found, dict):
         return {}
     doubts = _texts(found.get("doubts"))
+    said = {unquote(text) for text in doubts}
     return {
         "analysis": str(found.get("analysis", ""))[:40],
-        "verdict": _texts(found.get("sentences") or [found.get("text")]) or _values(found.get("values")),
+        "verdict": _texts(found.get("sentences") or [found.get("text")]),
         "doubts": doubts,
-        "warnings": [text for text in _texts(found.get("warnings")) if text not in doubts],
+        "warnings": [text for text in _texts(found.get("warnings")) if text not in said],
     }
 
 
@@ -180,18 +179,3 @@ def _texts(found: Any) -> list[str]:
     found = found[:_MOST_TEXTS] if isinstance(found, list) else []
     texts = [text_from(one) if isinstance(one, dict) else one for one in found]
     return [text for text in texts if isinstance(text, str) and 0 < len(text) <= _LONGEST_TEXT]
-
-
-def _values(values: Any) -> list[str]:
-    """Return the values that have an uncertainty as one line, for a result without a verdict."""
-    found = [
-        f"{name.replace('_', ' ')} {with_uncertainty(Estimate(one['value'], one['u'], str(one.get('unit', ''))))}"
-        for name, one in (values.items() if isinstance(values, dict) else ())
-        if isinstance(one, dict) and _is_number(one.get("value")) and _is_number(one.get("u")) and one["u"] > 0
-    ]
-    return [", ".join(found)[:_LONGEST_TEXT]] if found else []
-
-
-def _is_number(value: Any) -> bool:
-    """Return whether it is a number as an analysis writes it; a person may have changed the file."""
-    return isinstance(value, float) and math.isfinite(value)

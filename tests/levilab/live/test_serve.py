@@ -79,14 +79,15 @@ def test_ctrl_c_says_at_once_what_the_end_waits_for(tmp_path: Path, monkeypatch:
     )
 
 
-def test_a_result_without_a_verdict_is_said_by_its_values(tmp_path: Path) -> None:
-    frequency, bound = ({"value": -29.44559, "u": u, "unit": "Hz"} for u in (5e-4, None))
-    wrong = {"frequency": {"value": 1.0, "u": -1.0}, "other": {"value": 10**400, "u": 1.0}, "last": {"value": 1.0}}
-    for values, said in (
-        ({"frequency": frequency, "bound": bound}, ["frequency −29.4456(5) Hz"]), ([1], []), ({}, []), (wrong, []),
+def test_what_is_damaged_of_a_result_is_not_shown(tmp_path: Path) -> None:
+    value = {"template": "C = {value:n}.", "values": {"value": "2.34(1)"}}
+    for result, said in (
+        ({"sentences": [value, 3, {"template": "{other}", "values": {}}, {}, None]}, ["C = 2.34(1)."]),
+        ({"text": "as earlier versions"}, ["as earlier versions"]), ({"sentences": {}, "doubts": 1}, []), ({}, []),
     ):  # fmt: skip
-        (tmp_path / "result.json").write_text(json.dumps({"runs": [{}], "values": values}), encoding="utf-8")
-        assert Analyses().about(tmp_path)["verdict"] == said
+        (tmp_path / "result.json").write_text(json.dumps(result), encoding="utf-8")
+        about = Analyses().about(tmp_path)
+        assert (about["verdict"], about["doubts"]) == (said, [])
 
 
 @pytest.fixture
