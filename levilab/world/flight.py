@@ -227,6 +227,17 @@ class Flight:
             return float(self._samples_of(piece).lift.mean())
         return self._scene.start.position_m[2]
 
+    def spin_of_fall(self, time: float) -> float | None:
+        """Return the mean spin in a second that ended less than a second before the top fell [Hz].
+
+        Later it tumbles, and its tape turns otherwise.  None: a top is up, or it fell within a second.
+        """
+        self.simulate_until(time)
+        piece = self._pieces.at(time)
+        if not isinstance(piece, _Absent) or piece.state is None:
+            return None
+        return float(self.tape(np.array([piece.start - PIECE_S]))[1][0]) or None
+
     def passages(self, place: Callable[[float], float], start: float, stop: float) -> Array:
         """Return when the tape passes a place in its turn, increasing, shape (n,) [s].
 

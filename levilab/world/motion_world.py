@@ -235,6 +235,10 @@ class MotionWorld:
         times = start + step * np.arange(n, dtype=np.float64)
         return poses_of(*self._flight.attitude(times), start=start, step=step)
 
+    def spin_of_fall(self) -> float | None:
+        """Return the spin just before the fall of the top that has fallen [Hz]; see `Flight.spin_of_fall`."""
+        return self._flight.spin_of_fall(self.clock.now())
+
     def magnetic_field(self, times: Array, place: Array) -> Array:
         """Return the field of base and top, as the top moves; see World."""
         position, axis, arm, up = self._flight.attitude(times)

@@ -52,7 +52,7 @@ def cause_of_fall(
 
     Args:
         scene: as it was when it fell.
-        spin_hz: that was counted last [Hz]; None: none was.
+        spin_hz: with which it fell [Hz]; None: it was never counted.
         after_s: time since it was put there [s]; None: the run that is recorded says when it fell.
         driven: whether a drive held it.
         hides: whether the masses that float are to be found.

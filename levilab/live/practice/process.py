@@ -213,7 +213,9 @@ class PracticeProcess:
             return
         hides, driven = bool(self.tasks.name), self.drive.lose()
         seen = None if runs else after  # the run says in its own words when that was
-        why = cause_of_fall(self.top.scene, self.top.spin_hz, seen, driven=driven, hides=hides)
+        # of a top that swings too far the counter misses pulses
+        spin = None if self.top.spin_hz is None else self.top.world.spin_of_fall()
+        why = cause_of_fall(self.top.scene, spin, seen, driven=driven, hides=hides)
         if runs:
             self._fell = why
         else:

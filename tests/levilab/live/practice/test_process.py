@@ -377,6 +377,21 @@ def test_the_tilt_of_the_moment_is_why_this_top_falls_before_an_upright_one(tilt
     assert bool(poses(6.0, 0.1, 1).up[0]) is stands
 
 
+def test_a_fall_has_the_spin_before_it_though_a_top_that_tumbles_shows_the_counter_other_pulses() -> None:
+    scene = read_scene("practice")
+    world = scene_world(scene, VirtualClock, lambda _: None)
+    world.float_top(1)
+    world.clock.sleep(3.0)
+    assert world.spin_of_fall() is None
+    world.change_scene({"top.mass_kg": 0.03})
+    world.clock.sleep(3.0)
+    spin = world.spin_of_fall()
+    assert spin == pytest.approx(29.8, abs=0.2)  # from 30 Hz drag takes 0.07 Hz a second
+    assert cause_of_fall(scene, spin, 3.0).startswith("the spin could hold it")
+    world.float_top(2)
+    assert world.spin_of_fall() is None
+
+
 def test_each_group_has_a_top_of_its_own_with_its_truth(tmp_path: Path) -> None:
     """As on the bench of `levilab acquire --mock`; what floats does so over each base, and no group sees another's."""
     short = ("spin.drive_frequency_hz=31", "spin.hold_s=2", "spin.interval_s=2", "spin.gate_s=0.5", "spin.longest_s=8")
