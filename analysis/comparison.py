@@ -1,8 +1,8 @@
-"""Values of one quantity by several groups: their mean, whether they agree, how far each lies off.
+"""Values of one quantity by several groups: whether they agree, and how far each lies off.
 
 Each group has a top of its own: value = mean + difference of its top + error, the differences normal with a standard
 deviation τ that the values tell themselves (R. C. Paule & J. Mandel, J. Res. NBS 87, 377 (1982)).  Where the values
-agree within their u, τ is zero, and the mean is the usual one.
+agree within their u, τ is zero.
 """
 
 from __future__ import annotations
@@ -22,19 +22,15 @@ class Comparison:
     """What several values with standard uncertainties say together.
 
     Attributes:
-        mean: weighted by 1/(u² + τ²).
-        u: of the mean, with τ.
         between: τ, the standard deviation of the groups beyond their u.
         chi_square: Σ((value − mean)/u)² about the mean weighted by 1/u².
         freedom: its degrees of freedom.
         p: the probability that chance makes it so large.
         scatter: standard deviation of the values, unweighted; None of one value.
-        distances: from each value to the mean of the others, in units of the u of that difference, with the τ of
-            the others; None of one value.
+        distances: from each value to the mean of the others, weighted by 1/(u² + τ²), in units of the u of that
+            difference, with the τ of the others; None of one value.
     """
 
-    mean: float
-    u: float
     between: float
     chi_square: float
     freedom: int
@@ -55,15 +51,10 @@ def compare(values: ArrayLike, u: ArrayLike) -> Comparison:
     x: NDArray[np.float64] = np.asarray(values, float)
     of_x: NDArray[np.float64] = np.asarray(u, float)
     chi_square, freedom = _about_mean(x, of_x)[2], len(x) - 1
-    between = _between(x, of_x)
-    total = np.hypot(of_x, between)
-    mean, of_mean, _ = _about_mean(x, total)
     if not freedom:
-        return Comparison(mean, of_mean, 0.0, chi_square, 0, 1.0, None, (None,))
+        return Comparison(0.0, chi_square, 0, 1.0, None, (None,))
     return Comparison(
-        mean,
-        of_mean,
-        between,
+        _between(x, of_x),
         chi_square,
         freedom,
         float(chdtrc(freedom, chi_square)),

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
+import statistics
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from analysis.comparison import Comparison, compare
 from analysis.numbers import digits, how_many
+from analysis.spindown.combine import mean
 from analysis.spindown.drag import LAWS
 from analysis.uncertainty import Estimate
 from levilab.crosscheck.truth import Truth, truth_of
@@ -60,7 +64,8 @@ class Compared:
         unit: of results.
         estimates: of each group; None where it has no value with u.
         truths: of each group; None where it is not known.
-        together: of those that are used; None where there are none.
+        mean: of those that are used, by the rule of several runs in a report; None where there are none.
+        together: whether those agree; None where there are none.
         used: whether a group has a value that is neither doubtful nor far from its truth, or no group has.
         widths: by which u of each group grows in comparisons, as it is known from few repetitions alone.
     """
@@ -70,6 +75,7 @@ class Compared:
     unit: str
     estimates: tuple[Estimate | None, ...]
     truths: tuple[float | None, ...]
+    mean: Estimate | None
     together: Comparison | None
     used: tuple[bool, ...]
     widths: tuple[float, ...]
@@ -93,10 +99,10 @@ class Compared:
     def truth(self) -> tuple[float, float] | None:
         """The mean of the truths, and the distance of the class's mean from it in u; None where one is not known."""
         known = [truth for use, truth in zip(self.used, self.truths, strict=True) if use]
-        if self.together is None or None in known:
+        if self.mean is None or None in known:
             return None
-        mean = sum(known) / len(known)  # type: ignore[arg-type]
-        return mean, (self.together.mean - mean) / self.together.u
+        truth = sum(known) / len(known)  # type: ignore[arg-type]
+        return truth, (self.mean.value - truth) / self.mean.u  # type: ignore[operator]
 
     @property
     def from_class(self) -> tuple[float | None, ...]:
@@ -215,6 +221,7 @@ def _quantity(
         tuple(Estimate(one["value"], one["u"], one["unit"]) if one else None for one in good),
         tuple(truth.values.get(name) if truth.model in {"", model} else None for truth in truths),
         None,
+        None,
         tuple(one is not None for one in good),
         widths,
     )
@@ -222,10 +229,14 @@ def _quantity(
     used = tuple(bool(one) and not (doubt or off) for one, doubt, off in zip(good, doubts, far, strict=True))
     used = used if any(used) else of.used
     known = [
-        (one["value"], one["u"] * width) for one, width, use in zip(good, widths, used, strict=True) if one and use
+        Estimate(one["value"], one["u"] * width, of.unit)
+        for one, width, use in zip(good, widths, used, strict=True)
+        if one and use
     ]
-    together = compare([value for value, _ in known], [u for _, u in known]) if known else None
-    return replace(of, used=used, together=together)
+    if not known:
+        return replace(of, used=used)
+    together = compare(*np.array([(one.value, one.u) for one in known], float).T)
+    return replace(of, used=used, mean=mean(known), together=together)
 
 
 def _width(freedom: float | None) -> float:
@@ -246,10 +257,12 @@ class Mark:
     Attributes:
         word: GOOD; LOOK: there is something to know about it; REPEAT: its result is wrong or missing.
         why: the reasons, the worst first.
+        notes: remarks on readings too few for an analysis, of which the reason is enough.
     """
 
     word: str
     why: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
 
 def marks(of: Class) -> tuple[Mark, ...]:
@@ -268,8 +281,23 @@ def _mark(of: Class, k: int) -> Mark:
         elif truth is None and others is not None and abs(others) > FAR:
             odd.append(f"{one.symbol}: {with_sign(others, 1)} u from the others")
     wrong += group.doubts
-    odd += [text for text in group.warnings if text not in group.doubts]
+    remarks = tuple(text for text in group.warnings if text not in group.doubts)
+    if few := _few_readings(of, k):
+        return Mark(REPEAT if wrong else LOOK, (few, *wrong, *odd), remarks)
+    odd += remarks
     return Mark(REPEAT if wrong else LOOK if odd else GOOD, (*wrong, *odd))
+
+
+def _few_readings(of: Class, k: int) -> str:
+    """Return that a group has less than half as many readings as the others have; else an empty text."""
+    counts = [count_readings(group) for group in of.groups]
+    usual = statistics.median(counts[:k] + counts[k + 1 :] or [0])
+    return f"{how_many(counts[k], 'reading')} instead of {usual:.0f}: measure longer" if counts[k] < usual / 2 else ""
+
+
+def count_readings(group: Group) -> int:
+    """Return how many readings the fit used, or, without one, how many there are."""
+    return int(group.statistics.get("n") or len(group.source.readings))
 
 
 def _count_marks(of: Class) -> str:
@@ -315,8 +343,16 @@ def agreement(of: Class) -> str:
     """Return how far the groups agree, quantity by quantity, and how well they met the truth; empty for one group."""
     if len(of.groups) == 1:
         return ""
-    texts = [f"{one.symbol}: {_chi_square(one)}." for one in of.quantities]
+    texts = [f"{one.symbol}: {_agreement(one)}." for one in of.quantities]
     return "  ".join([*texts, *([_truth(of)] if of.knows_truth else [])])
+
+
+def statistics_of_agreement(of: Class) -> str:
+    """Return the statistics behind the agreement; empty where no groups were compared."""
+    compared = [(one, one.together) for one in of.quantities if one.together and one.together.freedom]
+    rule = "The mean is unweighted, as in levilab report; its u comes from the standard deviation of the values."
+    meaning = [rule] if compared else []
+    return "  ".join([*meaning, *(_chi_square(one, together) for one, together in compared)])
 
 
 def _scenes(of: Class) -> list[str]:
@@ -330,11 +366,8 @@ def _scenes(of: Class) -> list[str]:
 
 
 def _mean(of: Compared) -> str:
-    together = of.together
-    if together is None:
-        return of.symbol
-    factor = unit(of.unit).shown.factor
-    return f"{of.symbol} = {with_uncertainty(Estimate(together.mean * factor, together.u * factor, of.shown_unit))}"
+    shown = of.show(of.mean.value, of.mean.u) if of.mean else None
+    return f"{of.symbol} = {with_uncertainty(shown)}" if shown else of.symbol
 
 
 def _count(of: Class, one: Compared) -> str:
@@ -348,31 +381,24 @@ def _count(of: Class, one: Compared) -> str:
 def _agreement(of: Compared) -> str:
     together = of.together
     if together is None or together.scatter is None:
-        return "there is nothing to compare it with"
-    return "the groups differ by more than their u" if together.p < DIFFER else "the groups agree within their u"
-
-
-def _chi_square(of: Compared) -> str:
-    together = of.together
-    if together is None or together.scatter is None:
         return "there is no other group to compare it with"
-    p = "p < 10⁻⁶" if together.p < 1e-6 else f"p = {plain(together.p, 2)}"
-    freedom = f"{how_many(together.freedom, 'degree')} of freedom"
-    scatter, how = _scatter(of, together), f"χ² = {plain(together.chi_square)} for {freedom}, {p}"
     if together.p < DIFFER:
-        return (
-            f"the groups differ by more than their u, by {scatter} (standard deviation), as different tops do; that is "
-            f"in u of the mean and in each distance from it ({how}){_known_to(together.freedom)}"
-        )
-    return f"the groups agree within their u; their standard deviation is {scatter} ({how})"
+        return f"the groups differ by {_scatter(of, together)}, more than their u, as different tops do"
+    return f"the groups agree within their u: they differ by {_scatter(of, together)}"
 
 
 def _scatter(of: Compared, together: Comparison) -> str:
-    """Return the standard deviation of the groups: in per cent of the mean, unless that is near zero."""
-    scatter = together.scatter or 0.0
-    if scatter < abs(together.mean):
-        return f"{digits(100 * scatter / abs(together.mean), 2)} %"
+    """Return by how much the groups differ: in per cent of the mean, unless that is near zero."""
+    scatter, average = together.scatter or 0.0, abs(of.mean.value or 0.0) if of.mean else 0.0
+    if scatter < average:
+        return f"{digits(100 * scatter / average, 2)} %"
     return f"{digits(scatter * unit(of.unit).shown.factor, 2)} {of.shown_unit}".rstrip()
+
+
+def _chi_square(one: Compared, together: Comparison) -> str:
+    p = "p < 10⁻⁶" if together.p < 1e-6 else f"p = {plain(together.p, 2)}"
+    freedom = f"{how_many(together.freedom, 'degree')} of freedom"
+    return f"{one.symbol}: χ² = {plain(together.chi_square)} for {freedom}, {p}{_known_to(together.freedom)}."
 
 
 def _known_to(freedom: int) -> str:
@@ -382,7 +408,7 @@ def _known_to(freedom: int) -> str:
     if freedom >= _FEW:
         return ""
     known, factor = 100 / math.sqrt(2 * freedom), float(stdtrit(freedom, 0.5 + 0.6827 / 2))
-    return f"; {freedom + 1} groups give their scatter to {known:.0f} % only: a 68 % interval is {digits(factor, 2)} u"
+    return f"; {freedom + 1} values give their scatter to {known:.0f} % only: a 68 % interval is {digits(factor, 2)} u"
 
 
 def _truth(of: Class) -> str:

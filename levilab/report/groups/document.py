@@ -27,7 +27,19 @@ from levilab.present.document.blocks import (
 from levilab.present.numbers import column, enumeration, plain, with_sign, without_unit
 from levilab.present.tables import Row, table
 from levilab.report.document import banner_of, count_inputs
-from levilab.report.groups.beside import FAR, GOOD, LOOK, REPEAT, agreement, class_of, finding, marks, verdict
+from levilab.report.groups.beside import (
+    FAR,
+    GOOD,
+    LOOK,
+    REPEAT,
+    agreement,
+    class_of,
+    count_readings,
+    finding,
+    marks,
+    statistics_of_agreement,
+    verdict,
+)
 from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, writing_report
 from levilab.report.reproduction import Heading
@@ -84,10 +96,14 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
         return Section(title, blocks, anchor=f"{of.analysis.name}-{anchor}" if deeper else anchor)
 
     tables = (_values(of, one) for one in of.quantities)
-    agree = [Paragraph(text)] if (text := agreement(of)) else []
+    agree: list[Block] = [Paragraph(text)] if (text := agreement(of)) else []
+    agree += [Note(text)] if (text := statistics_of_agreement(of)) else []
     yield section("Result", "result", Verdict(verdict(of)), *_marks(of), *tables, *agree, _groups(of))
     if of.quantities and len(of.groups) > 1:
         yield section("Figure", "figure", _picture(of))
+    pairs = zip(of.groups, marks(of), strict=True)
+    if remarks := tuple(Fact(group.source.name, one.notes) for group, one in pairs if one.notes):
+        yield section("Remarks of the analysis", "remarks", Facts(remarks))
     if any(group.source.note for group in of.groups):
         notes = tuple(Fact(group.source.name, (group.source.note,)) for group in of.groups if group.source.note)
         yield section("Notes of the groups", "notes", Facts(notes))
@@ -112,8 +128,7 @@ def _marks(of: Class) -> Iterator[Tabular]:
 def _values(of: Class, quantity: Compared) -> Tabular:
     """Return a row for each group: its value, how far it lies from the others, and from the truth."""
     estimates = [quantity.show(one.value, one.u) if one else None for one in quantity.estimates]
-    together = quantity.together
-    mean = quantity.show(together.mean, together.u) if together else None
+    mean = quantity.show(quantity.mean.value, quantity.mean.u) if quantity.mean else None
     columns = [column([*estimates, mean]), [*map(_distance, quantity.from_class), ""]]
     heads = ["group", quantity.head, _FROM_CLASS]
     if of.knows_truth:
@@ -153,7 +168,7 @@ def _groups(of: Class) -> Tabular:
         (
             group.source.name,
             str(group.source.run.record.seed) if group.source.run and group.source.run.record.seed is not None else "",
-            str(group.statistics.get("n") or len(group.source.readings)),
+            str(count_readings(group)),
             plain(group.statistics.get("rms_residual")),
             plain(group.statistics.get("reduced_chi_square"), 2),
             group.best_model,

@@ -64,12 +64,13 @@ def _label(group: Group) -> str:
 
 
 def _draw_values(axes: Axes, of: Compared) -> None:
-    factor, together = unit(of.unit).shown.factor, of.together
+    factor = unit(of.unit).shown.factor
     power = _power(of)
     scale = factor / 10.0**power
-    if together:
-        axes.axvspan((together.mean - together.u) * scale, (together.mean + together.u) * scale, color=BLUE, alpha=0.2)
-        axes.axvline(together.mean * scale, color=BLUE, linewidth=1)
+    if of.mean and of.mean.value is not None and of.mean.u is not None:
+        mean, u = of.mean.value * scale, of.mean.u * scale
+        axes.axvspan(mean - u, mean + u, color=BLUE, alpha=0.2)
+        axes.axvline(mean, color=BLUE, linewidth=1)
     for k, (one, truth) in enumerate(zip(of.estimates, of.truths, strict=True)):
         if truth is not None:
             axes.plot(truth * scale, k, marker="D", markersize=5, color=VERMILION, markerfacecolor="none")

@@ -113,12 +113,12 @@ def _groups(of: Class) -> tuple[list[str], list[list[Cell]]]:
 
 def _means(of: Class) -> tuple[list[str], list[list[Cell]]]:
     """Return a row for each quantity of the whole class."""
-    heads = ["quantity", "unit", "weighted_mean", "u", "scatter", "groups", "chi_square", "degrees_of_freedom", "p"]
+    heads = ["quantity", "unit", "mean", "u", "scatter", "groups", "chi_square", "degrees_of_freedom", "p"]
     heads += ["mean_of_truths", "from_the_truth_in_u"]
     rows: list[list[Cell]] = []
     for one in of.quantities:
-        if (found := one.together) is not None:
-            mean = [found.mean, found.u, found.scatter, found.freedom + 1]
+        if (found := one.together) is not None and one.mean is not None:
+            mean = [one.mean.value, one.mean.u, found.scatter, found.freedom + 1]
             rows.append([one.name, one.unit, *mean, found.chi_square, found.freedom, found.p, *(one.truth or ())])
     return heads, rows
 

@@ -56,6 +56,12 @@ def test_each_group_is_beside_the_truth_of_its_seed(of_three):
     assert all(0 < group.statistics["rms_residual"] < 0.06 for group in of.groups)  # u of a reading is 0.03 Hz
 
 
+def test_the_mean_of_a_class_is_that_of_its_report(of_three):
+    of = compared(of_three)
+    mean, reported = of.quantities[0].mean, of.found.combined.fit("disc").constants["c32"]
+    assert (mean.value, mean.u) == pytest.approx((reported.value, reported.u), rel=1e-12)
+
+
 def test_twenty_groups_lie_within_two_u_of_their_truths(tmp_path):
     (c32,) = compared(measured(tmp_path, [f"Group {k}" for k in range(1, 21)])).quantities
     assert sum(abs(one) <= 2 for one in c32.from_truth) >= 17  # 19 are expected; fewer than 17 in one of 77 classes
@@ -111,8 +117,8 @@ def test_a_value_without_a_finite_u_is_not_compared(value, u):
     parts = [{"values": {"mean": {"value": one, "u": of, "unit": "Hz"}}} for one, of in [(1.0, 0.1), (value, u)]]
     quantity = _quantity("mean", ANALYSES["limit"], "", parts, [Truth(), Truth()], doubts=[False, False])
     assert [one is None for one in quantity.estimates] == [False, True]
-    assert quantity.together
-    assert quantity.together.mean == 1.0
+    assert quantity.mean
+    assert quantity.mean.value == 1.0
 
 
 @pytest.mark.parametrize(("experiment", "names"), [("field", ["strength", "origin", "thickness"]), ("limit", ["mean"])])
@@ -158,10 +164,22 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
     }  # fmt: skip
     assert verdict(of).startswith("2 of 3 results are good. To repeat: Group 2.")
     assert of.quantities[0].used == tuple(group.source.name != "Group 2" for group in of.groups)
-    assert of.quantities[0].together.mean == pytest.approx(2.4e-4, rel=0.03)  # the halved spins have 3.3e-4
+    assert of.quantities[0].mean.value == pytest.approx(2.4e-4, rel=0.03)  # the halved spins have 3.3e-4
     page = Page(write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")).text
     assert re.search(r"skipped \S*Group 4.csv, line 3: 'abc'", page)
     assert re.search(r"Group 2 repeat C₃/₂: \+\d+\.\d u from its truth", page)
+
+
+def test_a_run_of_few_readings_is_named_before_what_the_analysis_says(of_three, tmp_path):
+    root = with_changes(of_three, tmp_path, "", {})
+    (short,) = (folder for folder in root.glob("2*") if '"group": "Group 2"' in (folder / RECORD).read_text("utf-8"))
+    lines = (short / "readings.csv").read_text(encoding="utf-8").splitlines()
+    (short / "readings.csv").write_text("\n".join([*lines[:6], ""]), encoding="utf-8")
+    of = compared(root)
+    mark = marks(of)[[group.source.name for group in of.groups].index("Group 2")]
+    assert re.fullmatch(r"5 readings instead of \d\d: measure longer", mark.why[0])
+    assert not any("AICc" in text for text in mark.why)
+    assert any("AICc" in text for text in mark.notes)
 
 
 def test_groups_of_few_tops_differ_by_chance_as_often_as_p_says():
