@@ -370,15 +370,16 @@ _LETTERS_OF_NOTE = 20
 
 
 def _name_for_people(source: Source[R], name: str, sources: Sequence[Source[R]]) -> str:
-    """Return the group of a run with the beginning of its note, and the run's name if it is not the group's only one.
+    """Return the group of a run; if the group has several, the run's name and the beginning of its note behind it.
 
     A run of no group keeps its name.
     """
     if not source.group:
         return name
-    alone = sum(other.group == source.group for other in sources) == 1
+    if sum(other.group == source.group for other in sources) == 1:
+        return source.group
     note = source.note if len(source.note) <= _LETTERS_OF_NOTE else f"{source.note[: _LETTERS_OF_NOTE - 1]}…"
-    return f"{source.group}{'' if alone else f', {short_name(name)}'}{f' ({note})' if note else ''}"
+    return f"{source.group}, {short_name(name)}{f' ({note})' if note else ''}"
 
 
 def _by_group(sources: Sequence[Source[R]]) -> Sequence[Source[R]]:

@@ -50,7 +50,7 @@ def test_runs_have_the_names_of_their_groups_in_a_persons_order(of_class):
 
 @pytest.mark.parametrize(("others", "shown"), [([], "Group 2"), (["Group 3"], "Group 2"), (["Group 2"], "Group 2, x")])
 def test_a_groups_only_run_needs_no_other_name(tmp_path, others, shown):
-    make(tmp_path / "x", 1, group="Group 2")
+    make(tmp_path / "x", 1, note="hurried", group="Group 2")
     for k, group in enumerate(others):
         make(tmp_path / f"y{k}", 2 + k, group=group)
     assert analyzed(tmp_path).sources[0].name == shown
