@@ -48,7 +48,9 @@ def test_runs_have_the_names_of_their_groups_in_a_persons_order(of_class):
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("others", "shown"), [([], "Group 2"), (["Group 3"], "Group 2"), (["Group 2"], "Group 2, x")])
+@pytest.mark.parametrize(
+    ("others", "shown"), [([], "Group 2"), (["Group 3"], "Group 2"), (["Group 2"], "Group 2, x (hurried)")]
+)
 def test_a_groups_only_run_needs_no_other_name(tmp_path, others, shown):
     make(tmp_path / "x", 1, note="hurried", group="Group 2")
     for k, group in enumerate(others):
