@@ -58,7 +58,9 @@ function take(head) {
     data.records.clear();
     dirty.trace = true;
   }
+  const drove = data.bench ? Boolean(data.bench.drive?.output) : null;
   data.bench = head.bench;
+  if (drove === false && head.bench?.drive?.output) lookAtBench();
   let follows = false;
   for (const one of head.said) {
     seen.said = one.n;
@@ -93,6 +95,7 @@ function turnTo(run) {
   put(by("events-key"), {hidden: true});
   if (by("drawn").value === "minutes") by("drawn").value = "all";
   pointed = -1;
+  space?.endReplay?.();  // the fall was before this run
   dirty = {plot: true, trace: true};
   if (by("run").value !== run && run) listRuns(run);
 }
@@ -163,7 +166,10 @@ function takePoses(pieces) {
     const before = data.up;
     data.up = last === up.length - 1;
     if (before && !data.up) markFall();
-    else if (!before && data.up) forgetFall();
+    else if (!before && data.up) {
+      forgetFall();
+      if (before === false) lookAtBench();
+    }
     if (last >= 0) data.lastUp = piece.start_s + last * piece.step_s;
     space.add(piece.start_s, piece.step_s, piece.position, piece.quaternion, up);
   }
@@ -176,6 +182,13 @@ function markFall() {
   const spin = history.counts.at(-1)?.[1];
   history.mark(data.lastUp, spin ? phrase("fell at {spin} Hz", {spin: fixed(spin, 1)}) : phrase("fell"));
   dirty.plot = true;
+}
+
+/** After a run that is over, a person puts the top back or switches the drive on: the last minutes show what it does. */
+function lookAtBench() {
+  if (!practice || data.bench?.busy || data.about?.status === "running") return;
+  by("drawn").value = "minutes";
+  by("drawn").dispatchEvent(new Event("change"));
 }
 
 /** Another top floats: what is kept of a fall is not of it. */
@@ -220,7 +233,7 @@ function stateOf() {
   const quiet = !practice || practice.ended || (bench?.folder && !bench.busy) ? "silent" : "slow";
   if (about?.status === "running" && bench?.silent) return quiet;
   if (practice && (!bench || !isReady)) return practice.ended ? "silent" : "setup";
-  if (practice && !bench.busy && (!about || about.status === "missing")) return bench.silent ? quiet : "idle";
+  if (practice && !bench.busy && (!about || about.status === "missing" || isOfMinutes())) return bench.silent ? quiet : "idle";
   return about ? about.status : "none";
 }
 
@@ -238,10 +251,10 @@ function show() {
   const down = Boolean(practice) && data.up === false && Boolean(bench) && !bench.silent && !bench.folder;
   const does = bench?.silent ? "" : bench?.text || (down ? phrase("the top is down") : "");
   write("top-said", practice ? does : "");
-  write("state-text", lost || LONGER[state] || about?.problem || ended(about) || (!practice && about?.status === "running" && does) || "");
+  write("state-text", lost || LONGER[state] || about?.problem || (state === about?.status && ended(about)) || (!practice && about?.status === "running" && does) || "");
   put(by("state-text"), {title: by("state-text").textContent});
   put(by("synthetic"), {hidden: !(about?.synthetic || (!about && bench?.virtual))});
-  const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : last.time_s;
+  const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : state === "idle" ? NaN : last.time_s;
   write("elapsed", Number.isFinite(elapsed) ? lapse(elapsed) : "");
   const left = leftOf(about, bench, elapsed);
   const isPaced = practice && bench?.speed !== 1;

@@ -155,7 +155,9 @@ export async function openSpace(canvas, description) {
   return {
     add, keepFall, replay,
     /** Go on with what is now. */
-    endReplay: () => { film = live; },
+    endReplay: () => {
+      if (film !== live) [film, playhead] = [live, live.times.at(-1)];
+    },
     get replays() { return film === fall && fall !== null; },
     get parts() { return parts; },
     setParts: (described) => {

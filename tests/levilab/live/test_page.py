@@ -372,6 +372,12 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(
         page.click("#png")
     assert saved.value.path().read_bytes().startswith(b"\x89PNG")
     assert page.evaluate("levilab.space.replays")
+    later = GrowingRun(tmp_path, "20261122T110000Z-spin-0000")
+    watch.turn_to(later.folder)
+    until(page, f"levilab.seen.run === '{later.folder.name}'")
+    assert not page.evaluate("levilab.space.replays")
+    page.click("#replay")
+    assert page.evaluate("levilab.space.replays")
     publish(watch, Poses(3.0, 1 / 400, position[:300], upright[:300], up[:300]))  # another top floats
     until(page, "levilab.data.up")
     assert not page.evaluate("levilab.space.replays")

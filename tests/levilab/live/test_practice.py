@@ -304,6 +304,30 @@ def test_a_task_opens_the_control_that_it_needs_and_leads_to_the_next(starting: 
     assert page.inner_text("#tasks-done") == "2/5"
 
 
+def test_after_a_run_the_last_minutes_show_what_a_person_does(starting: Hall, page: Page, tmp_path: Path) -> None:
+    run = GrowingRun(tmp_path, OLDER)
+    run.readings(spin_down(19))
+    page.goto(address(starting, token=True))
+    until(page, "levilab.frames > 0")
+    page.select_option("#run", OLDER)
+    until(page, "levilab.data.count === 19")
+    watch = starting.watches[OLDER]
+    off = State(2.0, last={"spin_frequency_hz": 30.0}, drive=Drive("SQU", 30.0, 10.0))
+    publish(watch, off)
+    until(page, "document.body.dataset.state === 'finished' && levilab.data.bench")
+    assert page.inner_text("#readings-title") == "Readings"
+    is_of_minutes = "document.getElementById('readings-title').textContent === 'The last minutes'"
+    publish(watch, replace(off, time_s=3.0, drive=Drive("SQU", 30.0, 10.0, output=True)))
+    until(page, f"{is_of_minutes} && document.body.dataset.state === 'idle'")
+    page.select_option("#drawn", "all")  # the run is still there
+    until(page, f"!({is_of_minutes}) && document.body.dataset.state === 'finished'")
+    down = Poses(3.0, 1 / 400, np.full((1, 3), 0.01), np.array([[0.0, 0.0, 0.0, 1.0]]), np.zeros(1, dtype=bool))
+    publish(watch, down)
+    until(page, "levilab.data.up === false")
+    publish(watch, replace(down, start_s=4.0, up=np.ones(1, dtype=bool)))
+    until(page, f"{is_of_minutes} && document.body.dataset.state === 'idle'")
+
+
 #: Whether the panel of each tab is seen whole, without a scroll of the page or of its part.
 SEEN_WHOLE = """() => [...document.querySelectorAll('[role=tab]')].map((tab) => {
   tab.click();
