@@ -321,6 +321,9 @@ def test_after_a_run_the_last_minutes_show_what_a_person_does(starting: Hall, pa
     until(page, f"{is_of_minutes} && document.body.dataset.state === 'idle'")
     page.select_option("#drawn", "all")  # the run is still there
     until(page, f"!({is_of_minutes}) && document.body.dataset.state === 'finished'")
+    page.set_viewport_size({"width": 1366, "height": 650})  # a laptop: the plot is as high as its two parts need
+    assert page.evaluate("document.getElementById('plot').clientHeight") >= 200
+    assert page.evaluate("document.documentElement.scrollHeight") <= 700
     down = Poses(3.0, 1 / 400, np.full((1, 3), 0.01), np.array([[0.0, 0.0, 0.0, 1.0]]), np.zeros(1, dtype=bool))
     publish(watch, down)
     until(page, "levilab.data.up === false")
