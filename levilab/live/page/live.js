@@ -166,10 +166,7 @@ function takePoses(pieces) {
     const before = data.up;
     data.up = last === up.length - 1;
     if (before && !data.up) markFall();
-    else if (!before && data.up) {
-      forgetFall();
-      if (before === false) lookAtBench();
-    }
+    else if (!before && data.up) forgetFall();
     if (last >= 0) data.lastUp = piece.start_s + last * piece.step_s;
     space.add(piece.start_s, piece.step_s, piece.position, piece.quaternion, up);
   }
@@ -629,13 +626,20 @@ async function begin() {
   document.body.classList.add("no-top");
   if (bench) {
     document.body.classList.remove("no-top");
-    practice = bench.guest ? watchPractice() : openPractice(bench, (wanted) => paused && wanted.do !== "analyze" ? PAUSED : command(wanted, token), () => seen.run, isOwn, Boolean(token));
+    practice = bench.guest ? watchPractice() : openPractice(bench, give, () => seen.run, isOwn, Boolean(token));
   }
   for (const row of document.querySelectorAll(".practice-key")) row.hidden = !bench || bench.guest;
   wanted = bench ? "" : asked || first;
   if (wanted) by("run").value = wanted;
   open(wanted);
   if (!wanted && !bench) waitForRun();
+}
+
+/** Give a command to the bench for practice. */
+function give(wanted) {
+  if (paused && wanted.do !== "analyze") return PAUSED;
+  if (wanted.do === "put the top back") lookAtBench();  // the bench itself puts it back after some runs, whose readings stay
+  return command(wanted, token);
 }
 
 /** While there is no run: look for one every two seconds. */

@@ -290,11 +290,16 @@ export function openPractice(about, command, run, isOwn, allowed) {
     return now.learned ? "" : needs[items[last + 1].dataset.step];
   }
 
+  /** Open the result of a run: the one that was asked for last, under way or over, or a new one. */
   async function openResult(name) {
     if (!name) return;
     by("result").showModal();
-    await showResult(
-      () => command({do: "analyze", run: name}), `run/${encodeURIComponent(name)}`, () => by("result").open, () => { now.analyzed = name; });
+    if (now.asked === name) return;
+    now.asked = name;
+    const is = () => now.asked === name;
+    const isThere = await showResult(
+      () => command({do: "analyze", run: name}), `run/${encodeURIComponent(name)}`, is, () => { now.analyzed = name; });
+    if (is() && !isThere) now.asked = "";
   }
 
   return {

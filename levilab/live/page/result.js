@@ -16,6 +16,7 @@ const STEPS = {analyze: phrase("Analyzing…"), report: phrase("The report is be
  * @param {string} at address of the input on the server.
  * @param {() => boolean} wanted whether its answer is still looked at.
  * @param {() => void} analyzed is called once there is an answer.
+ * @returns whether the report was written, too.
  */
 export async function showResult(begin, at, wanted, analyzed) {
   const fill = (id, tag, texts) => by(id).replaceChildren(...texts.map((text) => {
@@ -35,12 +36,18 @@ export async function showResult(begin, at, wanted, analyzed) {
   };
   clear([], "analyze");
   const wrong = await begin();
-  if (wrong) return clear([wrong], "");
+  if (wrong) {
+    if (wanted()) clear([wrong], "");
+    return false;
+  }
   for (let isShown = false; ;) {
     await new Promise((go) => { setTimeout(go, 400); });
     const found = await read(`${at}/analysis?language=${LANGUAGE}`);
-    if (!wanted()) return;
-    if (!found || found.failed) return clear([found?.failed || GONE], "");
+    if (!wanted()) return false;
+    if (!found || found.failed) {
+      clear([found?.failed || GONE], "");
+      return false;
+    }
     if (found.step !== "analyze" && !isShown) {
       isShown = true;
       analyzed();
@@ -52,7 +59,7 @@ export async function showResult(begin, at, wanted, analyzed) {
     say(found.step);
     if (found.step) continue;
     put(by("report"), {href: `${at}/${found.report}`, hidden: !found.report});
-    return;
+    return Boolean(found.report);
   }
 }
 

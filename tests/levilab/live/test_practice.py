@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -18,10 +19,10 @@ from levilab.simulator import preset
 from levilab.telemetry.address import Address, write_address
 from levilab.telemetry.messages import Count, Drive, Poses, State
 from support.browser import PHONE
-from support.live_pages import GrowingRun, address, publish, serving, spin_down, until
+from support.live_pages import PATIENCE_S, GrowingRun, address, publish, serving, spin_down, until
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterator, Sequence
     from pathlib import Path
 
     from playwright.sync_api import Page, Route
@@ -324,11 +325,41 @@ def test_after_a_run_the_last_minutes_show_what_a_person_does(starting: Hall, pa
     page.set_viewport_size({"width": 1366, "height": 650})  # a laptop: the plot is as high as its two parts need
     assert page.evaluate("document.getElementById('plot').clientHeight") >= 200
     assert page.evaluate("document.documentElement.scrollHeight") <= 700
-    down = Poses(3.0, 1 / 400, np.full((1, 3), 0.01), np.array([[0.0, 0.0, 0.0, 1.0]]), np.zeros(1, dtype=bool))
-    publish(watch, down)
-    until(page, "levilab.data.up === false")
-    publish(watch, replace(down, start_s=4.0, up=np.ones(1, dtype=bool)))
+    page.route("**/do?*", lambda route: route.fulfill(json={"number": 1}))
+    page.click("#back")
     until(page, f"{is_of_minutes} && document.body.dataset.state === 'idle'")
+
+
+def test_a_result_that_was_closed_early_is_opened_again(
+    starting: Hall, page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, closed, asked = GrowingRun(tmp_path, OLDER), threading.Event(), []
+    run.readings(spin_down(19))
+
+    def answer(words: Sequence[str]) -> tuple[int, str]:
+        asked.append(words[0])
+        if words[0] == "analyze":
+            (run.folder / "result.json").write_text('{"sentences": ["The disc law."]}', encoding="utf-8")
+        else:
+            assert closed.wait(PATIENCE_S)
+            (run.folder / "report.html").write_text("<p>", encoding="utf-8")
+        return 0, ""
+
+    monkeypatch.setattr(starting.analyses, "_run", answer)
+    page.goto(address(starting, token=True))
+    until(page, "levilab.frames > 0")
+    page.select_option("#run", OLDER)
+    until(page, "levilab.data.count === 19")
+    publish(starting.watches[OLDER], State(2.0, last={"spin_frequency_hz": 30.0}, drive=Drive("SQU", 30.0, 10.0)))
+    page.click("#analyze")
+    until(page, "document.getElementById('writing').textContent === 'The report is being written…'")
+    page.keyboard.press("Escape")
+    closed.set()
+    until(page, "!document.getElementById('report').hidden")  # the page has gone on to look
+    page.click("#analyze")
+    assert page.locator("#report").is_visible()
+    assert page.inner_text("#verdict") == "The disc law."
+    assert asked == ["analyze", "report"]  # and not anew
 
 
 #: Whether the panel of each tab is seen whole, without a scroll of the page or of its part.
