@@ -454,9 +454,10 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
         examples = [EXAMPLES[name] for name in quantities if name in EXAMPLES]
         known = ", ".join([*(name for name in quantities if name in LISTED and name not in COMPANIONS), *examples])
         wanted_names = needed or [name for name in SHORTHANDS.values() if name in quantities][:2]
+        words = "" if any(_numbers(layout, k) for k in range(layout.width)) else "there are no numbers in it, and "
         raise NoSuchColumn(
             path,
-            f"no title is known ({known} …) among {quote_names(header)}: say `columns` = "
+            f"{words}no title is known ({known} …) among {quote_names(header)}: say `columns` = "
             + _in_one_word(f"{_key(name)}=NAME" for name in wanted_names),
             line=layout.header_line or layout.first_line,
             doubt=_which_columns(layout, wanted_names),
@@ -480,16 +481,29 @@ def _must_be_one_time(path: Path, layout: Layout, meant: Sequence[str]) -> None:
             raise TableError(path, f"{what}: {do}", line=layout.header_line or layout.first_line)
 
 
-def _which_columns(layout: Layout, names: Collection[str]) -> Doubt:
-    """Return the question which columns hold the quantities of these canonical names."""
-    numeric = [k for k in range(layout.width) if _numbers(layout, k)]
+def _which_columns(layout: Layout, names: Collection[str]) -> Doubt | None:
+    """Return the question which columns hold the quantities of these canonical names; None where none can."""
     title = dict(enumerate(layout.header))
+    numeric = [k for k in range(layout.width) if _numbers(layout, k) and not _is_of_another(title.get(k, ""), names)]
+    if not numeric:
+        return None
     choices = tuple(
         Choice(f"{_key(name)}: {shorten(title.get(k, f'column {k + 1}'))}", {_key(name): str(k + 1)})
         for name in names
         for k in numeric
     )
     return Doubt("titles", f"which column is {' and which '.join(map(_in_words, names))}?", None, choices)
+
+
+def _is_of_another(title: str, names: Collection[str]) -> bool:
+    """Return whether a title says another quantity than these."""
+    column = read_title(title).column
+    return column not in names if column else _SPIN in names and _is_field(title)
+
+
+def _is_field(title: str) -> bool:
+    """Return whether a title's unit is that of a magnetic field."""
+    return unit_factor(read_title(title).unit or "", "flux density") is not None
 
 
 def _in_words(name: str) -> str:
@@ -522,7 +536,13 @@ def no_column(path: Path, name: str, header: Sequence[str], doubt: Doubt | None 
     else:
         sensors = {title: OTHER_SENSORS.get(plain_unit(read_title(title).unit or "")) for title in header}
         title, sensor = next((pair for pair in sensors.items() if pair[1]), ("", None))
-        if sensor:
+        field = next((one for one in header if name == _SPIN and _is_field(one)), None)
+        if field:
+            text = (
+                f"'{shorten(field)}' is a magnetic field, no spin frequency: levilab analyze spin FILE finds the spin"
+            )
+            text += " in a magnetometer's record of its axes x, y and z"
+        elif sensor:
             text = f"'{shorten(title)}' is of {sensor}, which shows no turns: record with the magnetometer, or name its"
             text += f" sheet or file; no column is known to be {name}"
     return NoSuchColumn(path, text, doubt=doubt)

@@ -21,6 +21,7 @@ from levilab.pipelines.correction import corrected_parts, read_correction
 from levilab.pipelines.field import readings as scan
 from levilab.pipelines.limit import readings as limit
 from levilab.pipelines.precession import readings as precession
+from levilab.pipelines.spin import magnetometer
 from levilab.pipelines.spindown import readings as spindown
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType({
     "precession_frequency_hz": ("precession frequency", ("Hz", "rpm", "rad/s")),
     "height_m": ("height", ("m", "cm", "mm")),
     "flux_density_t": ("flux density", ("T", "mT", "μT", "G")),
+    **{name: (f"flux density {name[-3]}", ("T", "mT", "μT", "G")) for name in magnetometer.QUANTITIES[1:4]},
 })  # fmt: skip
 #: Tables by their columns: those that are wanted, and those without which it is another one; the first that fits.
 _TABLES = (
@@ -45,6 +47,7 @@ _TABLES = (
     (precession.QUANTITIES, precession.NEEDED),
     (spindown.QUANTITIES, spindown.QUANTITIES[:2]),
     (limit.QUANTITIES, limit.QUANTITIES[:1]),
+    (magnetometer.QUANTITIES, magnetometer.NEEDED),
 )
 _SPIN_DOWN = _TABLES[2]
 #: Points of a small plot at most, the samples that it shows, and the largest table that is read for it [bytes].

@@ -55,6 +55,25 @@ def test_json_is_the_understanding_alone(doubtful):
     assert [path.name for path in doubtful.parent.iterdir()] == ["my.csv"]  # nothing is written
 
 
+def test_a_magnetometer_s_record_is_understood_and_analyzed(tmp_path):
+    path = ROOT / "sample_data" / "phone" / "magnetometer.csv"
+    look = look_at(path, {})
+    used = [column.quantity for column in look.runs[0].columns]
+    assert (look.problem, used[:4]) == ("", ["time_s", *(f"flux_density_{axis}_t" for axis in "xyz")])
+    one_axis = tmp_path / "y.csv"  # which no analysis reads: the spin is not asked for among microtesla
+    rows = [line.split(",") for line in path.read_text("utf-8").splitlines()[:50]]
+    one_axis.write_text("".join(f"{row[0]},{row[2]}\n" for row in rows), "utf-8")
+    ended = command("open", "y.csv", cwd=tmp_path)
+    assert (ended.status, "f=NUMBER" in ended.out) == (1, False)
+    assert "levilab analyze spin FILE" in ended.err
+
+
+def test_a_sheet_without_numbers_asks_nothing():
+    sheets = look_at(ROOT / "sample_data" / "student-files" / "phyphox.xlsx", {}).runs
+    assert [(sheet.name, sheet.doubts) for sheet in sheets] == [("Peak history", ()), ("Metadata Device", ())]
+    assert "there are no numbers in it" in sheets[1].problem
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
