@@ -90,8 +90,10 @@ def _must_be_of_several(path: Path, time: Array, limit: Array) -> None:
     no_times = "of limits one row a repetition is expected (leave out the column of times if these are limits)"
     if np.any(np.diff(time) <= 0):
         raise DoesNotSuit(f"{path}: its times do not increase from row to row; {no_times}")
-    if len(limit) < _FEWEST or not np.ptp(limit):
+    if len(limit) < _FEWEST:
         return
+    if not np.ptp(limit):
+        raise DoesNotSuit(f"{path}: the spin does not change with time: is the drive on? {no_times}")
     ordered = np.sort(limit)
     ranks = np.searchsorted(ordered, limit) + np.searchsorted(ordered, limit, "right")  # equal limits share one
     trend = float(np.corrcoef(np.arange(len(limit)), ranks)[0, 1])

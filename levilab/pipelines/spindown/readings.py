@@ -207,6 +207,7 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> SpinReadings:
         TableError: a column is missing, there are too few readings, times repeat or go back, the spin does not fall,
             or a frequency or an uncertainty is not positive; the line of the file is named.
     """
+    table = _without_rest(table, fewest)
     time, frequency = table.column("time_s"), table.column("spin_frequency_hz")
     has_u = "spin_frequency_u_hz" in table.columns
     u = table.column("spin_frequency_u_hz") if has_u else None
@@ -223,6 +224,20 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> SpinReadings:
         raise _in_the_file(table, error) from error
     doubts = _doubts(table, time, frequency)
     return SpinReadings(time, frequency, u, (*map(Doubt, doubts), *table.warnings), doubtful=bool(doubts))
+
+
+def _without_rest(table: Table, fewest: int) -> Table:
+    """Return a table without its last rows of 0 Hz, which a counter writes once the top lies, with a note on them."""
+    end = int(np.flatnonzero(table.column("spin_frequency_hz")).max(initial=-1)) + 1
+    left_out = len(table.lines) - end
+    if not left_out or end < fewest:
+        return table
+    rows = how_many(left_out, "row")
+    note = (
+        f"{table.path.name}: the last {rows} of 0 Hz, after the top fell, {'is' if left_out == 1 else 'are'} left out"
+    )
+    columns = {name: values[:end] for name, values in table.columns.items()}
+    return replace(table, columns=columns, lines=table.lines[:end], warnings=(*table.warnings, note))
 
 
 #: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, times in ms
@@ -296,6 +311,8 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
         return TableError(table.path, f"{text}: {advice}", line=after)
     if isinstance(error, NotPositive):
         what, advice = _ABOVE_0[error.quantity]
+        if error.quantity == "spin frequency" and error.value == 0:
+            advice = "Hz, as after a fall or without a pulse: delete such rows"
         return TableError(table.path, f"{what} is {error.value:.9g} {advice}", line=int(table.lines[error.index]))
     return TableError(table.path, str(error))
 

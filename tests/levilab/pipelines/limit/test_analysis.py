@@ -296,8 +296,11 @@ def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path, samp
     file.write_text("t,f\n0,40\n10,39\n20,37\n30,37.5\n40,36\n50,35\n", encoding="utf-8")  # not far down
     with pytest.raises(DoesNotSuit, match="the spin falls with time"):
         LIMIT.analyze([file], LimitOptions())
-    file.write_text("t,f\n" + "".join(f"{k},21.8\n" for k in range(6)), encoding="utf-8")  # as printed to 0.1 Hz
-    assert [row.name for row, _ in analyze_suiting([file], {})] == ["limit"]
+    file.write_text("t,f\n" + "".join(f"{k},21.8\n" for k in range(6)), encoding="utf-8")  # a top under the drive
+    with pytest.raises(DoesNotSuit, match="the spin does not change with time: is the drive on"):
+        LIMIT.analyze([file], LimitOptions())
+    with pytest.raises(DataError, match="is the drive still on"):
+        analyze_suiting([file], {})
     for wrong, says in (
         ("0,40\nMittel,39\n20,40\n30,39.5\n", "'Mittel' stands in"),
         ("0,40\n0,39\n9,40\n", "repeated"),

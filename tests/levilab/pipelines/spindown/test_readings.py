@@ -38,7 +38,7 @@ def test_uncertainties_may_be_absent(tmp_path):
     [
         ("0,61,.1\n1,60,.1\n\n1,59,.1\n", 5, ["the time 1 s is repeated", "in line 3"]),
         ("0,61,.1\n2,60,.1\n# x\n1,59,.1\n", 5, ["the time 1 s comes after 2 s in line 3"]),
-        ("0,61,.1\n1,0,.1\n2,59,.1\n", 3, ["the frequency is 0 Hz"]),
+        ("0,61,.1\n1,0,.1\n2,59,.1\n", 3, ["the frequency is 0 Hz", "delete such rows"]),
         ("0,61,.1\n1,60,.1\n2,-59,.1\n", 4, ["the frequency is -59 Hz", "magnitude"]),
         ("0,61,.1\n1,60,0\n2,59,.1\n", 3, ["the uncertainty is 0 Hz"]),
         ("0,61,.1\n1,60,.1\n2,59,-.1\n", 4, ["the uncertainty is -0.1 Hz"]),
@@ -51,6 +51,12 @@ def test_what_cannot_be_a_spin_down_is_reported_with_its_line(rows, line, words,
     assert f"data.csv, line {line}: " in str(caught.value)
     assert str(caught.value).isprintable()
     assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+def test_rows_of_0_hz_after_the_fall_are_left_out_with_a_note(tmp_path):
+    readings = spin_readings(table_of(tmp_path, HEADER + "0,61,.1\n1,60,.1\n2,59,.1\n3,0,0\n4,0,0\n"))
+    np.testing.assert_array_equal(readings.frequency, [61, 60, 59])
+    assert readings.warnings == ("data.csv: 2 rows of 0 Hz at the end, after the top fell, left out",)
 
 
 def test_a_missing_column_is_reported_with_those_there_are(tmp_path):
