@@ -134,37 +134,38 @@ class FittedModel(Named[Quantity]):
         return curve(self._of.found, self._number, self.name)
 
     @bare
-    def eval(self, x: ArrayLike | None = None) -> Array:
+    def eval(self, x: ArrayLike | None = None, *, t: ArrayLike | None = None) -> Array:
         """Return the fitted curve in SI, in the shape of x.
 
         Args:
             x: times [s] of a spin-down, heights [m] of a field scan, drive frequencies [Hz] of a precession sweep;
                 None: those of the readings.
+            t: another name of x.
 
         Raises:
             UsageError: there is no curve, or x are no numbers.
         """
-        places = self._places(x)
+        places = self._places(x if t is None else t)
         found: Array = self._curve("eval", self._of.analysis.curve)(places.ravel())
         return found.reshape(places.shape)
 
     predict = eval  # noqa: A003 - the function above
 
     @bare
-    def eval_uncertainty(self, x: ArrayLike | None = None, sigma: float = 1.0) -> Array:
+    def eval_uncertainty(self, x: ArrayLike | None = None, sigma: float = 1.0, *, t: ArrayLike | None = None) -> Array:
         """Return the half width of the curve's interval, in SI: that of its parameters with their correlation alone.
 
         As lmfit's it is u of the curve, to first order, times Student's factor for the coverage of `sigma`; NaN where u
         is not determined, and of a curve with the tilt's wobble beyond the readings.
 
         Args:
-            x: as of `eval`.
+            x, t: as of `eval`.
             sigma: standard deviations of a normal number with the same coverage: 1 is 68.3 %, 2 is 95.4 %.
 
         Raises:
             UsageError: there is no curve.
         """
-        places = self._places(x)
+        places = self._places(x if t is None else t)
         u: Array = self._curve("eval_uncertainty", self._of.analysis.curve_u)(places.ravel())
         return self._half_width(sigma) * u.reshape(places.shape)
 

@@ -18,6 +18,12 @@ F = TypeVar("F", bound="Callable[..., Any]")
 _TAKES_ANY = 0x08
 #: Names less alike than this are not what was meant.
 _ALIKE = 0.55
+#: What others call an option → names that it may have here.
+_OTHERS = {
+    **dict.fromkeys(("sigma", "yerr", "dy", "u"), ("reading_u",)),
+    "t": ("time", "x"),
+    "f": ("frequency",),
+}
 #: Names that a message lists.
 _MOST_NAMES = 15
 
@@ -33,7 +39,10 @@ def meant(name: str, known: Iterable[str]) -> str:
     ('known are model, input', 'did you mean model?')
     """
     names = [*known]
-    near = [one for one in names if name in one.split("_")] or get_close_matches(name, names, n=3, cutoff=_ALIKE)
+    others = [one for one in _OTHERS.get(name, ()) if one in names]
+    near = (
+        others or [one for one in names if name in one.split("_")] or get_close_matches(name, names, n=3, cutoff=_ALIKE)
+    )
     if near:
         return f"did you mean {' or '.join(near)}?"
     more = f" and {len(names) - _MOST_NAMES} more, which dir() lists" * (len(names) > _MOST_NAMES)

@@ -29,6 +29,7 @@ from levilab.present.html import facts_as_html, fold, paragraphs, table_as_html
 from levilab.present.numbers import plain, without_unit
 from levilab.present.units import unit
 from levilab.report.export.contents import facts_of
+from levilab.report.export.write import FORMATS
 from levilab.report.page import render_part
 from levilab.report.tables.latex import to_latex
 
@@ -88,6 +89,12 @@ class AnalysisResult(Helpful):
     instead: ClassVar[Mapping[str, str]] = {
         "to_csv": "to_dataframe().to_csv(path), or export('result.csv')",
         "to_netcdf": "export('result.nc')",
+        "to_pandas": "to_dataframe()",
+        "savefig": "plot().savefig(path)",
+        "laws": "models",
+        "units": "the unit of a quantity, as result['c32'].unit, or to_dataframe()",
+        "version": "document['software']['levilab']",
+        "provenance": "document, with inputs, options and software",
         "plot_fit": "plot('fit')",
         "plot_residuals": "plot('residuals')",
         "rsquared": "redchi",
@@ -519,12 +526,15 @@ class AnalysisResult(Helpful):
     def _synthetic(self) -> list[bool]:
         return [source.synthetic for source in self.found.sources]
 
+    @bare
     def save(self, folder: str | PathLike[str]) -> list[Path]:
         """Write result.json and the figure into a folder, and beside them the DataFrames that were analyzed.
 
-        Returns the files.  Raises CannotWrite.
+        Returns the files.  Raises CannotWrite; UsageError: the folder has the name of a file that `export` writes.
         """
         place, found = Path(folder), self.found
+        if place.suffix.lower() in FORMATS and not place.is_dir():
+            raise UsageError("folder", f"a folder is expected; export({place.name!r}) writes such a file", value=folder)
         written = []
         for path in self.copies:
             copy = _copy(path, place)
