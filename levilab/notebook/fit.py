@@ -159,7 +159,8 @@ class FittedModel(Named[Quantity]):
         is not determined, and of a curve with the tilt's wobble beyond the readings.
 
         Args:
-            x, t: as of `eval`.
+            x: as of `eval`.
+            t: as of `eval`.
             sigma: standard deviations of a normal number with the same coverage: 1 is 68.3 %, 2 is 95.4 %.
 
         Raises:
