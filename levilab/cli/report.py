@@ -35,7 +35,9 @@ def report(
             "--crosscheck/--no-crosscheck",
         ),
     ] = True,
-    short: Annotated[bool, flag("Result, figure and notes alone.", "--short")] = False,
+    short: Annotated[
+        bool, flag("Answer, values, figure and notes alone; of a few spin-downs one page.", "--short")
+    ] = False,
     **given: Any,
 ) -> None:
     """Write the report."""

@@ -395,10 +395,10 @@ class Analysis(Needs[Any], Generic[A]):
         """Return the budgets of its uncertainties, as blocks of a document."""
         return budgets_of_result(found, self.symbols)
 
-    def figure(self, found: A) -> Figure:
-        """Draw the figure, by the function NAME_figure of levilab.pipelines.NAME.figure."""
+    def figure(self, found: A, *, short: bool = False) -> Figure:
+        """Draw the figure, by the function NAME_figure, or short_figure, of levilab.pipelines.NAME.figure."""
         drawing = import_module(f"levilab.pipelines.{self.name}.figure")  # with matplotlib
-        drawn: Figure = getattr(drawing, f"{self.name}_figure")(found)
+        drawn: Figure = getattr(drawing, "short_figure" if short else f"{self.name}_figure")(found)
         return drawn
 
     def png(self, found: A) -> bytes:

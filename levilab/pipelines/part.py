@@ -65,6 +65,8 @@ class ReportPart:
         lead: how much was used.
         result: what follows its text: numbers with their uncertainties, what they mean, the models compared.
         figure: its words.
+        values: the numbers alone, for a short report; none: as `result`.
+        short_figure: the words of its short figure; None: it has none, and the figure is that of every report.
         inputs: one by one.
         runs_title: of the section with `runs`.
         runs: what belongs to each run rather than to all; none: there is no such section.
@@ -76,6 +78,8 @@ class ReportPart:
     result: tuple[Block, ...]
     figure: FigureText
     inputs: tuple[InputPart, ...]
+    values: tuple[Block, ...] = ()
+    short_figure: FigureText | None = None
     runs_title: str = ""
     runs: tuple[Block, ...] = ()
 

@@ -110,9 +110,10 @@ def blocks_of_part(
         for doubtful in (True, False)
     )
     doubts = [Warnings(grave)] if grave else []
+    values = part.values if asked.short and part.values else part.result
     blocks = [
-        section("Result", "result", Verdict(_verdict(found)), *doubts, *part.result),
-        section("Figure", "figure", picture_of(analysis, found, part)),
+        section("Result", "result", Verdict(_verdict(found)), *doubts, *values),
+        section("Figure", "figure", picture_of(analysis, found, part, short=asked.short)),
         *([section("Notes", "notes", Warnings(notes))] if notes else []),
     ]
     if not asked.short:
@@ -154,16 +155,17 @@ def _verdict(found: Analyzed[Any, Any, Any, Any]) -> str:
     return f"MIXED, and so no measurement ({made_up} of {len(found.sources)} inputs are SYNTHETIC): {found.text}"
 
 
-def picture_of(analysis: Analysis[A], found: A, part: ReportPart) -> Picture:
-    """Return the analysis's figure."""
+def picture_of(analysis: Analysis[A], found: A, part: ReportPart, *, short: bool = False) -> Picture:
+    """Return the analysis's figure; short: the short one, where it has one."""
     many = len(found.sources) > MOST_IN_FULL
+    words = part.short_figure if short and part.short_figure else part.figure
     return Picture(
         name=analysis.name,
-        title=part.figure.title,
-        caption=part.figure.caption,
-        alt=part.figure.title.rstrip("."),
-        draw=partial(analysis.figure, found),
-        points=() if many else part.figure.points,
+        title=words.title,
+        caption=words.caption,
+        alt=words.title.rstrip("."),
+        draw=partial(analysis.figure, found, short=words is part.short_figure),
+        points=() if many else words.points,
         raster=many,
     )
 

@@ -85,7 +85,7 @@ def write_report(
             `levilab.pipelines.document.Analysis.recall_found`.
         tell: called with what lies there and is not in the report, and with what has no result.
         tables: whether tables of the results are written, too, into the folder that `folder_of` names.
-        short: whether result, figure and notes are all of it.
+        short: whether answer, values, figure and notes are all of it.
         heading: title, course, authors and date above it.
         crosscheck: whether one is made where none lies beside the result and it takes two seconds at most.
 
@@ -108,7 +108,7 @@ def write_report(
     sections = [section for kind, found in others for section in kind.sections(found)]
     results = _results(left, given or {}, tell, needed=not others)
     heading = heading or Heading()
-    asked = Asked(paths, form.ending, given or {}, crosscheck, short, heading)
+    asked = Asked(paths, output.name, given or {}, crosscheck, short, heading)
     document = heading.above(document_of(results, sections, asked))
     document = replace(document, date=newest_of(results, others))
     content = form.content(document)

@@ -56,11 +56,11 @@ _MOST_NAMED = 12
 
 @dataclass(frozen=True)
 class Asked:
-    """What a report was asked for, but for the name of its file, on which no byte of it depends.
+    """What a report was asked for, but for the folder of its file, on which no byte of it depends.
 
     Attributes:
         paths: as they were typed; empty: those of the inputs.
-        ending: of the file's name; it stands for the format.
+        name: of the file.
         given: options by their names.
         crosscheck: whether one was asked for where none is stored.
         short: whether result, figure and notes alone were asked for.
@@ -68,7 +68,7 @@ class Asked:
     """
 
     paths: Sequence[Path] = ()
-    ending: str = ".html"
+    name: str = "report.html"
     given: Mapping[str, Any] = field(default_factory=dict)
     crosscheck: bool = True
     short: bool = False
@@ -81,7 +81,7 @@ class Asked:
         no_crosscheck = [] if self.crosscheck else ["--no-crosscheck"]
         short = ["--short"] if self.short else []
         words = [*paths, *options, *no_crosscheck, *short, *self.heading.typed]
-        return " ".join(["levilab", "report", *words, "-o", f"report{self.ending}"])
+        return " ".join(["levilab", "report", *words, "-o", shlex.quote(self.name)])
 
 
 def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked) -> Block:

@@ -48,7 +48,7 @@ def without_drawing() -> Iterator[None]:
 def without_figures() -> Iterator[None]:
     """Figures of analyses are empty, too: for texts of a page whose figure other tests make from the same runs."""
     with without_drawing(), pytest.MonkeyPatch.context() as patch:
-        patch.setattr("levilab.pipelines.document.Analysis.figure", lambda *_: Figure())
+        patch.setattr("levilab.pipelines.document.Analysis.figure", lambda *_, **__: Figure())
         yield
 
 

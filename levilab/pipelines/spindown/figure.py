@@ -51,8 +51,8 @@ _SEEN, _MOST_NAMED = 1 / 120, 6
 #: Of the residuals: the common scale shows at least so many units, a law whose residuals reach this much further than
 #: it does has a scale of its own; a scale is so many times as long as the residuals reach, for the markers.
 _LEAST_SCALE, _BEYOND, _ROOM = 3.2, 1.1, 1.12
-#: Places [inch]: left edge and width of the panels; height of the figure.
-_LEFT, _FULL, _HEIGHT = 0.66, 6.26, 9.15
+#: Places [inch]: left edge and width of the panels; height of the figure, and of the short one.
+_LEFT, _FULL, _HEIGHT, _SHORT_HEIGHT = 0.66, 6.26, 9.15, 4.1
 
 
 @dataclass(frozen=True)
@@ -86,6 +86,16 @@ def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
         _draw_differences(panel(figure, _LEFT, 2.98, 4.3, 1.5), analysis, unit)
         _draw_residuals(figure, 5.34, analysis, unit)
         _draw_straight_lines(figure, 7.2, analysis)
+    return figure
+
+
+def short_figure(analysis: SpinDownAnalysis) -> Figure:
+    """Draw readings and best law, and below readings and laws less the best one."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDE, _SHORT_HEIGHT))
+        headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
+        _draw_spin(panel(figure, _LEFT, 0.62, 4.3, 1.35), analysis)
+        _draw_differences(panel(figure, _LEFT, 2.55, 4.3, 1.1), analysis, _unit(analysis))
     return figure
 
 

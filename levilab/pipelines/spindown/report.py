@@ -404,6 +404,12 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
             ),
             points=_points(analysis),
         ),
+        values=(Tabular("spindown-laws", _constants_table(analysis, short=True), VALUE_U),),
+        short_figure=FigureText(
+            title="Spin-down.",
+            caption="The readings with the law that is nearest to them; below, readings and all laws less that law.",
+            points=_points(analysis),
+        ),
         runs_title="Run by run",
         runs=_run_by_run(analysis),
         inputs=input_parts(
@@ -496,20 +502,24 @@ def _run_by_run(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
     return Paragraph(paper), Tabular("spindown-runs", found, note, first_column_wraps=True)
 
 
-def _constants_table(analysis: SpinDownAnalysis) -> Table:
+def _constants_table(analysis: SpinDownAnalysis, *, short: bool = False) -> Table:
+    """Return the constants of the laws; short: without start, wobble and nutation of a single run."""
     several = len(analysis.runs) > 1
     heads = ("law", "mean over the runs", "scatter s between the runs") if several else ("law", "constants")
     title = "Drag laws, u of the means from the scatter" if several else "Drag laws"
     rows = [
-        Row(_law_cells(analysis, law), "best" if is_best(analysis, law.name) else "") for law in analysis.combined.fits
+        Row(_law_cells(analysis, law, short=short), "best" if is_best(analysis, law.name) else "")
+        for law in analysis.combined.fits
     ]
     return table(title, heads, rows)
 
 
-def _law_cells(analysis: SpinDownAnalysis, law: CombinedLaw) -> tuple[str, ...]:
+def _law_cells(analysis: SpinDownAnalysis, law: CombinedLaw, *, short: bool) -> tuple[str, ...]:
     name = law.name + (" (best)" if is_best(analysis, law.name) else "")
     constants = [
-        f"{SYMBOLS[of]} = {with_uncertainty(value)}" for of, value in law_constants(analysis, law.name).items()
+        f"{SYMBOLS[of]} = {with_uncertainty(value)}"
+        for of, value in law_constants(analysis, law.name).items()
+        if not short or of in LAWS[law.name].constants
     ]
     if len(analysis.runs) == 1:
         return name, "\n".join(constants)

@@ -60,13 +60,13 @@ _ROWS = {GOOD: "best", LOOK: "", REPEAT: "outlier"}
 _FROM_CLASS, _TRUTH, _FROM_TRUTH = "from the others [u]", "truth", "from the truth [u]"
 
 
-def class_document(classes: Sequence[Class], paths: Sequence[Path], ending: str) -> Document:
+def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str) -> Document:
     """Return the document of a class.
 
     Args:
         classes: the groups, by each analysis.
         paths: as they were typed.
-        ending: of the document's name.
+        name: of the document's file.
     """
     sources = list({source.path.resolve(): source for of in classes for source in of.found.sources}.values())
     classes = sorted(classes, key=lambda of: -len(of.groups))  # what one group alone measured comes last
@@ -81,7 +81,7 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], ending: str)
     return Document(
         title=f"Class of {how_many(len(names), 'group')}",
         lead=f"{count_inputs(sources)}: {', '.join(map(_subject, classes))}",
-        blocks=(*of_all, *chapters, _made_by(paths, ending)),
+        blocks=(*of_all, *chapters, _made_by(paths, name)),
         banner=banner_of(sources),
         contents=True,
     )
@@ -203,10 +203,10 @@ def _draw(of: Class) -> Figure:
     return class_figure(of)
 
 
-def _made_by(paths: Sequence[Path], ending: str) -> Note:
+def _made_by(paths: Sequence[Path], name: str) -> Note:
     typed = " ".join(shlex.quote(str(path)) for path in paths)
     each = "each group's readings, figure and budget of uncertainties are in that of levilab report"
-    return Note(f"Made by: levilab class {typed} -o class{ending}; {each}.")
+    return Note(f"Made by: levilab class {typed} -o {shlex.quote(name)}; {each}.")
 
 
 SPREADSHEET = ".xlsx"
@@ -249,7 +249,7 @@ def write_class(
     classes = [class_of(analysis, found) for analysis, found in results]
     date = newest_of(results)
     if form:
-        document = (heading or Heading()).above(class_document(classes, paths, form.ending))
+        document = (heading or Heading()).above(class_document(classes, paths, output.name))
         content = form.content(replace(document, date=date))
     else:
         content = class_workbook(classes, date)

@@ -1,5 +1,7 @@
 """The order of a report, its short form, and what a person writes above it."""
 
+import re
+
 import pytest
 
 from levilab.report.page import write_report
@@ -32,7 +34,17 @@ def test_a_short_one_has_no_more_and_names_the_command_that_makes_it(tmp_path):
     assert "readings.csv" not in text
 
 
+@pytest.mark.parametrize("runs", [RUNS[:1], [*RUNS, SAMPLE_DATA / "spin-down-3"]])
+def test_a_short_one_of_few_spin_downs_is_one_page_without_criteria(tmp_path, runs):
+    pages = re.findall(rb"/Type */Page\b", write_report(runs, tmp_path / "short.pdf", short=True).read_bytes())
+    assert len(pages) == 1
+    text = Page(write_report(runs, tmp_path / "short.html", short=True).read_text(encoding="utf-8")).text
+    assert not re.search("AICc|Durbin|order test", text)
+    assert "-o short.html" in text
+
+
 def test_the_same_heading_makes_the_same_pdf(tmp_path):
     heading = Heading(course="a", author="b")
-    made = [write_report(RUNS[:1], tmp_path / f"{name}.pdf", short=True, heading=heading).read_bytes() for name in "ab"]
+    files = [tmp_path / folder / "report.pdf" for folder in "ab"]
+    made = [write_report(RUNS[:1], file, short=True, heading=heading).read_bytes() for file in files]
     assert made[0] == made[1]

@@ -303,7 +303,7 @@ def test_all_analyses_of_a_folder_are_on_the_page_in_their_order(tmp_path, sampl
         "What was measured, and with what",
         "How to reproduce this",
     ]
-    assert page.text.count(f"levilab report {tmp_path / 'runs'} --no-crosscheck -o report.html") == 1
+    assert page.text.count(f"levilab report {tmp_path / 'runs'} --no-crosscheck -o page.html") == 1
     assert len(messages) == 1  # no run is passed over by all analyses
     assert "no result lies beside spin-down-1, upper-limits" in messages[0]
 

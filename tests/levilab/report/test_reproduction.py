@@ -21,8 +21,8 @@ def test_columns_that_are_not_named_are_not_given():
 
 def test_the_command_of_a_report_has_the_paths_the_options_and_the_format_that_were_asked_for():
     given = {"columns": {"t": "1", "f": "spin, Hz"}, "rate": None, "uncertainty": "covariance", "keep_outliers": True}
-    asked = Asked((Path("runs"), Path("a b.csv")), ".pdf", given, crosscheck=False)
-    words = "runs 'a b.csv' --columns 't=1,f=spin, Hz' --keep-outliers --no-crosscheck -o report.pdf"
+    asked = Asked((Path("runs"), Path("a b.csv")), "short.pdf", given, crosscheck=False)
+    words = "runs 'a b.csv' --columns 't=1,f=spin, Hz' --keep-outliers --no-crosscheck -o short.pdf"
     assert asked.command([]) == f"levilab report {words}"
 
 
