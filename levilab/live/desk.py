@@ -28,6 +28,11 @@ _MOST_ANSWERS = 64
 _LONGEST_TEXT = 600
 
 
+def _data_of(row: Any) -> dict[str, Any]:
+    """Return what a row of a table has, less its functions."""
+    return {key: value for key, value in vars(row).items() if not callable(value)}
+
+
 @dataclass
 class Desk:
     """A bench for practice, and its events.
@@ -56,13 +61,8 @@ class Desk:
             {"name": name, "title": row.title, "asks": row.asks, "length_s": row.length_s}
             for name, row in PRACTICE.items()
         ]
-        what_if = {
-            name: {key: value for key, value in vars(row).items() if key != "keys"} for name, row in WHAT_IF.items()
-        }
-        tasks = [
-            {key: value for key, value in vars(row).items() if key not in {"holds", "hidden"}} | {"name": name}
-            for name, row in TASKS.items()
-        ]
+        what_if = {name: _data_of(row) for name, row in WHAT_IF.items()}
+        tasks = [_data_of(row) | {"name": name} for name, row in TASKS.items()]
         return {"experiments": rows, "what_if": what_if, "tasks": tasks} | {
             "runs": [folder.name for folder in self.folders]
         }

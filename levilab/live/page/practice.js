@@ -112,7 +112,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     value.ariaLive = "off";  // what the slider is at, its own text says
     Object.assign(input, {type: "range", min: row.low, max: row.high, step: row.step, value: row.usual});
     input.id = name;
-    input.setAttribute("aria-label", `${title}, ${row.unit || phrase("as a part of the moment")}`);
+    input.setAttribute("aria-label", `${title}, ${row.unit}`);
     input.setAttribute("aria-describedby", "shows");
     label.append(make("span", title), input, value);
     by("quantities").append(label);

@@ -226,8 +226,11 @@ class PracticeProcess:
         drive = self.drive
         look = Look(self.clock.now(), self.top.floats(), self._spin, drive.output_hz, drive.follows, answer)
         if task := self.tasks.look(look):
-            self._voice.say(Text("reached: {title}. It shows: {teaches}", title=task.title, teaches=task.teaches), "")
+            found = task.found(self.top.scene)
             self._leave_task()
+            self._voice.say(Text("reached: {title}. It shows: {teaches}", title=task.title, teaches=task.teaches), "")
+            if found:
+                self._voice.say(found)
 
     def _leave_task(self) -> None:
         """End the task under way; what it hid is taken away again."""

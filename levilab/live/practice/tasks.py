@@ -13,6 +13,8 @@ from levilab.texts.text import Text
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
+    from levilab.simulator.scene import Scene
+
 #: A held top swings about its drive by less than this [Hz].
 _HELD_HZ = 0.5
 
@@ -54,6 +56,7 @@ class Task:
         needs: the control of the page that it begins with.
         holds: whether the goal is there at a moment.
         for_s: how long it has to be there without a break [s].
+        found: said of the top that reached it; empty: nothing.
         hidden: what the bench changes, and does not say: keys of a scene by a random number from 0 to 1.
         answers: to choose from; none: no answer is asked.
     """
@@ -64,6 +67,7 @@ class Task:
     needs: str
     holds: Callable[[Look], bool]
     for_s: float = 0.0
+    found: Callable[[Scene], str] = lambda _: ""
     hidden: Callable[[float], dict[str, Any]] = lambda _: {}
     answers: Mapping[str, float] = field(default_factory=dict)
 
@@ -71,6 +75,10 @@ class Task:
 def _mass(chance: float) -> dict[str, Any]:
     """Return a mass above those that float, 24.25 to 24.97 g, from which washers of -0.2 to 0.8 g lead into them."""
     return {"top.mass_kg": 25.0e-3 + 0.1e-3 * chance}
+
+
+def _say_mass(scene: Scene) -> str:
+    return Text("this top floated with {mass:.2f} g", mass=1e3 * scene.top.mass_kg)
 
 
 #: A drag that slows 30 Hz by 0.11 Hz/s: exponent → law and coefficient.  C ω^n = 0.7 rad/s² at 188 rad/s.
@@ -99,10 +107,10 @@ TASKS: dict[str, Task] = {
         "drive", lambda look: look.is_held, for_s=180.0,
     ),
     "mass": Task(
-        "Find the mass that floats", "This top is too heavy by some tenths of a gram. Take washers off (What if), and "
-        "put it back, until it floats for 20 s.",
+        "Find the mass that floats", "This top is too heavy by some tenths of a gram. Take washers off (What if: below "
+        "0 g), and put it back, until it floats for 20 s.",
         "of 25 g only some tenths are free: field and weight balance at a height at which the field also holds the top",
-        "washers_g", lambda look: look.floats, for_s=20.0, hidden=_mass,
+        "washers_g", lambda look: look.floats, for_s=20.0, found=_say_mass, hidden=_mass,
     ),
     "fast": Task(
         "Reach 57 Hz", "Take the top up with the drive. At 0.1 Hz/s it is lost near 57 Hz: more slowly it goes on.",

@@ -43,6 +43,16 @@ def _drag_at(scene: Scene, pressure: float) -> float:
     return scene.drag.constants[0] * math.pow(pressure, (LAWS[scene.drag.law].exponent or 1.0) - 1.0)
 
 
+#: Tilt of the usual top's moment, rounded to a tenth [°].
+_USUAL_TILT_DEG = 1.2
+
+
+def _tilt_moment(scene: Scene, tilt_deg: float) -> dict[str, Any]:
+    """Return the parts of the moment at a tilt, in proportion to it: right to a tenth of a degree."""
+    across = scene.top.moment_tilt[0] * (tilt_deg / _USUAL_TILT_DEG)
+    return {"top.moment_tilt": [across, 1.0 - across]}
+
+
 #: Name → row.  The washers of a set have 0.02 to 0.1 g.  The air's viscosity η does not change with its
 #: pressure, and its density ρ does: a drag in proportion to ωⁿ goes as ρ^(n − 1), as η for n = 1, √(ρη) for n = 3/2 (a
 #: laminar boundary layer), ρ for n = 2.
@@ -63,9 +73,9 @@ WHAT_IF: dict[str, Change] = {
         "air pressure", "bar", "The air alone slows a free top.", 0.0, 2.0, 0.1, 1.0,
         lambda scene, value: {"drag.coefficient": _drag_at(scene, value)},
     ),
-    "moment_tilt": Change(
-        "tilt of the moment", "", "What lies across the axis is what the drive holds the top by.",
-        0.0, 0.04, 0.005, 0.02, lambda _, value: {"top.moment_tilt": [value, 1.0 - value]},
+    "moment_tilt_deg": Change(
+        "tilt of the moment", "°", "What lies across the axis is what the drive holds the top by.",
+        0.0, 2.4, 0.3, _USUAL_TILT_DEG, _tilt_moment,
     ),
 }  # fmt: skip
 USUAL = {name: row.usual for name, row in WHAT_IF.items()}

@@ -445,6 +445,8 @@ def test_the_mass_that_floats_is_found(tmp_path: Path) -> None:
     said = script.said("message")
     assert said[0].startswith("the top is too heavy for this base, however it spins: it fell after")  # and no mass
     assert said[1].startswith("reached: Find the mass that floats. It shows: ")
+    assert re.fullmatch(r"this top floated with 24\.[89]\d g", said[2])  # 25.0 to 25.1 g, less 0.2 g
+    assert script.states[-1].text == said[2]
     reached = next(state for state in script.states if state.tasks_done)
     assert 28.0 < reached.time_s < 31.0  # 20 s after it floats
     assert (reached.task, reached.tasks_done) == ("", ("mass",))
