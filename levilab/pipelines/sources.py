@@ -265,8 +265,8 @@ _NAMED = 2
 
 
 def in_words(left_out: Sequence[LeftOut]) -> str:
-    """Return that the files are left out, as one line."""
-    return f"left out: {files_by_kind(left_out)}"
+    """Return the files that hold nothing to analyze, as one line."""
+    return f"nothing to analyze in {files_by_kind(left_out)}"
 
 
 def files_by_kind(left_out: Sequence[LeftOut]) -> str:

@@ -665,7 +665,8 @@ def _fall(source: Source[SpinReadings], fit: SpinDown) -> str:
     text = next((str(event["text"]) for event in reversed(events) if event["kind"] == RunEvent.FELL), None)
     if text is None:
         return ""
-    return f"{text}; last reading that was fitted {fit.frequency[-1]:.2f} Hz at {fit.time[-1]:.1f} s"
+    last = f"last reading that was fitted {fit.frequency[-1]:.2f} Hz at {fit.time[-1]:.1f} s"
+    return f"{text[:1].upper()}{text[1:]}; {last}"
 
 
 def _falls_in_short(analysis: SpinDownAnalysis, seen: int) -> str:

@@ -177,7 +177,7 @@ def test_what_another_analysis_reads_is_left_out_of_one_alone(tmp_path, sample_d
 def test_a_folder_without_anything_to_read_says_of_what_kind_its_files_are(tmp_path):
     (tmp_path / "foto.jpg").write_bytes(b"\xff\xd8\xff\xe0")
     (tmp_path / "other.csv").write_text("a,b\n1,2\n", encoding="utf-8")
-    with pytest.raises(DoesNotSuit, match=r"left out: a picture \(foto\.jpg: .*; a table with other columns \(other"):
+    with pytest.raises(DoesNotSuit, match=r"analyze in a picture \(foto\.jpg: .*; a table with other columns \(other"):
         analyze_suiting([tmp_path], {})
 
 
@@ -187,7 +187,7 @@ def test_sound_without_the_extra_is_counted_with_what_to_install(tmp_path, sampl
         shutil.copy(sample_data / "scope-files" / "phone.m4a", tmp_path / name)
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
     (text,) = texts_of(remarks([found.remarks for _, found in analyze_suiting([tmp_path], {})]))
-    assert text.startswith("left out: 2 sound files and films (a.m4a, b.m4a: the extra video")
+    assert text.startswith("nothing to analyze in 2 sound files and films (a.m4a, b.m4a: the extra video")
     assert "names all" not in text
     shutil.copy(tmp_path / "a.m4a", tmp_path / "c.m4a")
     (text,) = texts_of(remarks([found.remarks for _, found in analyze_suiting([tmp_path], {})]))
