@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 RISING = 0.01
 #: One of the folds is certain from this probability on.
 CERTAIN = 0.95
+#: Tops spin between these [Hz]; where nothing decides, one of ten is faster.
+USUAL_HZ, UNUSUAL = (20.0, 60.0), 0.1
 #: Even times describe the samples better than the times given: by this ratio of likelihoods, as natural logarithm.
 EVEN = 5.0
 #: Times jitter by less than this part of the interval, or they are uneven otherwise.
@@ -60,7 +62,7 @@ class Weighed:
 
     Attributes:
         shares: probability of each, shape (h,).
-        order: their numbers, the most probable first.
+        order: their numbers, the most probable first; where none is certain, a spin as tops have it goes before.
         by_times: whether the times alone tell them from each other.
         regular: whether the samples lie more evenly than their times say.
     """
@@ -120,8 +122,12 @@ def weigh(seen: list[Evidence], signs: list[int], slope: float, u: float) -> Wei
     posterior = by_times + np.log([_sense(sign * slope / u) for sign in signs])
     order = np.argsort(-posterior, kind="stable")
     first = int(order[0])
+    shares = np.exp(posterior - np.logaddexp.reduce(posterior))
+    if shares[first] <= CERTAIN:
+        usual = [USUAL_HZ[0] <= one.frequency <= USUAL_HZ[1] for one in seen[0].fits]
+        order = np.argsort(-shares * np.where(usual, 1.0, UNUSUAL), kind="stable")
     return Weighed(
-        shares=np.exp(posterior - np.logaddexp.reduce(posterior)),
+        shares=shares,
         order=tuple(map(int, order)),
         by_times=bool(np.exp(by_times[first] - np.logaddexp.reduce(by_times)) > CERTAIN),
         regular=bool(even > log[first] + EVEN),

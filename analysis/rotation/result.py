@@ -49,7 +49,8 @@ class FieldSpin:
         rate: samples per second.
         duration: of the record [s].
         samples: number of those used.
-        folds: frequencies that could be it, the most probable first, which is this one.
+        folds: frequencies that could be it, the first is this one: the most probable, where none is certain that of
+            the spins that tops have.
         kinds: of warnings.
     """
 

@@ -65,6 +65,14 @@ def test_without_slope_and_jitter_the_folds_are_named(fresh):
     assert sorted(fold.frequency for fold in found.folds) == pytest.approx([39.0, 61.0], abs=0.02)
 
 
+def test_where_nothing_decides_a_spin_as_tops_have_it_leads():
+    times = np.arange(1000) / 100.0
+    turn = 2 * np.pi * 30.0 * times
+    found = spin_of_field(times, 5e-6 * np.stack([4 + np.sin(turn), np.cos(turn) - 2], axis=1))
+    assert found.doubtful
+    assert [fold.frequency for fold in found.folds] == pytest.approx([30.0, 70.0], abs=1e-6)
+
+
 def test_times_that_jitter_more_than_their_samples_tell_no_fold(fresh):
     times, field = synthetic_field(fresh, frequency=61.0, chirp=0.0, jitter=0.0, snr_db=12.0)
     found = spin_of_field(times + fresh.normal(0, 3e-4, times.size), field)
