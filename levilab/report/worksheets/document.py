@@ -61,11 +61,11 @@ class Sheet:
     asked: tuple[str, ...] = ()
     clicks: str = "with_clicks"
 
-    def commands(self, group: str, seed: int) -> tuple[str, ...]:
-        """Return what a group types."""
+    def commands(self, group: str, seed: int, spoken: str = "") -> tuple[str, ...]:
+        """Return what a group types.  spoken: the option of the language, after a blank."""
         chosen = "".join(f" --set {one}" for one in self.settings)
         return (
-            f'levilab acquire {self.experiment} --mock --group "{group}" --seed {seed} --out class{chosen}',
+            f'levilab acquire {self.experiment} --mock --group "{group}" --seed {seed}{spoken} --out class{chosen}',
             f"levilab analyze {self.analysis} class",
             "levilab report class -o report.html",
         )
@@ -146,7 +146,7 @@ def worksheet(sheet: Sheet, language: Language, seeds: Mapping[str, int]) -> Doc
         byline=f"{words['name']} {_BLANK}  {words['date']} {_BLANK[:7]}",
         blocks=(
             Paragraph(texts.aim),
-            Section(words["commands"], (Code("\n".join(sheet.commands(group, seed))), clicks, *live)),
+            Section(words["commands"], (Code("\n".join(sheet.commands(group, seed, spoken))), clicks, *live)),
             Section(words["seeds"], (Paragraph(told), Listing("seeds", listed, rows_in_a_piece=5))),
             Section(words["tasks"], tuple(Question(f"{k}.", task) for k, task in enumerate(texts.tasks, start=1))),
         ),

@@ -36,6 +36,7 @@ def test_every_text_is_used(code, tmp_path):
     missing = [text for text in (*filled, texts.title, texts.aim, *texts.tasks, *texts.answers) if text not in page]
     assert missing == []
     assert f'lang="{code}"' in files[0].read_text(encoding="utf-8")
+    assert (f"--seed 1 --language {code} --out class" in page) is (code != "en")  # as the program speaks by itself
 
 
 @pytest.mark.parametrize("experiment", BY_TIME)
