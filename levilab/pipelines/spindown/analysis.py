@@ -44,7 +44,7 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
         """Yield remarks on the means, on the laws that are not excluded, and on what was asked for."""
         yield from (*map(remark, self.combined.remarks), *self._left_out(), *self._of_laws(self.combined.fits))
         if self.options.laws:
-            yield f"as asked, the other drag laws than {enumeration(self.options.laws)} are left out"
+            yield f"drag laws other than {enumeration(self.options.laws)} are left out, as asked"
         if any(run.has_tilt for run in self.runs) and not is_seen(self.combined.tilt):
             yield TILT_ALLOWED
 

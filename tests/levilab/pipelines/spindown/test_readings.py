@@ -116,7 +116,7 @@ def test_the_laws_that_are_asked_for_are_fitted_and_the_others_have_no_numbers(t
     path = spin_down_csv(tmp_path / "a.csv")
     found = SPINDOWN.analyze([path], SpinDownOptions(tilt="none", **read_options({"laws": "disc,stokes"})))
     assert [fit.name for fit in found.combined.fits] == ["stokes", "disc"]
-    assert "as asked, the other drag laws than stokes and disc are left out" in found.all_warnings
+    assert "drag laws other than stokes and disc are left out, as asked" in found.all_warnings
     part = SPINDOWN.document(found, tmp_path)["runs"][0]
     values = {column.name: column.read(part) for column in SPINDOWN.row}
     assert values["disc_c32_per_sqrt_rad_s"] == pytest.approx(2.34e-4, rel=0.01)  # 0.15 % by 0.03 Hz
