@@ -56,7 +56,7 @@ def test_what_cannot_be_a_spin_down_is_reported_with_its_line(rows, line, words,
 def test_rows_of_0_hz_after_the_fall_are_left_out_with_a_note(tmp_path):
     readings = spin_readings(table_of(tmp_path, HEADER + "0,61,.1\n1,60,.1\n2,59,.1\n3,0,0\n4,0,0\n"))
     np.testing.assert_array_equal(readings.frequency, [61, 60, 59])
-    assert readings.warnings == ("data.csv: 2 rows of 0 Hz at the end, after the top fell, left out",)
+    assert readings.warnings == ("data.csv: the last 2 rows of 0 Hz, after the top fell, are left out",)
 
 
 def test_a_missing_column_is_reported_with_those_there_are(tmp_path):
