@@ -126,18 +126,18 @@ def swings_of(times: Array, places: Places, heights: Array | None = None, *, win
         NoSwings: they stand out in none.
     """
     t, s = _check(times, places)
-    z = None if heights is None else np.asarray(heights, dtype=np.float64)
-    if z is not None:
-        if z.shape != t.shape:
-            raise ShapesDiffer(quantity="the height", seen=z.shape, expected=t.shape)
-        _refuse_unless_finite("height", z)
+    z = None if heights is None else _check_heights(heights, t)
     borders = np.searchsorted(t, np.linspace(t[0], t[-1], max(round(float(t[-1] - t[0]) / window), 1) + 1))
     borders[-1] = t.size
     parts = [slice(*ends) for ends in itertools.pairwise(borders.tolist()) if ends[1] - ends[0] >= FEWEST]
+
+    def look(part: slice, near: Sequence[Swings]) -> Swings | None:
+        return swings_in_window(t[part], s[part], None if z is None else z[part], near=near)
+
     found: list[Swings] = []
     used = []
     for part in parts:
-        if one := swings_in_window(t[part], s[part], None if z is None else z[part], near=found[-1:]):
+        if one := look(part, found[-1:]):
             found.append(one)
             used.append(part)
     if not found:
@@ -146,7 +146,7 @@ def swings_of(times: Array, places: Places, heights: Array | None = None, *, win
         near = [
             one for one in found[max(k - 1, 0) : k + 2] if abs(one.frequency[0] - found[k].frequency[0]) > _APART_HZ
         ]
-        if near and (one := swings_in_window(t[part], s[part], None if z is None else z[part], near=near)):
+        if near and (one := look(part, near)):
             found[k] = one
     return found
 
@@ -164,6 +164,14 @@ def _check(times: Array, places: Places) -> tuple[Array, Places]:
         k = int(back[0])
         raise TimesNotIncreasing(index=k + 1, before=float(t[k]), after=float(t[k + 1]))
     return t, s
+
+
+def _check_heights(heights: Array, t: Array) -> Array:
+    z = np.asarray(heights, dtype=np.float64)
+    if z.shape != t.shape:
+        raise ShapesDiffer(quantity="the height", seen=z.shape, expected=t.shape)
+    _refuse_unless_finite("height", z)
+    return z
 
 
 def _refuse_unless_finite(quantity: str, values: Array | Places) -> None:

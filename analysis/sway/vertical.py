@@ -109,6 +109,8 @@ def _misfit(rest: NDArray[np.number], lines: NDArray[np.number], others: NDArray
     count, paid = numbers * rest.size, numbers * lines.shape[1]
     lines = np.linalg.qr(lines - others @ (others.conj().T @ lines))[0]
     energy = float(np.linalg.norm(rest) ** 2)
+    if not energy:  # as of heights that are all alike
+        return 0.0
     left = max(energy - float(np.linalg.norm(lines.conj().T @ rest) ** 2), _FINEST**2 * energy)
     there = count * math.log(left / energy) + paid * math.log(count)
     return -2 * float(np.logaddexp(-there / 2, 0.0))

@@ -13,14 +13,13 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-import levilab
 from levilab.animation.request import AnimationRequest, animate, check_request
 from levilab.errors import UsageError
 from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation
 from levilab.motion.summary import as_document
 from levilab.motion.table import headline, print_motion
 from levilab.notebook.labels import dataset_of_contents
-from levilab.notebook.names import Helpful, bare, meant
+from levilab.notebook.names import Exportable, bare, meant
 from levilab.notebook.quantity import Named
 from levilab.present.html import facts_as_html
 from levilab.report.export.contents import Contents, table_of
@@ -53,7 +52,7 @@ _COLUMNS = {
 
 
 @dataclass(frozen=True, repr=False)
-class SimulatedMotion(Helpful, Trajectory):
+class SimulatedMotion(Exportable, Trajectory):
     """A trajectory with what `levilab simulate` says of it; the columns of its table are attributes, too.
 
     Attributes:
@@ -149,10 +148,6 @@ class SimulatedMotion(Helpful, Trajectory):
         """What is exported of it."""
         name, about = self.scene.name, {"source": "levilab simulate, simulated", "synthetic": "true"}
         return Contents(name, headline(self._found), (table_of(self.to_dataframe(), "states", "a state"),), about)
-
-    def export(self, output: str | PathLike[str], **options: Any) -> list[Path]:
-        """Write it for other programs; the same as `levilab.export(motion, output, …)`."""
-        return levilab.export(self, output, **options)
 
     @bare
     def plot(

@@ -8,10 +8,13 @@ from functools import wraps
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
+import levilab
 from levilab.errors import LevilabError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
+    from os import PathLike
+    from pathlib import Path
 
 F = TypeVar("F", bound="Callable[..., Any]")
 #: Flag of a function's code: it takes any names.
@@ -133,3 +136,11 @@ class Helpful:
             text = f"take {advice}" if advice else meant(name, public)
             with border:
                 raise NoSuchAttribute(f"{type(self).__name__} has no {name!r}: {text}")
+
+
+class Exportable(Helpful):
+    """Such an object that other programs can read."""
+
+    def export(self, output: str | PathLike[str], **options: Any) -> list[Path]:
+        """Write it for other programs; the same as `levilab.export(self, output, …)`."""
+        return levilab.export(self, output, **options)  # type: ignore[arg-type]

@@ -20,7 +20,7 @@ from levilab.errors import UsageError, unquote
 from levilab.files import CannotWrite, as_json, replace_atomically
 from levilab.notebook.fit import FIT, METHODS, FittedModel, axes_of
 from levilab.notebook.labels import as_dataset, head_as_html
-from levilab.notebook.names import Helpful, bare
+from levilab.notebook.names import Exportable, bare
 from levilab.notebook.quantity import Named, Quantity, correlate
 from levilab.pipelines.catalogue import ANALYSES, print_analysis
 from levilab.pipelines.result import Place
@@ -65,7 +65,7 @@ _STATISTICS = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AnalysisResult(Helpful):
+class AnalysisResult(Exportable):
     """What an analysis found of one or several inputs.  Nothing is written unless `save` is called.
 
     It is a mapping of its values: `result["c32"]`, `dict(result)`; each is an attribute, too.
@@ -390,10 +390,6 @@ class AnalysisResult(Helpful):
     def report(self, output: str | PathLike[str] = "report.html", **options: Any) -> Path:
         """Write its report; the same as `levilab.report(result, output, …)`."""
         return levilab.report(self, output, **options)
-
-    def export(self, output: str | PathLike[str], **options: Any) -> list[Path]:
-        """Write it for other programs; the same as `levilab.export(result, output, …)`."""
-        return levilab.export(self, output, **options)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return the readings with their residuals as a Dataset with units, and where they come from; needs xarray.

@@ -10,7 +10,7 @@ import levilab
 from analysis.numbers import how_many
 from levilab.notebook.analysis import analyze_data
 from levilab.notebook.labels import dataset_of_contents
-from levilab.notebook.names import Helpful, bare, meant
+from levilab.notebook.names import Exportable, bare, meant
 from levilab.notebook.quantity import NoSuchName
 from levilab.present.html import facts_as_html, table_as_html
 from levilab.report.export.contents import contents_of_results
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, repr=False)
-class RecordedRun(Helpful, Run):
+class RecordedRun(Exportable, Run):
     """A run folder whose readings are columns by their names, as those of a DataFrame; each is an attribute, too."""
 
     also: ClassVar[Mapping[str, Any]] = {
@@ -143,10 +143,6 @@ class RecordedRun(Helpful, Run):
     def report(self, output: str | PathLike[str] = "report.html", **options: Any) -> Path:
         """Write its report; the same as `levilab.report(run, output, …)`."""
         return levilab.report(self, output, **options)
-
-    def export(self, output: str | PathLike[str], **options: Any) -> list[Path]:
-        """Write it for other programs; the same as `levilab.export(run, output, …)`."""
-        return levilab.export(self, output, **options)
 
 
 #: Columns that a notebook's cell shows.

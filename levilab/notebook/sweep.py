@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from analysis.numbers import how_many
 from levilab.errors import UsageError
 from levilab.notebook.labels import dataset_of, head_as_html
-from levilab.notebook.names import Helpful, bare
+from levilab.notebook.names import Exportable, bare
 from levilab.notebook.quantity import Named
 from levilab.notebook.scene import chosen_scene, in_seconds, whole_key
 from levilab.present.html import facts_as_html, fold
@@ -41,7 +41,7 @@ _MOST_ROWS = 10
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SimulatedMap(Helpful):
+class SimulatedMap(Exportable):
     """What a sweep found at each point; what was observed, and the axes, are attributes, too.
 
     Attributes:

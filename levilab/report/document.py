@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     Results = Sequence[tuple[Analysis[Any], Any]]
 
 #: With more inputs the report is an overview: the section of each can be opened, and the figure is a PNG, a tenth as
-#: large as an SVG of so many lines.
+#: large as an SVG with the lines of all of them.
 MOST_IN_FULL = 12
 
 

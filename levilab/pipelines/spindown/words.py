@@ -325,7 +325,7 @@ def _value(estimate: Estimate) -> str:
 #: What a tilt costs that the readings do not show (decision 11).
 TILT_ALLOWED = (
     "the fits allow for a tilt of the top's moment, which the counter would see and these readings do not show: u of a "
-    "run's constants is 1.4 to 2 times that of a plain fit, and of a top without a tilt C comes out 0.6 to 1.1 u too "
+    "run's constants is 1.4 to 2 times that of a plain fit, and of a top without a tilt C comes out some 0.7 u too "
     "large on average; if yours has none, `tilt` = none leaves it out"
 )
 

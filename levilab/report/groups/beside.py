@@ -6,6 +6,7 @@ import math
 import statistics
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -104,13 +105,13 @@ class Compared:
         truth = sum(known) / len(known)  # type: ignore[arg-type]
         return truth, (self.mean.value - truth) / self.mean.u  # type: ignore[operator]
 
-    @property
+    @cached_property
     def from_class(self) -> tuple[float | None, ...]:
         """The distance of each group from the mean of the others, in u."""
         others = iter(self.together.distances if self.together else ())
         return tuple(next(others) if use else None for use in self.used)
 
-    @property
+    @cached_property
     def from_truth(self) -> tuple[float | None, ...]:
         """The distance of each group from its truth, in its u."""
         return tuple(
@@ -136,6 +137,11 @@ class Class:
     groups: tuple[Group, ...]
     quantities: tuple[Compared, ...]
     others: Mapping[str, str]
+
+    @cached_property
+    def marks(self) -> tuple[Mark, ...]:
+        """The mark of each group."""
+        return tuple(_mark(self, k) for k in range(len(self.groups)))
 
     @property
     def knows_truth(self) -> bool:
@@ -265,11 +271,6 @@ class Mark:
     notes: tuple[str, ...] = ()
 
 
-def marks(of: Class) -> tuple[Mark, ...]:
-    """Return the mark of each group."""
-    return tuple(_mark(of, k) for k in range(len(of.groups)))
-
-
 def _mark(of: Class, k: int) -> Mark:
     group, wrong, odd = of.groups[k], [], []
     for one in of.quantities:
@@ -303,7 +304,7 @@ def count_readings(group: Group) -> int:
 def _count_marks(of: Class) -> str:
     """Return how many groups have a good result, and which others have not."""
     named: dict[str, list[str]] = {GOOD: [], LOOK: [], REPEAT: []}
-    for group, one in zip(of.groups, marks(of), strict=True):
+    for group, one in zip(of.groups, of.marks, strict=True):
         named[one.word].append(group.source.name)
     texts = [f"{len(named[GOOD])} of {len(of.groups)} results {'is' if len(named[GOOD]) == 1 else 'are'} good."]
     texts += [f"To repeat: {enumeration(named[REPEAT])}."] if named[REPEAT] else []
@@ -329,7 +330,7 @@ def finding(of: Class) -> str:
 def verdict(of: Class) -> str:
     """Return whose results are good, and the mean of each quantity beside the truth."""
     if len(of.groups) == 1:
-        (group,), (mark,) = of.groups, marks(of)
+        (group,), (mark,) = of.groups, of.marks
         return f"{group.source.name} alone measured this: {mark.word}."
     texts = [f"{_mean(one)} is the mean of {_count(of, one)}{_beside_truth(one)}." for one in of.quantities]
     return "  ".join([_count_marks(of), *_scenes(of), *texts])

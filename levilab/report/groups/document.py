@@ -36,7 +36,6 @@ from levilab.report.groups.beside import (
     class_of,
     count_readings,
     finding,
-    marks,
     statistics_of_agreement,
     verdict,
 )
@@ -101,7 +100,7 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
     yield section("Result", "result", Verdict(verdict(of)), *_marks(of), *tables, *agree, _groups(of))
     if of.quantities and len(of.groups) > 1:
         yield section("Figure", "figure", _picture(of))
-    pairs = zip(of.groups, marks(of), strict=True)
+    pairs = zip(of.groups, of.marks, strict=True)
     if remarks := tuple(Fact(group.source.name, one.notes) for group, one in pairs if one.notes):
         yield section("Remarks of the analysis", "remarks", Facts(remarks))
     if any(group.source.note for group in of.groups):
@@ -113,7 +112,7 @@ def _marks(of: Class) -> Iterator[Tabular]:
     """Yield a row for each group whose result is not good, and why; nothing where all are."""
     rows = [
         Row((group.source.name, mark.word, "\n".join(mark.why)), _ROWS[mark.word])
-        for group, mark in zip(of.groups, marks(of), strict=True)
+        for group, mark in zip(of.groups, of.marks, strict=True)
         if mark.word != GOOD
     ]
     note = (
@@ -139,7 +138,7 @@ def _values(of: Class, quantity: Compared) -> Tabular:
         ]
         heads += [_TRUTH, _FROM_TRUTH]
     names = [*(group.source.name for group in of.groups), "mean"]
-    kinds = [*(_ROWS[mark.word] for mark in marks(of)), "together"]
+    kinds = [*(_ROWS[mark.word] for mark in of.marks), "together"]
     rows = [Row(cells, kind) for kind, cells in zip(kinds, zip(names, *columns, strict=True), strict=True)]
     rows = rows if len(of.groups) > 1 else rows[:1]
     note = "value(u): the digits in parentheses are u of the last digits. Green: good; red: to repeat."

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from levilab.present.units import name_with_unit
-from levilab.report.groups.beside import REPEAT, marks
+from levilab.report.groups.beside import REPEAT
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -93,7 +93,7 @@ def _groups(of: Class) -> tuple[list[str], list[list[Cell]]]:
             columns += [[*one.truths], [*one.from_truth]]
     heads += ["readings", "rms_residual", "reduced_chi_square", "best_model"]
     rows = []
-    for k, (group, mark) in enumerate(zip(of.groups, marks(of), strict=True)):
+    for k, (group, mark) in enumerate(zip(of.groups, of.marks, strict=True)):
         source, record = group.source, group.source.run.record if group.source.run else None
         about: list[Cell] = [
             source.group or source.name,

@@ -95,6 +95,14 @@ def test_the_vertical_swing_has_its_uncertainty(fresh, beside, rising):
     assert np.std(pulls) == pytest.approx(1, abs=4 / np.sqrt(24))
 
 
+def test_heights_that_are_all_alike_say_nothing():
+    times = np.arange(2400) / 120
+    places = swing(times, (-0.59, 0.77))
+    (without,), (alike,) = swings_of(times, places), swings_of(times, places, np.zeros(2400))
+    assert alike.frequency == pytest.approx(without.frequency, abs=1e-9)
+    assert alike.vertical == pytest.approx(without.vertical, rel=0.05)  # the grid of its prior is cut at 4 u
+
+
 def test_a_mirrored_view_is_known_by_the_precession(fresh):
     times = np.arange(2400) / 120
     places = swing(times, (-0.59, 0.77)) + 1e-4 * (fresh.normal(size=2400) + 1j * fresh.normal(size=2400))

@@ -186,7 +186,7 @@ def record_quickly(route: Route) -> None:
 def test_a_student_drives_records_and_analyzes(
     served: Hall, older: GrowingRun, page: Page, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    page.route("**/do", record_quickly)
+    page.route("**/do?*", record_quickly)
     page.goto(address(served, token=True))
     until(page, "levilab.data.bench?.last.spin_frequency_hz && levilab.space?.frames && levilab.space.state")
     assert page.evaluate(ANOTHER_TOP) == pytest.approx([0, 0, 0.07], abs=2e-4)
@@ -359,7 +359,7 @@ def test_a_result_that_was_closed_early_is_opened_again(
     page.click("#analyze")
     assert page.locator("#report").is_visible()
     assert page.inner_text("#verdict") == "The disc law."
-    assert asked == ["analyze", "report"]  # and not anew
+    assert asked == ["analyze", "report"]  # each once
 
 
 #: Whether the panel of each tab is seen whole, without a scroll of the page or of its part.

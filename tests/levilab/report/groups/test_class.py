@@ -16,7 +16,7 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.crosscheck.truth import Truth
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.report.groups.beside import DIFFER, GOOD, REPEAT, _quantity, _width, class_of, finding, marks, verdict
+from levilab.report.groups.beside import DIFFER, GOOD, REPEAT, _quantity, _width, class_of, finding, verdict
 from levilab.report.groups.document import write_class
 from levilab.runs.find import RECORD
 from levilab.world.spin_world import SpinScene, random_scene
@@ -159,7 +159,7 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
     (wrong / "readings.csv").write_text("\n".join([heads, *halved, ""]), encoding="utf-8")
     (root / "Group 4.csv").write_text("t in s,f in Hz\n0,40\n10,abc\n20,37\n", encoding="utf-8")
     of = compared(root)
-    assert {group.source.name: one.word for group, one in zip(of.groups, marks(of), strict=True)} == {
+    assert {group.source.name: one.word for group, one in zip(of.groups, of.marks, strict=True)} == {
         HOSTILE: GOOD, "Group 2": REPEAT, "Group 10": GOOD,
     }  # fmt: skip
     assert verdict(of).startswith("2 of 3 results are good. To repeat: Group 2.")
@@ -176,7 +176,7 @@ def test_a_run_of_few_readings_is_named_before_what_the_analysis_says(of_three, 
     lines = (short / "readings.csv").read_text(encoding="utf-8").splitlines()
     (short / "readings.csv").write_text("\n".join([*lines[:6], ""]), encoding="utf-8")
     of = compared(root)
-    mark = marks(of)[[group.source.name for group in of.groups].index("Group 2")]
+    mark = of.marks[[group.source.name for group in of.groups].index("Group 2")]
     assert re.fullmatch(r"5 readings instead of \d\d: measure longer", mark.why[0])
     assert not any("AICc" in text for text in mark.why)
     assert any("AICc" in text for text in mark.notes)
