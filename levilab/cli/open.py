@@ -43,7 +43,7 @@ def open_files(
     as_json: Json = False,
     **given: Any,
 ) -> None:
-    """Show how files are understood, and analyze them."""
+    """Show how files are understood, and what the data say; writes nothing without --keep or -o."""
     from levilab.pipelines.correction import write_correction
     from levilab.pipelines.look import look_as_kept
 
@@ -76,11 +76,11 @@ def _analyze(paths: "Sequence[Path]", options: "Mapping[str, Any]") -> None:
     from levilab.pipelines.suits import analyze_suiting
 
     left_out: list[str] = []
-    with interruptible("nothing is written"):
+    with interruptible("nothing is shown"):
         results = analyze_suiting(paths, options, left_out.append)
-    write_and_print(results, left_out, save=True, out=None, as_json=False, tables=False)
+    write_and_print(results, left_out, save=False, out=None, as_json=False, tables=False)
     same = " with the same options" if options else ""
-    message(f"all numbers: levilab analyze {' '.join(map(str, paths))}{same}")
+    message(f"all numbers, and a figure beside the file: levilab analyze {' '.join(map(str, paths))}{same}")
 
 
 def _report(paths: "Sequence[Path]", options: "Mapping[str, Any]", output: Path) -> None:

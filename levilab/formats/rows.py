@@ -32,6 +32,8 @@ if TYPE_CHECKING:
 FEW = 1 << 16  # bytes that are read line by line before pandas is imported
 BLOCK = 1 << 17  # bytes counted at once: small enough for the cache
 ONE_BYTE_ENCODINGS = ("utf-8", "utf-8-sig", "latin-1")  # those in which a line end is one byte, whatever precedes it
+#: In a field behind the last column a digit is a number too many; a word is a person's remark.
+_NUMBER_IN = re.compile(r"\d")
 _ITS_OWN_COLUMN = "write what stands behind the ± into a column of its own, with the title u"
 TRUTHS = (b"rue", b"RUE", b"alse", b"ALSE")  # of True and False, which pandas takes for 1 and 0
 SPELLINGS = sorted({form for text in MISSING for form in (text, text.upper(), text.title(), "NaN")})
@@ -182,6 +184,7 @@ def _read_lines(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_un
         if below:
             raise below[0][0]
         time = time or _time_in(layout, chosen, line)
+        notes += _remark_behind(layout, number, line)
         lines.append(number)
         for column, value in zip(values, row, strict=True):
             column.append(value)
@@ -199,6 +202,13 @@ def _lines(text: Text, layout: Layout) -> Iterator[tuple[int, str]]:
         for number, line in enumerate(stream, 1):
             if number >= layout.first_line and not _skips(layout, line):
                 yield number, line
+
+
+def _remark_behind(layout: Layout, number: int, line: str) -> Iterator[str]:
+    """Yield a note on the words that a person wrote behind the last column."""
+    remark = "" if layout.aligned else " ".join(filter(None, layout.dialect.split(line)[layout.width :]))
+    if remark:
+        yield f"line {number}: '{shorten(remark)}' behind the last column is left out"
 
 
 def _begins_with_words(layout: Layout, line: str) -> bool:
@@ -266,7 +276,7 @@ def _doubts_about(time: str) -> Iterator[str]:
 def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: str) -> list[float]:
     """Return the numbers of one row, NaN where a reading is missed."""
     fields = layout.dialect.split(text)
-    if not layout.aligned and (len(fields) < layout.width or any(fields[layout.width :])):
+    if not layout.aligned and (len(fields) < layout.width or any(map(_NUMBER_IN.search, fields[layout.width :]))):
         hint = "; if the comma is a decimal mark, separate by ; or tab" if layout.dialect.separator == "," else ""
         raise TableError(
             path,

@@ -9,7 +9,7 @@ import io
 import json
 import re
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from datetime import date, datetime, time, timedelta
@@ -40,6 +40,8 @@ _ABOUT = "meta"
 _JSON = frozenset({".json", ".jsonl"})
 _OLE, _ZIP = b"\xd0\xcf\x11\xe0", b"PK\x03\x04"
 _BLOCK = 1 << 18
+#: Files of a folder that a message names.
+_NAMED = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +92,20 @@ def locate(path: Path) -> tuple[Path, str]:
     return path, ""
 
 
+def name_files(folder: Path, ends: Collection[str] = ()) -> str:
+    """Return the names of a folder's files, the first of many, as text; with `ends`, of names that end so."""
+    files = sorted(one.name for one in folder.iterdir() if one.is_file() and not one.name.startswith("."))
+    files = [name for name in files if not ends or Path(name).suffix.casefold() in ends]
+    return ", ".join([*files[:_NAMED], *["…"] * (len(files) > _NAMED)])
+
+
 def must_be_file(path: Path) -> None:
     """Raise TableError for a folder, a pipe or a device, FileNotFoundError for nothing: reading it would wait."""
     path = locate(path)[0]
     if path.is_dir():
-        raise TableError(path, "is a folder; a data file is expected: name the file in it")
+        names = name_files(path, (*TEXTS, *SPREADSHEETS)) or name_files(path)
+        advice = f"name one in it: {names}" if names else "there are no files in it"
+        raise TableError(path, f"is a folder; a data file is expected: {advice}")
     if not path.exists():  # also for a name that no file can have
         raise FileNotFoundError
     if not path.is_file():
@@ -125,6 +136,8 @@ def _texts(file: Path, _: int, size: int) -> tuple[Text, ...]:
     if head[:200].removeprefix(codecs.BOM_UTF8).lstrip()[:1] in {b"{", b"["} and file.suffix.casefold() != ".csv":
         return (_of_json(file, size),)
     dressed = undress(head, lambda: _read(file, size))
+    if dressed is None and file.suffix.casefold() in {".md", ".markdown"}:
+        raise NoTable(file, "is a Markdown page without a table of readings")
     return (Text(file, dressed.content, dressed.titles) if dressed else Text(file),)
 
 

@@ -45,7 +45,7 @@ NEED_UNITS = (
 #: Units in which the title says whether turns or radians are counted.
 _PER_SECOND = ("1/s", "s-1")
 
-#: Names of a component of the magnetic field; that of its absolute value, "Absolute field", is none.
+#: Names of a component of the magnetic field.
 _COMPONENTS = (
     "flux_density_{}", "magnetic_field_{}", "magnetfeld_{}", "magnetfält_{}", "champ_magnétique_{}",
     "campo_magnético_{}", "magnetometer_{}", "mag_{}", "mag{}", "b_{}", "b{}",
@@ -77,6 +77,9 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
         f"flux_density_{axis}_t": ("flux density", tuple(form.format(axis) for form in _COMPONENTS))
         for axis in "xyz"
     },
+    "flux_density_abs_t": ("flux density", (
+        "absolute_field", "absolute_magnetic_field", "absolutes_feld", "absolutes_magnetfeld", "absolutfeld",
+        "magnetic_field_magnitude", "|b|", "b_abs", "babs", "btotal", "b_total")),
 }  # fmt: skip
 
 # Names that say their unit themselves; every other bare name is taken as SI.
@@ -171,8 +174,10 @@ COMPANIONS: Mapping[str, str] = {companion(column): column for column in QUANTIT
 CANONICAL = (*QUANTITIES, *COMPANIONS)
 #: Components of a field along a phone's axes.
 COMPONENTS = tuple(f"flux_density_{axis}_t" for axis in "xyz")
+#: The field's magnitude, where no component is recorded.
+MAGNITUDE = "flux_density_abs_t"
 #: Those that a message lists.
-LISTED = tuple(name for name in CANONICAL if COMPANIONS.get(name, name) not in {*COMPONENTS, "x_m", "y_m"})
+LISTED = tuple(name for name in CANONICAL if COMPANIONS.get(name, name) not in {*COMPONENTS, MAGNITUDE, "x_m", "y_m"})
 
 
 def _all_names() -> dict[str, str]:

@@ -162,7 +162,7 @@ def _shown(look: "_Look", request: "Request", *, alone: bool) -> UnderstoodRun:
     """Return one look at a run as data."""
     plan, error, layout, part = look.plan, look.error, look.layout, look.part
     name = "" if alone else look.name
-    if layout is None or part is None:
+    if layout is None or part is None or isinstance(error, NoTable):
         return UnderstoodRun(look.path, name, 0, (), problem=str(error))
     used = {column.index: column for column in _known(look, layout, part, request)}
     seen = [_column(k, layout, used.get(k)) for k in range(layout.width) if part.has(k, layout.header)]
@@ -455,6 +455,8 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
         known = ", ".join([*(name for name in quantities if name in LISTED and name not in COMPANIONS), *examples])
         wanted_names = needed or [name for name in SHORTHANDS.values() if name in quantities][:2]
         words = "" if any(_numbers(layout, k) for k in range(layout.width)) else "there are no numbers in it, and "
+        if words and locate(path)[1]:
+            raise NoTable(path, "is a sheet without numbers")
         raise NoSuchColumn(
             path,
             f"{words}no title is known ({known} …) among {quote_names(header)}: say `columns` = "
@@ -538,10 +540,7 @@ def no_column(path: Path, name: str, header: Sequence[str], doubt: Doubt | None 
         title, sensor = next((pair for pair in sensors.items() if pair[1]), ("", None))
         field = next((one for one in header if name == _SPIN and _is_field(one)), None)
         if field:
-            text = (
-                f"'{shorten(field)}' is a magnetic field, no spin frequency: levilab analyze spin FILE finds the spin"
-            )
-            text += " in a magnetometer's record of its axes x, y and z"
+            text = f"'{shorten(field)}' is a magnetic field, no spin frequency: levilab analyze spin FILE reads it"
         elif sensor:
             text = f"'{shorten(title)}' is of {sensor}, which shows no turns: record with the magnetometer, or name its"
             text += f" sheet or file; no column is known to be {name}"

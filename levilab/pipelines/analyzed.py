@@ -108,7 +108,8 @@ class Analyzed(Generic[S, R, T, Opt]):
         """Every warning once, doubts first; an input's with its name, unless it says it or is of every input."""
         texts = [*self.warnings, *self.about_all()]
         of_runs = [
-            [*source.warnings, *self.about_run(run)] for source, run in zip(self.sources, self.runs, strict=True)
+            [*source.warnings, *(() if source.readings.doubtful else self.about_run(run))]
+            for source, run in zip(self.sources, self.runs, strict=True)
         ]
         of_every = set.intersection(*map(set, of_runs))
         for source, said in zip(self.sources, of_runs, strict=True):

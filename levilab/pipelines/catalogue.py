@@ -45,7 +45,7 @@ def print_analysis(
     *,
     tables: bool = True,
 ) -> None:
-    """Print what the data say, doubts about it, the tables, and notes.
+    """Print doubts, what the data say, the tables, and notes.
 
     Args:
         analysis: the row of the catalogue.
@@ -59,9 +59,9 @@ def print_analysis(
     from levilab.present.terminal import draw, terminal  # with rich
 
     console = console or terminal()
-    console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
     for doubt in found.doubts:
         console.print(f"[bold yellow]Before you use the numbers.[/bold yellow] {escape(in_words(doubt))}")
+    console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
     if tables:
         console.print()
         for table in analysis.tables(found):

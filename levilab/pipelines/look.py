@@ -13,6 +13,7 @@ from analysis.numbers import digits
 from levilab.errors import LevilabError
 from levilab.formats.table import read_table
 from levilab.formats.texts import locate
+from levilab.formats.titles import COMPONENTS, MAGNITUDE
 from levilab.formats.understanding import UnderstoodColumn, UnderstoodRun, understand
 from levilab.formats.waveforms.header import NoWaveform
 from levilab.formats.waveforms.record import read_record
@@ -39,7 +40,8 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType({
     "precession_frequency_hz": ("precession frequency", ("Hz", "rpm", "rad/s")),
     "height_m": ("height", ("m", "cm", "mm")),
     "flux_density_t": ("flux density", ("T", "mT", "μT", "G")),
-    **{name: (f"flux density {name[-3]}", ("T", "mT", "μT", "G")) for name in magnetometer.QUANTITIES[1:4]},
+    **{name: (f"flux density {name[-3]}", ("T", "mT", "μT", "G")) for name in COMPONENTS},
+    MAGNITUDE: ("magnitude of the flux density", ("T", "mT", "μT", "G")),
 })  # fmt: skip
 #: Tables by their columns: those that are wanted, and those without which it is another one; the first that fits.
 _TABLES = (
@@ -47,7 +49,7 @@ _TABLES = (
     (precession.QUANTITIES, precession.NEEDED),
     (spindown.QUANTITIES, spindown.QUANTITIES[:2]),
     (limit.QUANTITIES, limit.QUANTITIES[:1]),
-    (magnetometer.QUANTITIES, magnetometer.NEEDED),
+    *((magnetometer.QUANTITIES, needed) for needed in magnetometer.NEEDED),
 )
 _SPIN_DOWN = _TABLES[2]
 #: Points of a small plot at most, the samples that it shows, and the largest table that is read for it [bytes].

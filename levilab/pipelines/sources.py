@@ -81,9 +81,11 @@ class Readings:
     Attributes:
         warnings: what to know before using them.
         compared: names of the arrays by which the same readings are found again; the last has the fingerprint.
+        doubtful: whether their unit is in doubt: means leave them out, and fits to them deserve no remark.
     """
 
     warnings: tuple[str, ...]
+    doubtful: bool = False
     compared: ClassVar[tuple[str, ...]]
 
     def _compared(self) -> list[np.ndarray]:

@@ -92,7 +92,7 @@ def blocks_of_part(
     *,
     deeper: bool = False,
 ) -> list[Block]:
-    """Return what one analysis found: result with its doubts, figure, notes, what else is known, run by run.
+    """Return what one analysis found: doubts, result, figure, notes, what else is known, run by run.
 
     Args:
         analysis: the row of the catalogue.
@@ -112,7 +112,7 @@ def blocks_of_part(
     doubts = [Warnings(grave)] if grave else []
     values = part.values if asked.short and part.values else part.result
     blocks = [
-        section("Result", "result", Verdict(_verdict(found)), *doubts, *values),
+        section("Result", "result", *doubts, Verdict(_verdict(found)), *values),
         section("Figure", "figure", picture_of(analysis, found, part, short=asked.short)),
         *([section("Notes", "notes", Warnings(notes))] if notes else []),
     ]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from levilab.errors import DataError
 from levilab.files import CannotWrite
-from levilab.formats.texts import locate
+from levilab.formats.texts import SPREADSHEETS, TEXTS, locate, name_files
 
 RECORD = "run.json"
 #: Where runs are, unless a person says otherwise.
@@ -62,7 +62,9 @@ def no_such_path(path: Path) -> DataError:
     folder = next(place for place in (path.parent, *path.parent.parents) if place.is_dir())
     wanted = path.relative_to(folder).parts[0] if folder != path.parent else path.name
     near = difflib.get_close_matches(wanted, sorted(one.name for one in folder.iterdir()), n=1, cutoff=0.8)
-    advice = f"did you mean {folder / near[0]}?" if near else "check the name; levilab runs lists the runs of a folder"
+    files = name_files(folder, (*TEXTS, *SPREADSHEETS))
+    there = f"its data files are {files}" if files else "check the name; levilab runs lists the runs of a folder"
+    advice = f"did you mean {folder / near[0]}?" if near else there
     return DataError(f"{path}: there is no such file or folder in {folder.resolve()}: {advice}")
 
 

@@ -13,7 +13,7 @@ from analysis.pulses import Finding, SpinFrequency
 from analysis.uncertainty import Estimate
 from levilab.formats.columns import TableError
 from levilab.formats.table import read_table
-from levilab.formats.titles import COMPONENTS
+from levilab.formats.titles import COMPONENTS, MAGNITUDE
 from levilab.formats.understanding import Request, SeveralRuns, plan_of
 
 if TYPE_CHECKING:
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 #: Columns of a record; a Bz beside a Bx is a component.
-QUANTITIES = ("time_s", *COMPONENTS, "flux_density_t")
-#: Those that make a table a record.
-NEEDED = ("time_s", COMPONENTS[0])
+QUANTITIES = ("time_s", *COMPONENTS, "flux_density_t", MAGNITUDE)
+#: Those that make a table a record: any of these pairs.
+NEEDED = tuple(("time_s", name) for name in (*COMPONENTS, MAGNITUDE))
 #: No field that a phone survives is as strong [T]: the unit is in doubt.
 STRONGEST_T = 0.1
 #: A slower record shows no spin [samples/s]: a scan of the field by hand has one a second.
@@ -42,7 +42,7 @@ class FieldRecord:
     Attributes:
         times: increasing, shape (n,) [s].
         field: shape (n, k) [T].
-        axes: their names, "x" to "z".
+        axes: their names, "x" to "z", or "|B|" alone.
         warnings: about the file.
     """
 
@@ -71,21 +71,19 @@ class FieldRecord:
 
 
 def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
-    """Return the samples in a data file; None: it holds no component of a field against time.
+    """Return the samples in a data file; None: it holds no field against time.
 
     Raises:
         TableError: it does, but cannot be used.
     """
-    try:
-        plan_of(path, Request(options.columns or {}, QUANTITIES, NEEDED, guess=False))
-    except SeveralRuns:
-        raise
-    except (TableError, OSError):  # another reader says why
+    needed = next((pair for pair in NEEDED if _holds(path, options, pair)), None)
+    if needed is None:
         return None
-    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=False)
+    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=needed, guess=False)
     axes = {name: name[-3] for name in COMPONENTS if name in table.columns}
-    if axes and COMPONENTS[2] not in axes and "flux_density_t" in table.columns:
+    if COMPONENTS[2] not in axes and "flux_density_t" in table.columns:
         axes["flux_density_t"] = "z"
+    axes = axes or {MAGNITUDE: "|B|"}
     times = table.column("time_s")
     field = np.stack([table.column(name) for name in axes], axis=1)
     warnings = list(table.warnings)
@@ -101,8 +99,24 @@ def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
         units = ",".join(f"b{axis}=NAME [µT]" for axis in axes.values())
         what = f"{path.name}: a field of {strongest:.3g} T is stronger than a phone measures, so the unit is another"
         warnings.append(f"{what}; say it with the columns: {units}")
+    if MAGNITUDE in axes:
+        warnings.append(
+            f"{path.name}: holds the field's magnitude alone: where the field that turns is the stronger part, its "
+            "line lies at twice the spin; record the axes x, y and z, too"
+        )
     record = FieldRecord(times, field, tuple(axes.values()), tuple(warnings))
     return record if record.duration > 0 and record.rate > SLOWEST_RATE else None
+
+
+def _holds(path: Path, options: InputOptions, needed: tuple[str, ...]) -> bool:
+    """Return whether a file holds these columns.  Raises SeveralRuns."""
+    try:
+        plan_of(path, Request(options.columns or {}, QUANTITIES, needed, guess=False))
+    except SeveralRuns:
+        raise
+    except (TableError, OSError):  # another reader says why
+        return False
+    return True
 
 
 # --- as the spin of a train of pulses has it ---

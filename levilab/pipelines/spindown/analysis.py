@@ -42,6 +42,8 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
 
     def about_all(self) -> Iterable[str]:
         """Yield remarks on the means, on the laws that are not excluded, and on what was asked for."""
+        if all(source.readings.doubtful for source in self.sources):
+            return
         yield from (*map(remark, self.combined.remarks), *self._left_out(), *self._of_laws(self.combined.fits))
         if self.options.laws:
             yield f"drag laws other than {enumeration(self.options.laws)} are left out, as asked"

@@ -240,9 +240,9 @@ def _without_rest(table: Table, fewest: int) -> Table:
     return replace(table, columns=columns, lines=table.lines[:end], warnings=(*table.warnings, note))
 
 
-#: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, times in ms
-#: 3e-6; a brake of eddy currents and a poor vacuum lie between.
-FASTEST_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 1e-5
+#: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, seconds that
+#: pass for minutes 5e-5, times in ms 3e-6; a brake of eddy currents lies between.
+FASTEST_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 1e-4
 #: No hand spins a top so fast [Hz].
 FASTEST_BY_HAND_HZ = 60.0
 
@@ -267,8 +267,9 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
     loss = float(np.log(frequency[0] / frequency[-1])) / lasts
     if loss > FASTEST_LOSS_PER_S or (0 < loss < SLOWEST_LOSS_PER_S):
         doubt = f"{table.path.name}: the spin goes from {frequency[0]:.4g} to {frequency[-1]:.4g} Hz in {lasts:.4g} s"
-        unit = "min" if loss > FASTEST_LOSS_PER_S else "ms"
-        return [f"{doubt}, in air it takes minutes; if the times are not in seconds, say so, as t=NAME [{unit}]"]
+        minutes = loss < SLOWEST_LOSS_PER_S and table.factors.get("time_s", 1.0) > 1
+        written, unit = ("minutes", "s") if minutes else ("seconds", "min" if loss > FASTEST_LOSS_PER_S else "ms")
+        return [f"{doubt}, in air it takes minutes; if the times are not in {written}, say so, as t=NAME [{unit}]"]
     first, last = float(frequency[0]), float(frequency[-1])
     if first > FASTEST_BY_HAND_HZ and FALLS_BETWEEN_HZ[1] < last / 2 < FALLS_BETWEEN_HZ[0]:
         doubt = f"{table.path.name}: the spin goes from {first:.4g} to {last:.4g} Hz: is each turn counted twice?"

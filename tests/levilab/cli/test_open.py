@@ -1,6 +1,7 @@
 """levilab open in the terminal: what a file is understood as, corrected, kept, analyzed and reported."""
 
 import json
+import re
 import sys
 
 import pytest
@@ -40,10 +41,10 @@ def test_an_answer_is_kept_analyzed_and_reported(doubtful):
     assert ended.status == 0
     assert "the report is in my.html" in ended.out
     names = {path.name for path in doubtful.parent.iterdir()}
-    assert {"my.html", "my.csv.levilab.toml", "my.csv.result.json", "my.csv.spindown.png"} <= names
+    assert names == {"my.csv", "my.html", "my.csv.levilab.toml"}
     again = command("open", "my.csv", cwd=doubtful.parent)
     assert len(again.out.splitlines()) <= 20  # with some messages a screen of 25
-    assert "all numbers: levilab analyze my.csv" in again.err
+    assert "figure beside the file: levilab analyze my.csv" in again.err
     assert (again.status, "is read as my.csv.levilab.toml says" in again.out) == (0, True)
 
 
@@ -60,18 +61,21 @@ def test_a_magnetometer_s_record_is_understood_and_analyzed(tmp_path):
     look = look_at(path, {})
     used = [column.quantity for column in look.runs[0].columns]
     assert (look.problem, used[:4]) == ("", ["time_s", *(f"flux_density_{axis}_t" for axis in "xyz")])
-    one_axis = tmp_path / "y.csv"  # which no analysis reads: the spin is not asked for among microtesla
-    rows = [line.split(",") for line in path.read_text("utf-8").splitlines()[:50]]
-    one_axis.write_text("".join(f"{row[0]},{row[2]}\n" for row in rows), "utf-8")
-    ended = command("open", "y.csv", cwd=tmp_path)
-    assert (ended.status, "f=NUMBER" in ended.out) == (1, False)
-    assert "levilab analyze spin FILE" in ended.err
+    rows = [line.split(",") for line in path.read_text("utf-8").splitlines()]
+    for name, columns in {"one axis": (0, 2), "magnitude": (0, 4)}.items():
+        file = tmp_path / f"{name}.csv"
+        file.write_text("".join(",".join(row[k] for k in columns) + "\n" for row in rows), "utf-8")
+        ended = command("open", file.name, cwd=tmp_path)
+        assert ended.status == 0
+        (spin,) = re.findall(r"; (36\.8\d+)\(\d+\) Hz at 22\.5 s", ended.out)
+        assert float(spin) == pytest.approx(36.8569, abs=0.012)  # of all axes; twice the u of one
+        assert ("lies at twice the spin" in ended.out) == (name == "magnitude")
 
 
 def test_a_sheet_without_numbers_asks_nothing():
     sheets = look_at(ROOT / "sample_data" / "student-files" / "phyphox.xlsx", {}).runs
     assert [(sheet.name, sheet.doubts) for sheet in sheets] == [("Peak history", ()), ("Metadata Device", ())]
-    assert "there are no numbers in it" in sheets[1].problem
+    assert "is a sheet without numbers" in sheets[1].problem
 
 
 @pytest.mark.parametrize(

@@ -722,11 +722,12 @@ def test_passes_over_many_files_work_out_each_dialect_once(tmp_path, monkeypatch
 @pytest.mark.parametrize(
     "title", ["Magnetic Field {} (µT)", "Magnetfeld {} in µT", "B{} [µT]", "b_{}/µT", "mag{} (uT)"]
 )
-def test_components_of_a_field_are_read_and_its_size_is_none(title, table_file):
+def test_components_of_a_field_and_its_magnitude_are_read(title, table_file):
     names = [title.format(axis) for axis in "xyz"]
     text = "\n".join(",".join(row) for row in [("Time (s)", *names, "Absolute field (µT)")]) + "\n"
     table = read_table(table_file(text + "0,1,2,3,3.7\n0.01,1,2,3,3.7\n0.02,1,2,3,3.7\n"))
     found = {name: values[0] for name, values in table.columns.items() if name != "time_s"}
     if title.startswith(("B", "b")):  # alone it is that of a Hall probe on the axis
         found["flux_density_z_t"] = found.pop("flux_density_t")
-    assert found == pytest.approx({f"flux_density_{axis}_t": k * 1e-6 for k, axis in enumerate("xyz", 1)})
+    fields = {axis: k * 1e-6 for k, axis in enumerate("xyz", 1)} | {"abs": 3.7e-6}
+    assert found == pytest.approx({f"flux_density_{axis}_t": value for axis, value in fields.items()})

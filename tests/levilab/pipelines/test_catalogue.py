@@ -208,14 +208,14 @@ def test_a_sweep_that_keeps_records_is_a_sweep_first(tmp_path, sample_data):
     assert save_found(spin, spin.analyze([run], spin.options_from({"channel": "laser"})))[0].name == "result.spin.json"
 
 
-def test_the_answer_comes_first_and_then_what_makes_it_doubtful():
+def test_what_makes_an_answer_doubtful_comes_before_it():
     limit = ANALYSES["limit"]
     found = limit.analyze([SAMPLE_DATA / "loose-washers"], limit.options())
     shown = " ".join(as_text(lambda console: print_analysis(limit, found, console=console)).split())
     said = "What the data say. The drive lost the tops at 70.26(15) Hz on average: 8 upper limits"
-    in_order = (said, "LOOSE WASHERS", "Limits of the spin, 1 run, SYNTHETIC", "Beside theory")
+    in_order = ("LOOSE WASHERS", said, "Limits of the spin, 1 run, SYNTHETIC", "Beside theory")
     assert sorted(in_order, key=shown.index) == list(in_order)
     result, *others = blocks_of_part(limit, found, limit.part(found), Asked(crosscheck=False))
-    assert [type(block).__name__ for block in result.blocks[:2]] == ["Verdict", "Warnings"]
-    assert "LOOSE WASHERS" in repr(result.blocks[1])
+    assert [type(block).__name__ for block in result.blocks[:2]] == ["Warnings", "Verdict"]
+    assert "LOOSE WASHERS" in repr(result.blocks[0])
     assert not any("LOOSE WASHERS" in repr(section) for section in others if section.title == "Notes")
