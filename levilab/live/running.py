@@ -143,7 +143,7 @@ def spin_down(columns: Mapping[str, Array], size: int, *_: object) -> Running:
         Curve(x, y, solid_to=last),
         end,
         found.best,
-        "dashed: the law alone, without the tilt, which is in the count" if best.has_tilt and end else "",
+        "dashed: the law alone; the count also sees the wobble" if best.has_tilt and end else "",
         Text("{law} law   {equation}", law=found.best, equation=LAWS[found.best].equation),
     )
 

@@ -331,7 +331,7 @@ function showGenerator(bench, last) {
   by("drive-on").classList.toggle("on", Boolean(drive?.output));
   write("signal", drive?.waveform ? `${drive.waveform}, ${short(drive.amplitude_vpp)} Vpp${drive.offset_v ? phrase(", offset {volts} V", {volts: short(drive.offset_v)}) : ""}` : "–");
   const [, spin, then] = drive?.output && history.latest || [], off = spin - then;  // of a count and its own time
-  write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? (practice && !bench.busy && !bench.took_hold ? phrase("takes hold") : phrase("follows")) : Math.abs(off) < SWINGS_HZ ? phrase("near it") : phrase("beside it")}, ${off >= 0 ? "+" : ""}${fixed(off, 3)} Hz` : "–");
+  write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? (practice && !bench.busy && !bench.took_hold ? phrase("takes hold") : phrase("follows")) : Math.abs(off) < SWINGS_HZ ? phrase("nearly") : phrase("does not follow")}, ${off >= 0 ? "+" : ""}${fixed(off, 3)} Hz` : "–");
   write("generator-model", modelOf("generator"));
 }
 
@@ -341,7 +341,7 @@ function showMagnetometer(bench, last) {
   const field = from.flux_density_t, height = from.height_m ?? bench?.probe_m;
   write("field-value", Number.isFinite(field) ? fixed(field * 1000, 3) : "–");
   stale("field-value", !bench || bench.silent);
-  write("probe", Number.isFinite(height) ? phrase("{height} cm above the base", {height: short(height * 100)}) : bench?.virtual ? phrase("in its chamber") : "–");
+  write("probe", Number.isFinite(height) ? phrase("{height} cm above the base", {height: short(height * 100)}) : bench?.virtual ? phrase("in its chamber until a field run") : "–");
   write("magnetometer-model", modelOf("magnetometer"));
   write("scope-model", modelOf("oscilloscope"));
 }
@@ -388,9 +388,9 @@ function showTop(bench) {
 function showAge(bench) {
   const used = Object.keys(data.about?.instruments || {}), runs = data.about?.status === "running";
   const drawn = [...data.records.values()].some((one) => one.drawn);
-  const still = runs && used.length && !used.includes("oscilloscope") ? phrase("a {experiment} run does not read it", {experiment: data.about.experiment}) : "";
-  const why = still && drawn ? `${still}: ${phrase("the simulated signals")}` : still;
-  write("scope-key", [data.up === false ? phrase("the top is down") : "", why].filter(Boolean).join("; "));
+  const still = runs && used.length && !used.includes("oscilloscope") ? phrase("this run does not use it") : "";
+  const why = still && drawn ? `${still}; ${phrase("the signals are simulated")}` : still;
+  write("scope-key", [data.up === false ? phrase("the top is down") : "", why].filter(Boolean).join("; ") || (data.records.has("laser") ? phrase("laser: the beam that the stem cuts") : ""));
   put(by("trigger-of"), {hidden: !drawn});
   for (const one of data.records.values()) {
     const said = ageOf(one, bench);
@@ -418,7 +418,7 @@ function speak(state, left) {
   if (now - spoken < SPOKEN_EVERY_MS && state === spokenState) return;
   spokenState = state;
   const spin = data.last.spin_frequency_hz;
-  const parts = [phrase("reading {number}", {number: data.count}), Number.isFinite(spin) ? `${fixed(spin, 2)} hertz` : "", left ? phrase("{time} left", {time: left}) : ""];
+  const parts = [phrase("reading {number}", {number: data.count}), Number.isFinite(spin) ? phrase("{spin} hertz", {spin: fixed(spin, 2)}) : "", left ? phrase("{time} left", {time: left}) : ""];
   const text = (STATES[state] || state) + (data.count ? `: ${parts.filter(Boolean).join(", ")}` : "");
   if (by("news").textContent !== text) {
     spoken = now;

@@ -79,7 +79,7 @@ class PracticeDrive:
         self.bench: Bench | None = None
         self._set = Drive("SQU", 30.0, 10.0)  # as a person set it: where its frequency is, or is going
         self._ramp_hz_per_s = 0.1
-        self._is_matched = False  # to the top, which spins more slowly by the time it is switched on
+        self._is_matched = False  # to the top, whose spin it follows until it is switched on
         self._hold: Hold | None = None  # while it is on near the top's spin
         self.took_hold = self.tuned_up = False
         self._moved = 0.0  # bench time of the last step of the frequency [s]
@@ -229,6 +229,8 @@ class PracticeDrive:
             spin: that was counted [Hz]; None: no light pulses.
         """
         hold = self._hold
+        if self._is_matched and spin is not None:  # it is still off, and the top gets slower meanwhile
+            self._set = replace(self._set, frequency_hz=round(spin, 2))
         if hold is None or hold.is_lost:
             return
         if hold.since is None:
@@ -240,7 +242,7 @@ class PracticeDrive:
         self._switch_on(spin)
         limits = self.generator.limits
         self._hold = Hold(self._set.frequency_hz, Grip(spin, limits.drive_lowest_hz, limits.drive_frequency_hz))
-        self._voice.say(Text("drive on at the top's spin, {spin:.2f} Hz; it takes hold within 20 s", spin=spin))
+        self._voice.say("drive on at the top's spin; it takes hold within 20 s")
 
     def _yield(self, hold: Hold, spin: float | None) -> None:
         grip = hold.grip
@@ -249,8 +251,9 @@ class PracticeDrive:
             self._give_up()
         elif grip.is_over:
             hold.since = self._moved = self._now()
-            if self._set.frequency_hz == hold.asked_hz:  # else a person has tuned it on meanwhile
-                self._set = replace(self._set, frequency_hz=grip.drive)
+        if self._set.frequency_hz == hold.asked_hz:  # else a person has tuned it on meanwhile
+            hold.asked_hz = grip.drive
+            self._set = replace(self._set, frequency_hz=grip.drive)
 
     def _compare(self, hold: Hold, spin: float | None) -> None:
         """Compare the spin with the drive: it follows, was tuned up, or was lost."""

@@ -149,7 +149,7 @@ class PracticeProcess:
             ask.StopRun: self._stop_run,
             ask.RecordRun: self._want_run,
             ask.PutBack: lambda _: self.top.put_back(),
-            ask.ChangeBench: lambda command: self.top.change(command.values),
+            ask.ChangeBench: self._change_bench,
             ask.TakeSeed: self._take_seed,
             ask.BeginTask: self._begin_task,
             ask.AnswerTask: self._answer_task,
@@ -227,16 +227,18 @@ class PracticeProcess:
         look = Look(self.clock.now(), self.top.floats(), self._spin, drive.output_hz, drive.follows, answer)
         if task := self.tasks.look(look):
             found = task.found(self.top.scene)
-            self._leave_task()
+            if found:  # its top stays as a person made it float
+                self.tasks.begin("")
+            else:
+                self._leave_task()
             self._voice.say(Text("reached: {title}. It shows: {teaches}", title=task.title, teaches=task.teaches), "")
             if found:
                 self._voice.say(found)
 
     def _leave_task(self) -> None:
         """End the task under way; what it hid is taken away again."""
-        hid = self.tasks.hidden
         self.tasks.begin("")
-        if hid:
+        if self.top.hides:
             self.top.hide({})
             if not self.top.floats():
                 self.top.put_back()
@@ -338,6 +340,13 @@ class PracticeProcess:
         if plan.experiment in NEED_A_TOP and not plan.scene and not self.top.floats():
             raise CommandRefused("the top is down, and this run begins with one that floats: put the top back first")
         self._wanted, self._stopped = command, ""
+
+    def _change_bench(self, command: ask.ChangeBench) -> None:
+        if command.values or self.tasks.name:
+            self.top.change(command.values)
+        else:
+            self.top.hide({})  # with a top that a task has left
+            self._voice.text = ""
 
     def _take_seed(self, command: ask.TakeSeed) -> None:
         seed = seed_of_group(command.group, self._options.seed or 1) if command.seed is None else command.seed

@@ -36,8 +36,8 @@ def keys_of_seed(scene: Scene, seed: int) -> dict[str, Any]:
         scatter = np.random.default_rng(seed).standard_normal(2)
         drag = 1 + _DRAG_SCATTER * float(scatter[0])
         base = 1 + _BASE_SCATTER * float(np.clip(scatter[1], -_MOST, _MOST))
-    return {
-        "drag.coefficient": scene.drag.constants[0] * drag,
+    constants = scene.drag.constants  # none of a scene without drag
+    return ({"drag.coefficient": constants[0] * drag} if constants else {}) | {
         "base.strength_t_m": scene.base.strength_t_m * base,
         "top.moment_a_m2": scene.top.moment_a_m2 / base,
     }

@@ -73,12 +73,12 @@ class Task:
 
 
 def _mass(chance: float) -> dict[str, Any]:
-    """Return a mass above those that float, 24.25 to 24.97 g, from which washers of -0.2 to 0.8 g lead into them."""
+    """Return a mass above those that float, 24.25 to 24.97 g, of which washers of 0.2 g are a part."""
     return {"top.mass_kg": 25.0e-3 + 0.1e-3 * chance}
 
 
 def _say_mass(scene: Scene) -> str:
-    return Text("this top floated with {mass:.2f} g", mass=1e3 * scene.top.mass_kg)
+    return Text("this top floats with {mass:.2f} g; “All as usual” brings the usual one", mass=1e3 * scene.top.mass_kg)
 
 
 #: A drag that slows 30 Hz by 0.11 Hz/s: exponent → law and coefficient.  C ω^n = 0.7 rad/s² at 188 rad/s.
@@ -107,8 +107,8 @@ TASKS: dict[str, Task] = {
         "drive", lambda look: look.is_held, for_s=180.0,
     ),
     "mass": Task(
-        "Find the mass that floats", "This top is too heavy by some tenths of a gram. Take washers off (What if: below "
-        "0 g), and put it back, until it floats for 20 s.",
+        "Find the mass that floats", "This top is too heavy by some tenths of a gram. Take washers off (What if), and "
+        "put it back, until it floats for 20 s.",
         "of 25 g only some tenths are free: field and weight balance at a height at which the field also holds the top",
         "washers_g", lambda look: look.floats, for_s=20.0, found=_say_mass, hidden=_mass,
     ),

@@ -39,6 +39,7 @@ class PracticeTop:
     Attributes:
         world, wiring: of the top that is on the bench, and of the instruments that see it.
         scene: of that top, as it is now.
+        hides: whether a task has changed the usual top.
         what_if: what a person changed about the usual top, by names in WHAT_IF.
         seed: which drew top and base.
         up_since: when the top that floats was put there, bench time [s]; None: it is down.
@@ -56,7 +57,7 @@ class PracticeTop:
     def __init__(self, name: str, scene: Scene, world: MotionWorld, seed: int, voice: Voice) -> None:
         self.world, self.wiring, self.seed, self._voice = world, virtual_wiring(world, Limits()), seed, voice
         self._name, self._usual = name, scene  # usual: as at first or by a task, whatever a person changed
-        self.scene, self.what_if = scene, dict(USUAL)
+        self.scene, self.what_if, self.hides = scene, dict(USUAL), False
         self._tops = 0
         self.up_since: float | None = 0.0
         self.spin_hz: float | None = None
@@ -92,7 +93,7 @@ class PracticeTop:
 
     def hide(self, keys: Mapping[str, Any]) -> None:
         """Take another top for the usual one, as a task does: the usual one with these keys changed."""
-        self._usual = self._of_seed(self._name).changed(keys)
+        self._usual, self.hides = self._of_seed(self._name).changed(keys), bool(keys)
         self.change({})
 
     def take_seed(self, seed: int) -> None:

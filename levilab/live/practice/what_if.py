@@ -43,8 +43,8 @@ def _drag_at(scene: Scene, pressure: float) -> float:
     return scene.drag.constants[0] * math.pow(pressure, (LAWS[scene.drag.law].exponent or 1.0) - 1.0)
 
 
-#: Tilt of the usual top's moment, rounded to a tenth [°].
-_USUAL_TILT_DEG = 1.2
+#: Washers on the usual top [g], and the tilt of its moment, rounded to a tenth [°].
+_WASHERS_G, _USUAL_TILT_DEG = 0.2, 1.2
 
 
 def _tilt_moment(scene: Scene, tilt_deg: float) -> dict[str, Any]:
@@ -58,8 +58,8 @@ def _tilt_moment(scene: Scene, tilt_deg: float) -> dict[str, Any]:
 #: laminar boundary layer), ρ for n = 2.
 WHAT_IF: dict[str, Change] = {
     "washers_g": Change(
-        "washers", "g", "The mass that floats is known to some tenths of a gram.", -0.2, 0.8, 0.02, 0.0,
-        lambda scene, value: {"top.mass_kg": scene.top.mass_kg + 1e-3 * value},
+        "washers", "g", "The mass that floats is known to some tenths of a gram.", 0.0, 1.0, 0.02, _WASHERS_G,
+        lambda scene, value: {"top.mass_kg": scene.top.mass_kg + 1e-3 * (value - _WASHERS_G)},
     ),
     "base_tilt_deg": Change(
         "tilt of the base", "°", "The top slides off a base that leans.", -2.0, 2.0, 0.05, 0.0,

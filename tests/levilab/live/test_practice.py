@@ -116,7 +116,7 @@ def record_some_readings(page: Page) -> None:
     until(page, "levilab.data.fit")
     assert listings
     until(page, "[...levilab.data.records.values()].some((one) => one.drawn)")
-    still = "a spin run does not read it: the simulated signals"
+    still = "this run does not use it; the signals are simulated"
     until(page, f"document.getElementById('scope-key').textContent.endsWith('{still}')")
     assert still in (page.get_attribute("#trace", "aria-label") or "")
     assert "ago" not in (page.get_attribute("#trace", "aria-label") or "")
@@ -151,10 +151,10 @@ def change_what_if(page: Page) -> None:
     """A slider has its effect at once; the task under way stands in the place of the guide."""
     slider = "document.querySelector('#quantities input')"
     assert page.locator("#quantities input").count() == len(WHAT_IF)
-    page.evaluate(f"{slider}.value = 0.02, {slider}.dispatchEvent(new Event('input'))")
-    until(page, "levilab.data.bench.what_if.washers_g === 0.02")
+    page.evaluate(f"{slider}.value = 0.22, {slider}.dispatchEvent(new Event('input'))")
+    until(page, "levilab.data.bench.what_if.washers_g === 0.22")
     page.evaluate("document.getElementById('usual').click()")
-    until(page, f"levilab.data.bench.what_if.washers_g === 0 && {slider}.value === '0'")
+    until(page, f"levilab.data.bench.what_if.washers_g === 0.2 && {slider}.value === '0.2'")
     page.get_by_role("tab", name="Measure").press("ArrowLeft")  # the last one
     page.get_by_role("button", name="Hold it for three minutes").click()
     until(page, "document.getElementById('guide').hidden && !levilab.data.bench.drive.output")  # each begins without it
