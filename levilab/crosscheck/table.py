@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from analysis.numbers import digits, how_many
 from levilab.crosscheck.own.model import OF_ONE_RUN
 from levilab.crosscheck.own.study import ENOUGH, TRIALS
 from levilab.crosscheck.study import LONG_TAILS, Spread, Verdict, by_pulls
-from levilab.present.document.blocks import Note, Paragraph, Tabular
+from levilab.present.document.blocks import Details, Note, Paragraph, Tabular
 from levilab.present.numbers import enumeration, with_sign
 from levilab.present.tables import Row, Table, table
 
@@ -168,9 +169,7 @@ def blocks_of(study: Study, symbols: Mapping[str, str] | None = None) -> tuple[B
         "chance does in one right study of a hundred; a smaller standard deviation and a larger share mean that u is "
         "on the safe side."
     )
-    return (
-        Paragraph(as_text(study, symbols)),
-        # the readings of the trials are synthetic, whatever the result is of
-        Tabular(f"crosscheck-{study.name}", crosscheck_table([study], symbols), mark="SYNTHETIC."),
-        Note(note),
-    )
+    found = crosscheck_table([study], symbols)
+    # the readings of the trials are synthetic, whatever the result is of
+    pulls = Tabular(f"crosscheck-{study.name}", replace(found, title=""), mark="SYNTHETIC.")
+    return Paragraph(as_text(study, symbols)), Details(found.title, (pulls, Note(note)), on_paper="out")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
 from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
@@ -207,14 +208,14 @@ def _percent(share: float | None) -> str:
     return "< 0.1 %" if share < _LEAST_SHARE else f"{digits(100 * share, 2)} %"
 
 
-def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
+def sentences_of(budget: Budget, shown: Mapping[str, str] | None = None) -> list[str]:
     """Return what dominates u of a result, what would make it smaller, and what it does not contain."""
     name = (shown or {}).get(budget.quantity, budget.quantity.replace("_", " "))
     budget = _in_shown_units(budget)
     largest, texts = budget.largest, []
     if largest is not None:
-        text = f"{_percent(budget.share(largest))} of u² of {name} comes from: {largest.source}"
-        texts.append(f"{text}. It gets smaller with {largest.remedy}." if largest.remedy else f"{text}.")
+        texts.append(f"{_percent(budget.share(largest))} of u² of {name} comes from: {largest.source}.")
+        texts += [f"It gets smaller with {largest.remedy}."] if largest.remedy else []
     known = [one for one in budget.left_out if one.contribution]
     if known and not budget.misses_nothing:
         whole = _number(budget.u_with_all, budget.unit)
@@ -227,8 +228,7 @@ def in_a_sentence(budget: Budget, shown: Mapping[str, str] | None = None) -> str
         most = max(abs(one.sensitivity) for one in clocks) * _TEN_PPM
         size = "less than 1 % of u" if most < 0.01 * budget.u else _number(most, budget.unit)
         texts.append(f"Not known: {enumeration([one.source for one in clocks])}; an error of 10⁻⁵ would add {size}.")
-    texts += [f"Not known: {one.source}; it takes {one.remedy}." for one in unknown if one not in clocks]
-    return " ".join(texts)
+    return [*texts, *(f"Not known: {one.source}; it takes {one.remedy}." for one in unknown if one not in clocks)]
 
 
 def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, str] | None = None) -> tuple[Block, ...]:
@@ -275,7 +275,7 @@ def budget_blocks(
     of: str = "",
     mark: Callable[[Budget], str] | None = None,
 ) -> tuple[Block, ...]:
-    """Return each budget as a table with its largest part in a sentence, then the sources of the numbers.
+    """Return each budget in a line that opens its table, what holds for several once, then the sources of the numbers.
 
     Args:
         budgets: of the results.
@@ -284,15 +284,20 @@ def budget_blocks(
         mark: what a result is synthetic of, see `Tabular`.
     """
     blocks: list[Block] = []
-    for budget in budgets:
+    said = [sentences_of(budget, shown) for budget in budgets]
+    counts = Counter(text for texts in said for text in texts)
+    of_all = [text for text, count in counts.items() if count > 1]
+    for budget, texts in zip(budgets, said, strict=True):
         words = " ".join(filter(None, ("budget", of, budget.model, budget.quantity)))
         name = re.sub(r"[^a-z0-9]+", "-", words.casefold()).strip("-")
         found = budget_table(budget, shown)
-        blocks.append(Tabular(name, found, first_column_wraps=True, mark=mark(budget) if mark else None))
-        blocks.append(Paragraph(in_a_sentence(budget, shown)))
+        part = Tabular(name, replace(found, title=""), first_column_wraps=True, mark=mark(budget) if mark else None)
+        blocks.append(Details(found.title, (part,), more=" ".join(text for text in texts if text not in of_all)))
+    blocks += [Paragraph(" ".join(of_all))] if of_all else []
     notes = notes_of(budgets)
     if notes:
-        blocks.append(Details("Where these uncertainties come from", (Bullets(tuple(notes)), Note(EXPLAINED))))
+        explained = Details("What the columns mean", (Note(EXPLAINED),), on_paper="out")
+        blocks.append(Details("Where these uncertainties come from", (Bullets(tuple(notes)), explained)))
     return tuple(blocks)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.pipelines.sources import mark_of
 from levilab.pipelines.tune.owner import washers_text
 from levilab.present.clock import local, moment
-from levilab.present.document.blocks import Details, Fact, Facts, Note, Section, Tabular, with_marks
+from levilab.present.document.blocks import Details, Fact, Facts, Listing, Note, Section, Tabular, with_marks
 from levilab.present.tables import table
 from levilab.present.units import split
 from levilab.present.words import setting_in_words, settings_in_words, value_in_words
@@ -90,12 +90,19 @@ def in_common(inputs: Sequence[Input]) -> tuple[Fact, ...]:
 def describe(parts: Sequence[About]) -> Input:
     """Return what is known of an input, of which several analyses may say something."""
     source = parts[0].source
-    own = (block for one in parts for block in one.part.blocks)
+    own = (_fold_listing(block) for one in parts for block in one.part.blocks)
     return Input(
         name=source.name,
         facts=tuple(fact for fact in _facts(source, parts) if any(fact.texts)),
         blocks=(*_changes(source), *_events(source), *with_marks(own, mark_of([source]))),
     )
+
+
+def _fold_listing(block: Block) -> Block:
+    """Return a listing of readings below its title, which opens it; any other block as it is."""
+    if not isinstance(block, Listing):
+        return block
+    return Details(block.table.title, (replace(block, table=replace(block.table, title="")),))
 
 
 def _facts(source: Source[Any], parts: Sequence[About]) -> list[Fact]:
@@ -176,7 +183,7 @@ def _events(source: Source[Any]) -> tuple[Block, ...]:
     shown = Tabular("events", table("", heads, rows, numbers=heads[:1]), note, wraps=heads[1:])
     if len(rows) <= _FEW_EVENTS:
         return (Section("What happened", (shown,)),)
-    return (Details("What happened", (shown,), more=f"{len(events)} events"),)
+    return (Details("What happened", (shown,), more=f"{len(events)} events", on_paper="out"),)
 
 
 def _moment(event: Mapping[str, Any], zero: str | None) -> str:
@@ -241,7 +248,8 @@ def _changes(source: Source[Any]) -> tuple[Block, ...]:
     if not rows:
         return (Note("No setting of an instrument changed between start and end."),)
     heads = ("instrument", "setting", "at the start", "at the end")
-    return (Section("Settings that changed between start and end", (Tabular("changes", table("", heads, rows)),)),)
+    changes = (Tabular("changes", table("", heads, rows)),)
+    return (Details("Settings that changed between start and end", changes, on_paper="out"),)
 
 
 def _differences(kind: str, start: Mapping[str, Any], end: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
+from analysis.numbers import how_many
 from levilab.errors import LevilabError
 from levilab.formats.table import parse_columns
 from levilab.pipelines.options import OF_REPORT, OPTIONS, options_of, typed_name
@@ -50,7 +51,7 @@ class Heading:
         return replace(document, title=self.title, lead=f"{document.title}: {document.lead}", byline=byline)
 
 
-#: With more inputs the commands of analyses name none, and the inputs are folded away.
+#: With more inputs the commands of analyses name none.
 _MOST_NAMED = 12
 
 
@@ -89,7 +90,6 @@ def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked) -> 
     sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
     if asked.short:
         return Note(f"Made by: {asked.command(sources)}")
-    many = len(sources) > _MOST_NAMED
     data = (_data(sources), *_recording(sources))
     return Section(
         "How to reproduce this",
@@ -100,8 +100,8 @@ def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked) -> 
             ),
             Code("\n".join([*_commands(results, asked.paths), asked.command(sources)])),
             *_others(results),
-            *((Details("The data", data, more=f"{len(sources)} inputs"),) if many else data),
-            Facts((Fact("Versions here", (_versions(software_versions()),)),)),
+            Details("The data", data, more=f"{how_many(len(sources), 'input')}, by hash, command and versions"),
+            *_versions_here(sources),
         ),
         anchor="reproduce",
     )
@@ -219,6 +219,14 @@ def _recording(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
     if len(facts) > 1 and len({fact.texts for fact in facts}) == 1:
         facts = [replace(facts[0], name=f"all {len(facts)} runs")]
     return (Section("Recorded by", (Facts(tuple(facts)),)),) if facts else ()
+
+
+def _versions_here(sources: Sequence[Source[Any]]) -> tuple[Facts, ...]:
+    """Return the versions that made the report, unless they recorded all inputs, too."""
+    here = software_versions()
+    if all(source.run and source.run.record.software == here for source in sources):
+        return ()
+    return (Facts((Fact("Versions here", (_versions(here),)),)),)
 
 
 def _as_typed(words: Sequence[str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,7 @@ from levilab.pipelines.part import (
     title_of,
 )
 from levilab.pipelines.row import cells_of
-from levilab.pipelines.spindown.words import OF_RUN, STRAIGHT_LINES, SYMBOLS, is_seen, verdict_of_run
+from levilab.pipelines.spindown.words import OF_RUN, STRAIGHT_LINES, SYMBOLS, is_seen, law_names, verdict_of_run
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Details, Listing, Note, Paragraph, Points, Tabular
 from levilab.present.numbers import (
@@ -153,8 +153,8 @@ def _exponent(analysis: SpinDownAnalysis) -> Iterator[str]:
     if exponent.value is None or not exponent.u:
         return
     away = {name: abs(exponent.value - n) / exponent.u for name, n in _POWERS.items()}
-    near = [f"{name} ({_POWERS[name]:g})" for name, far in away.items() if far < _DIFFERS]
-    far = [f"{name} ({_POWERS[name]:g}) by {far:.0f} u" for name, far in away.items() if far >= _DIFFERS]
+    near = [f"{law_names([name])} ({_POWERS[name]:g})" for name, far in away.items() if far < _DIFFERS]
+    far = [f"{law_names([name])} ({_POWERS[name]:g}) by {far:.0f} u" for name, far in away.items() if far >= _DIFFERS]
     agrees = f"agrees with {enumeration(near)}" if near else "agrees with none of the laws of one power"
     misses = f" and misses {enumeration(far)}" if far else ""
     yield f"With a free exponent the readings choose n = {with_uncertainty(exponent)}: that {agrees}{misses}."
@@ -172,10 +172,6 @@ def _tilt(analysis: SpinDownAnalysis) -> Iterator[str]:
 def _runs(analysis: SpinDownAnalysis) -> Iterator[str]:
     """Yield the meaning of the scatter between runs."""
     if len(analysis.runs) == 1:
-        yield (
-            "This is one run. Another one of the same top may differ by more than this u: draught, temperature and "
-            "how the top was set spinning are not in it."
-        )
         return
     # the constants of a general law trade against each other: their large u would hide that the runs differ
     verdict = analysis.combined.verdict
@@ -445,8 +441,8 @@ def _falls(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
 # --- tables --------------------------------------------------------------------------------------------
 
 
-def _laws(analysis: SpinDownAnalysis) -> tuple[Tabular, Tabular]:
-    """Return the constants of all laws, and how well they fit."""
+def _laws(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
+    """Return the constants of the laws, and how well they fit; of excluded ones the constants can be opened."""
     several = len(analysis.runs) > 1
     n = analysis.combined.fit(analysis.combined.best).statistics.n
     low, high = max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)
@@ -461,8 +457,14 @@ def _laws(analysis: SpinDownAnalysis) -> tuple[Tabular, Tabular]:
         "so seldom, or so often; below 0.01 they have a shape. Durbin–Watson is near 2 for noise: chance alone gives "
         f"{low:.2f} to {high:.2f} (2 ± 4/√n, 2σ); less means a shape."
     )
+    out = analysis.combined.verdict.excluded
+    kept = [fit for fit in analysis.combined.fits if fit.name not in out]
+    others = [fit for fit in analysis.combined.fits if fit.name in out]
+    excluded = replace(_constants_table(analysis, others), title="")
+    folded = Details(f"Excluded: {law_names(out)}", (Tabular("spindown-laws-excluded", excluded),)) if others else None
     return (
-        Tabular("spindown-laws", _constants_table(analysis), constants),
+        Tabular("spindown-laws", _constants_table(analysis, kept), constants),
+        *([folded] if folded else []),
         Tabular("spindown-models-compared", quality_table(analysis, QUALITY_IN_WORDS), quality),
     )
 
@@ -499,17 +501,24 @@ def _run_by_run(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
     start = _Column(_head_of(f"{combined.best} fit", "start_frequency", starts[0].unit), starts)
     times = [_Column(one.head, one.show_all(analysis.runs)) for one in OF_RUN]
     found = _by_run_table(analysis, "", [*constants, start, *times])
-    return Paragraph(paper), Tabular("spindown-runs", found, note, first_column_wraps=True)
+    blocks = (Paragraph(paper), Tabular("spindown-runs", found, note, first_column_wraps=True))
+    return (
+        blocks
+        if len(analysis.runs) > 1
+        else (Details("Straight lines as one draws them on paper", blocks, on_paper="out"),)
+    )
 
 
-def _constants_table(analysis: SpinDownAnalysis, *, short: bool = False) -> Table:
-    """Return the constants of the laws; short: without start, wobble and nutation of a single run."""
+def _constants_table(
+    analysis: SpinDownAnalysis, laws: Sequence[CombinedLaw] | None = None, *, short: bool = False
+) -> Table:
+    """Return the constants of laws, of all by default; short: without start, wobble and nutation of a single run."""
     several = len(analysis.runs) > 1
     heads = ("law", "mean over the runs", "scatter s between the runs") if several else ("law", "constants")
     title = "Drag laws, u of the means from the scatter" if several else "Drag laws"
     rows = [
         Row(_law_cells(analysis, law, short=short), "best" if is_best(analysis, law.name) else "")
-        for law in analysis.combined.fits
+        for law in (analysis.combined.fits if laws is None else laws)
     ]
     return table(title, heads, rows)
 

@@ -21,7 +21,7 @@ from levilab.present.units import name_with_unit
 from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from numpy.typing import NDArray
 
@@ -135,10 +135,21 @@ SPINDOWN_ROW = (
 
 #: How the drag by such a law depends on the spin ω, in plain notation.
 _DRAGS = {"stokes": "ω", "disc": "ω^(3/2)", "newton": "ω²"}
+#: Laws that have a person's name, as text; the others are called as the options call them.
+_PERSONS = {"stokes": "Stokes", "newton": "Newton"}
 #: u of an exponent, or of an angle [rad], that no measurement has.
 TOO_SMALL = 5e-10
 #: A tilt of the moment is mentioned from this multiple of its u on.
 SEEN = 3.0
+
+
+def law_names(laws: Iterable[str]) -> str:
+    """Return drag laws as a list in a sentence; "the laws" for none.
+
+    >>> law_names(["stokes", "disc"])
+    'Stokes and disc'
+    """
+    return enumeration([_PERSONS.get(law, law) for law in laws] or ["the laws"])
 
 
 def verdict_of_run(run: SpinDown) -> str:
@@ -163,14 +174,15 @@ def finding(found: Combined) -> str:
     """Return the verdict of all runs in a few words, for the head of a figure."""
     said, best = found.verdict, found.best
     if not said.describes:
-        return f"no drag law describes these readings; the {best} law comes nearest"
+        return f"no drag law describes these readings; the {law_names([best])} law comes nearest"
     if said.decided:
-        excluded = f"; {enumeration(said.excluded)} {_are(said.excluded)} excluded" if said.excluded else ""
-        return f"the {best} law describes the readings{excluded}"
+        excluded = f"; {law_names(said.excluded)} {_are(said.excluded)} excluded" if said.excluded else ""
+        return f"the {law_names([best])} law describes the readings{excluded}"
     simple = _simple(said)
     if len(simple) == 1:
-        return f"{enumeration(said.indistinguishable)} cannot be distinguished; {best} has the fewest constants"
-    return f"the readings cannot distinguish {enumeration(simple) if simple else 'the laws'}"
+        alike = law_names(said.indistinguishable)
+        return f"{alike} cannot be distinguished; {law_names([best])} has the fewest constants"
+    return f"the readings cannot distinguish {law_names(simple)}"
 
 
 def _are(laws: Sequence[str]) -> str:
@@ -195,10 +207,10 @@ def _verdict(
     def names(laws: Sequence[str]) -> str:
         exponent = constants.get("power", {}).get("exponent")
         power = Text("power ({exponent:n})", exponent=_exponent(exponent))
-        return enumeration([power if name == "power" else name for name in laws])
+        return enumeration([power if name == "power" else law_names([name]) for name in laws])
 
-    simple, law = _simple(said), said.best
-    how, others, advice = _how(law, constants[law]), said.indistinguishable[1:], ""
+    simple, law = _simple(said), law_names([said.best])
+    how, others, advice = _how(said.best, constants[said.best]), said.indistinguishable[1:], ""
     if not said.describes:
         first = _no_law(found, runs, digits(best.rms_residual))
     elif said.decided:
@@ -214,24 +226,24 @@ def _verdict(
             "These {n} readings cannot distinguish {laws}: over a fall of the spin by {percent:n} % they differ too "
             "little for readings of this number and precision.",
             n=best.n,
-            laws=enumeration(simple) if len(simple) > 1 else "the laws",
+            laws=law_names(simple if len(simple) > 1 else ()),
             percent=digits(100 * fall),
         )
         advice = "Let the top fall further, or read it more often."
     misses = [Text("{rms:n} Hz", rms=digits(stats[name].rms_residual)) for name in said.excluded]
     excluded = Text(
         "The readings exclude {laws}, off by {rms} (rms); {law} is off by {least:n} Hz.",
-        laws=enumeration(said.excluded or [""]),
+        laws=law_names(said.excluded),
         rms=enumeration(misses or [""]),
         law=law,
         least=digits(best.rms_residual),
     )
-    weak = Text("They speak against {laws}, not strongly enough to exclude.", laws=enumeration(said.weak or [""]))
+    weak = Text("They speak against {laws}, not strongly enough to exclude.", laws=law_names(said.weak))
     return Sentences(
         first,
         Text("If the {law} law holds, {how}.", law=law, how=how) if how and said.describes and not said.decided else "",
         excluded if misses else "",
-        Text("{laws} cannot be distinguished from it.", laws=names(others)) if others and said.decided else "",
+        Text("They cannot distinguish it from {laws}.", laws=names(others)) if others and said.decided else "",
         advice,
         weak if said.weak else "",
         _needless(said, names(said.needless))
@@ -277,9 +289,7 @@ def _wobble(tilt: Estimate | None) -> str:
 
 
 def _needless(said: Verdict, names: str) -> str:
-    if len(said.needless) > 1:
-        return Text("{laws} fit as well as {law}, but need more constants.", laws=names, law=said.best)
-    return Text("{laws} fits as well as {law}, but needs more constants.", laws=names, law=said.best)
+    return Text("As well as {law} fit with more constants: {laws}.", laws=names, law=law_names([said.best]))
 
 
 def _no_law(found: SpinDown | Combined, runs: Sequence[SpinDown], rms: str) -> str:
@@ -299,7 +309,7 @@ def _no_law(found: SpinDown | Combined, runs: Sequence[SpinDown], rms: str) -> s
         "No law describes these readings: {what}; the best one, {law}, leaves {rms:n} Hz rms. Its constants and their "
         "uncertainties are those of a curve through the readings, not of a drag.",
         what=what,
-        law=found.best,
+        law=law_names([found.best]),
         rms=rms,
     )
 
@@ -324,9 +334,8 @@ def _value(estimate: Estimate) -> str:
 
 #: What a tilt costs that the readings do not show (decision 11).
 TILT_ALLOWED = (
-    "the fits allow for a tilt of the top's moment, which the counter would see and these readings do not show: u of a "
-    "run's constants is 1.4 to 2 times that of a plain fit, and of a top without a tilt C comes out some 0.7 u too "
-    "large on average; if yours has none, `tilt` = none leaves it out"
+    "the fits allow for a tilt of the moment, which these readings do not show: u is 1.4 to 2 times that of a plain "
+    "fit; of a top without a tilt C comes out some 0.7 u too large on average, and `tilt` = none leaves it out"
 )
 
 
@@ -388,8 +397,8 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str]] = MappingProxyType({
         "calculated? Then no uncertainty here says anything about a top"
     ),
     "no u": (
-        "no uncertainties of the readings were given: they are taken from the scatter about each law, so a law that "
-        "does not fit shows only beside one that fits better"
+        "the readings have no uncertainties of their own: their scatter about each law stands for them, so a law that "
+        "does not fit shows only beside a better one"
     ),
     "understated": lambda of: (
         f"even the best law, {of.law}, misses the readings by {digits(of.values[0])} times their stated uncertainties, "
@@ -415,7 +424,10 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str]] = MappingProxyType({
         f"{of.values[0]:.0f} of {of.values[1]:.0f} runs give no uncertainties of their readings: theirs come from the "
         "scatter about each law"
     ),
-    "one run": "this is one run: its uncertainties contain nothing of the scatter between runs, so record several",
+    "one run": (
+        "this is one run: another of the same top may differ by more than its u (draught, temperature, the start): "
+        "record several"
+    ),
     "few runs": _few_runs,
     "missing": lambda of: (
         f"{of.values[0]:.0f} of {of.values[1]:.0f} runs have no {of.name} and are not in its mean"

@@ -248,8 +248,18 @@ def _row(row: Row, classes: tuple[str | None, ...], heads: Iterable[str]) -> Htm
     return element("tr", cells, class_=row.kind or None)
 
 
+#: Letters of small print from which on it folds.
+_LONG = 250
+
+
 def _small_print(text: str) -> Html | str:
-    return element("p", words(text), class_="note") if text else ""
+    """Return small print below a table; a long one opens from a line."""
+    said = element("p", words(text), class_="note") if text else ""
+    return (
+        element("details", element("summary", "What the columns mean", class_="note"), said)
+        if len(text) > _LONG
+        else said
+    )
 
 
 # --- figures -------------------------------------------------------------------------------------------

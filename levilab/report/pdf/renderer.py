@@ -303,8 +303,17 @@ def _monospace(text: str) -> Text:
 # --- blocks --------------------------------------------------------------------------------------------
 
 
-def _section(block: Section, drawing: _Drawing) -> Drawn:
+def _is_out(block: Block) -> bool:
+    """Return whether nothing of a block is printed."""
+    if isinstance(block, Section):
+        return bool(block.blocks) and all(map(_is_out, block.blocks))
+    return isinstance(block, Details) and block.on_paper == "out"
+
+
+def _section(block: Section, drawing: _Drawing) -> Drawn | None:
     """Return a section; a figure alone stands without a heading, so that text can fill the page before it."""
+    if _is_out(block):
+        return None
     match block.blocks:
         case (Picture() as picture,):
             return _picture(picture, drawing)
@@ -319,7 +328,7 @@ def _section(block: Section, drawing: _Drawing) -> Drawn:
 
 
 def _details(block: Details, drawing: _Drawing) -> Drawn | None:
-    if block.on_paper == "out":
+    if _is_out(block):
         return None
     return {
         "kind": "details",

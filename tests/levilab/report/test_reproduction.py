@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import read_options
-from levilab.present.document.blocks import Code, Facts, Note, Tabular
+from levilab.present.document.blocks import Code, Details, Facts, Note
 from levilab.report.reproduction import Asked, paths_in_commands, reproduction
 from support.paths import SAMPLE_DATA
 
@@ -59,10 +59,9 @@ def test_commands_hashes_seeds_and_what_recorded_it_are_there(tmp_path):
         f"levilab analyze limit '{run}' --reading-u 0.06",
         f"levilab report '{run}' -o report.html",
     ]
-    (data,) = (block for block in section.blocks if isinstance(block, Tabular))
+    data, recorded = next(block for block in section.blocks if isinstance(block, Details)).blocks
     digest = hashlib.sha256((run / "readings.csv").read_bytes()).hexdigest()
     assert [row.cells for row in data.table.rows] == [("a run", "readings.csv", "7", digest)]
-    recorded = next(block for block in section.blocks if getattr(block, "title", "") == "Recorded by")
     (facts,) = recorded.blocks
     assert isinstance(facts, Facts)
     assert facts.facts[0].texts == ("""levilab acquire limit --note 'it'"'"'s'""",)
@@ -80,10 +79,8 @@ def test_what_recorded_all_runs_alike_is_said_once(tmp_path):
 
     def recorded(*runs):
         found = limit.analyze(list(runs), limit.options_from({}))
-        (section,) = (
-            one for one in reproduction([(limit, found)], Asked()).blocks if getattr(one, "title", "") == "Recorded by"
-        )
-        (facts,) = section.blocks
+        of_data = next(one for one in reproduction([(limit, found)], Asked()).blocks if isinstance(one, Details))
+        (facts,) = of_data.blocks[1].blocks
         return [(fact.name, fact.texts) for fact in facts.facts]
 
     one, two, late = (tmp_path / f"run-{k}" for k in range(3))
