@@ -95,17 +95,19 @@ class Code:
 
 @dataclass(frozen=True)
 class Question:
-    """A question, and below it lines as wide as the text to write the answer on; on one page.
+    """A question, and below it the answer, or lines as wide as the text to write one on; on one page.
 
     Attributes:
         lead: its number, in bold before it.
-        text: the question.
+        text: the question; in bold above an answer.
         lines: how many.
+        answer: empty for lines.
     """
 
     lead: str
     text: str
     lines: int = 2
+    answer: str = ""
 
 
 @dataclass(frozen=True)

@@ -315,6 +315,8 @@ def _count_marks(of: Class) -> str:
 DIFFER = 0.01
 #: Degrees of freedom from which on a scatter is known well enough, to a third.
 _FEW = 5
+#: Distance from the truth [u] at which a mean still agrees with it: as a rule one in twenty is farther away.
+_AGREES = 2.0
 #: Share of groups within 2 u of their truth, where u is right.
 _WITHIN_2_U = 0.954
 
@@ -337,7 +339,10 @@ def verdict(of: Class) -> str:
 
 
 def _beside_truth(of: Compared) -> str:
-    return f", {with_sign(of.truth[1], 1)} u from the truth" if of.truth else ""
+    if of.truth is None:
+        return ""
+    agrees = "and agrees with the truth" if abs(of.truth[1]) <= _AGREES else "and not the truth"
+    return f", {agrees} (it is {with_sign(of.truth[1], 1)} u from it)"
 
 
 def agreement(of: Class) -> str:

@@ -13,6 +13,7 @@ from levilab.errors import unquote
 from levilab.files import check_writable, replace_atomically
 from levilab.pipelines.suits import recall_suiting
 from levilab.present.document.blocks import (
+    Details,
     Document,
     Fact,
     Facts,
@@ -96,7 +97,7 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
 
     tables = (_values(of, one) for one in of.quantities)
     agree: list[Block] = [Paragraph(text)] if (text := agreement(of)) else []
-    agree += [Note(text)] if (text := statistics_of_agreement(of)) else []
+    agree += [Details("Statistics", (Paragraph(text),))] if (text := statistics_of_agreement(of)) else []
     yield section("Result", "result", Verdict(verdict(of)), *_marks(of), *tables, *agree, _groups(of))
     if of.quantities and len(of.groups) > 1:
         yield section("Figure", "figure", _picture(of))
@@ -128,6 +129,7 @@ def _values(of: Class, quantity: Compared) -> Tabular:
     """Return a row for each group: its value, how far it lies from the others, and from the truth."""
     estimates = [quantity.show(one.value, one.u) if one else None for one in quantity.estimates]
     mean = quantity.show(quantity.mean.value, quantity.mean.u) if quantity.mean else None
+    marks = [*(mark.word for mark in of.marks), ""]
     columns = [column([*estimates, mean]), [*map(_distance, quantity.from_class), ""]]
     heads = ["group", quantity.head, _FROM_CLASS]
     if of.knows_truth:
@@ -137,15 +139,16 @@ def _values(of: Class, quantity: Compared) -> Tabular:
             [*map(_distance, (*quantity.from_truth, distance))],
         ]
         heads += [_TRUTH, _FROM_TRUTH]
+    columns, numbers, heads = [*columns, marks], heads[1:], [*heads, "result"]
     names = [*(group.source.name for group in of.groups), "mean"]
     kinds = [*(_ROWS[mark.word] for mark in of.marks), "together"]
     rows = [Row(cells, kind) for kind, cells in zip(kinds, zip(names, *columns, strict=True), strict=True)]
     rows = rows if len(of.groups) > 1 else rows[:1]
-    note = "value(u): the digits in parentheses are u of the last digits. Green: good; red: to repeat."
+    note = "value(u): the digits in parentheses are u of the last digits."
     if any(one and not use for one, use in zip(quantity.estimates, quantity.used, strict=True)):
         note += " The mean is without results to repeat."
     name = f"{of.analysis.name}-{quantity.name.replace('_', '-')}"
-    return Tabular(name, table("", heads, rows, numbers=heads[1:]), note, first_column_wraps=True, narrow="turn")
+    return Tabular(name, table("", heads, rows, numbers=numbers), note, first_column_wraps=True, narrow="turn")
 
 
 def truth_text(truth: Estimate | None, estimate: Estimate | None) -> str:

@@ -169,6 +169,9 @@ def _code(_: Writer, block: Code, __: int) -> Html:
 
 
 def _question(_: Writer, block: Question, __: int) -> Html:
+    if block.answer:
+        asked = element("p", element("strong", block.lead, " ", words(block.text)))
+        return element("div", asked, element("p", words(block.answer)), class_="question")
     lines = [element("div", class_="line")] * block.lines
     return element("div", element("p", element("strong", block.lead), " ", words(block.text)), lines, class_="question")
 

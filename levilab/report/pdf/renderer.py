@@ -411,6 +411,7 @@ _BLOCKS: Mapping[type, Callable[[Any, _Drawing], Drawn | None]] = MappingProxyTy
             "lead": _text(it.lead),
             "text": _text(it.text),
             "lines": it.lines,
+            "answer": _text(it.answer),
         },
         Facts: _facts,
         Tabular: _tabular,

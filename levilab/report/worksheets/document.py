@@ -19,8 +19,6 @@ from levilab.present.document.blocks import (
     Banner,
     Code,
     Document,
-    Fact,
-    Facts,
     Listing,
     Paragraph,
     Question,
@@ -164,14 +162,14 @@ def key(sheet: Sheet, language: Language, seeds: Mapping[str, int], found: Class
         found: what the runs of these seeds give.
     """
     words, texts = language.words, language.sheets[sheet.experiment]
-    answers = zip(texts.tasks, texts.answers, strict=True)
-    facts = tuple(Fact(str(k), (task, f"→ {answer}")) for k, (task, answer) in enumerate(answers, start=1))
+    tasks = enumerate(zip(texts.tasks, texts.answers, strict=True), start=1)
+    answers = (Question(f"{k}.", task, answer=answer) for k, (task, answer) in tasks)
     return Document(
         title=texts.title,
         lead=words["key"],
         banner=Banner("SYNTHETIC.", f"{words['numbers']} {words['synthetic']}"),
         blocks=(
-            Section(words["answers"], (Facts(facts),)),
+            Section(words["answers"], tuple(answers)),
             Section(words["numbers"], tuple(_numbers(language, seeds, found))),
         ),
         language=language.code,
@@ -194,8 +192,11 @@ def _numbers(language: Language, seeds: Mapping[str, int], found: Class) -> Iter
                 columns.append([*map(truth_text, map(one.show, one.truths), estimates)])
                 heads.append(words["truth"])
         if part:
+            if part is known:  # written by hand
+                columns.append([_BLANK] * len(seeds))
+                heads.append(words["mark"])
             rows = [tuple(row) for row in zip(*columns, strict=True)]
-            shown = table("", heads, rows, numbers=heads[1:])
+            shown = table("", heads, rows, numbers=[head for head in heads[1:] if head != words["mark"]])
             yield Tabular(about.replace("_", "-"), shown, words[about], first_column_wraps=True)
 
 
