@@ -40,7 +40,7 @@ def copy_samples(text, place):
 def test_python_in_the_pages_prints_what_it_says(page, code, tmp_path):
     copy_samples(code, tmp_path)
     shown = io.StringIO()
-    with contextlib.chdir(tmp_path), contextlib.redirect_stdout(shown), reduce_work(page):
+    with contextlib.chdir(tmp_path), contextlib.redirect_stdout(shown), without_drawing(), with_few_trials():
         exec(compile(code, page, "exec"), {"__name__": "__main__"})
     assert shown.getvalue().splitlines() == re.findall(r"print\(.*\)  # (.*)", code)
 
@@ -80,25 +80,14 @@ def as_pattern(shown):
     return "".join(lines) + r"\Z"
 
 
-#: The page whose figures are drawn, and whose reports have all of their trials: those of every analysis.  No test looks
-#: at those of the others.
-IN_FULL = "README.md"
-
-
-@contextlib.contextmanager
-def reduce_work(page):
-    """Draw no figures and make few trials, on all pages but one."""
-    if page == IN_FULL:
-        yield
-    else:
-        with without_drawing(), with_few_trials():
-            yield
+#: The page whose figures are drawn, those of every analysis.  No test looks at those of the others.
+DRAWN = "README.md"
 
 
 @pytest.mark.parametrize("page", steps())
 def test_the_commands_of_a_page_work_one_after_another(tmp_path, page):
     copy_samples(" ".join(steps()[page]), tmp_path)
-    with reduce_work(page):
+    with with_few_trials(), contextlib.nullcontext() if page == DRAWN else without_drawing():
         follow(steps()[page], tmp_path)
 
 

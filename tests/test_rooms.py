@@ -1,18 +1,11 @@
 """The rooms of the house, as docs/decisions/0001-rooms.md has them; which way imports go is import-linter's."""
 
-from __future__ import annotations
-
 import ast
 from collections import Counter
 from functools import cache
-from typing import TYPE_CHECKING
 
 from support.paths import ROOT
 from support.sources import modules, sources
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 #: What takes so long to load that it is imported where it is used: at least 10 ms, or not everywhere installed.
 HEAVY = {
@@ -23,7 +16,7 @@ HEAVY = {
 }  # fmt: skip
 
 
-def imported(node: ast.AST) -> list[str]:
+def imported(node):
     """The modules that a statement imports; of ``from a import b`` both a and a.b, whichever there is."""
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
@@ -32,13 +25,13 @@ def imported(node: ast.AST) -> list[str]:
     return []
 
 
-def top_level(tree: ast.Module) -> list[str]:
+def top_level(tree):
     """What is loaded together with a module; ``if TYPE_CHECKING`` loads nothing."""
     return [name for statement in tree.body for name in imported(statement)]
 
 
 @cache
-def loads_something_heavy(name: str) -> bool:
+def loads_something_heavy(name):
     """Whether a package is heavy, or a module of ours loads a heavy one at its head or further down."""
     if name.partition(".")[0] in HEAVY:
         return True
@@ -55,50 +48,50 @@ def loads_something_heavy(name: str) -> bool:
     return False
 
 
-def late_imports(tree: ast.Module) -> Iterator[tuple[int, list[str]]]:
+def late_imports(tree):
     for function in ast.walk(tree):
         if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
             for statement in ast.walk(function):
                 if names := imported(statement):
-                    yield statement.lineno, names  # type: ignore[attr-defined]
+                    yield statement.lineno, names
 
 
-def is_a_door(name: str) -> bool:
+def is_a_door(name):
     """Whether a module imports inside of functions, to open at once: front door, command line, their options."""
     return name in {"levilab", "levilab.pipelines.options"} or name.startswith("levilab.cli")
 
 
-def test_only_what_is_heavy_is_imported_where_it_is_used() -> None:
+def test_only_what_is_heavy_is_imported_where_it_is_used():
     late = [(name, *found) for name, _ in modules() if not is_a_door(name) for found in late_imports(sources()[name])]
     assert [(name, line, names) for name, line, names in late if not any(map(loads_something_heavy, names))] == []
 
 
-def rooms(folder: Path) -> list[str]:
+def rooms(folder):
     return sorted(path.name for path in folder.iterdir() if path.is_dir() and any(path.glob("*.py")))
 
 
-def files(folder: Path) -> list[str]:
+def files(folder):
     return sorted(path.name for path in folder.glob("*.py"))
 
 
-def test_the_ground_floor_of_levilab_is_small() -> None:
+def test_the_ground_floor_of_levilab_is_small():
     assert len(files(ROOT / "levilab")) <= 9
     assert len(rooms(ROOT / "levilab")) + len(files(ROOT / "levilab")) <= 30 + 1  # __main__ is no room
 
 
-def test_virtual_instruments_have_seven_rooms() -> None:
+def test_virtual_instruments_have_seven_rooms():
     assert len(rooms(ROOT / "instruments/virtual")) <= 7
     assert files(ROOT / "instruments/virtual") == ["__init__.py"]
 
 
-def test_tests_lie_in_the_room_of_their_subject() -> None:
+def test_tests_lie_in_the_room_of_their_subject():
     tests = ROOT / "tests"
     folders = {path.parent.relative_to(tests) for path in tests.rglob("test_*.py")}
     strange = [folder.as_posix() for folder in folders if not (ROOT / folder).is_dir()]
     assert strange == ["peers"]  # of other people's drivers
 
 
-def test_no_folder_holds_a_family_of_files_with_one_prefix() -> None:
+def test_no_folder_holds_a_family_of_files_with_one_prefix():
     folders = {path.parent for _, path in modules()}
     families = Counter(
         (folder.relative_to(ROOT).as_posix(), name.partition("_")[0])

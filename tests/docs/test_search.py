@@ -4,10 +4,10 @@ import re
 import threading
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from urllib.parse import quote
 
 import pytest
 
+from support.browser import watch
 from support.paths import DOCS, ROOT
 
 SITE = ROOT / "build/site"
@@ -68,31 +68,40 @@ class Quiet(SimpleHTTPRequestHandler):
 
 
 @pytest.fixture(scope="module")
-def site():
-    """The address of the site: its search loads pages, which a browser does not allow of files."""
+def search(browser):
+    """The search of the site, served: it loads its index, which a browser does not allow of files."""
     if not (SITE / "searchindex.js").exists():
         pytest.skip("make site makes it")
-    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=SITE)) as server:
+    with ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=SITE)) as server, watch(browser) as page:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        yield f"http://127.0.0.1:{server.server_port}"
+        page.goto(f"http://127.0.0.1:{server.server_port}/search.html")
+        page.evaluate("DOCUMENTATION_OPTIONS.SHOW_SEARCH_SUMMARY = false")  # it loads each page that is found
+        yield page
         server.shutdown()
 
 
-def found(site, page, words):
+#: Searches again without loading the page; its scorer reads the words from the address.
+SEARCH = """words => {
+    history.replaceState(null, "", "?" + new URLSearchParams({q: words}));
+    Search.output?.parentElement.replaceChildren();
+    Search.performSearch(words);
+}"""
+
+
+def found(search, words):
     """The pages that the search finds, each once, in their order."""
-    page.goto(f"{site}/search.html?q={quote(words)}")
-    page.wait_for_selector("#search-results .search-summary:has-text('found')")
-    page.wait_for_selector("#search-results ul.search li a")
-    links = page.locator("#search-results ul.search li a")
+    search.evaluate(SEARCH, words)
+    search.wait_for_selector("#search-results .search-summary:has-text('found')")
+    links = search.locator("#search-results ul.search li a")
     addresses = links.evaluate_all("links => links.map(link => link.getAttribute('href'))")
     return list(dict.fromkeys(address.partition(".html")[0] for address in addresses))
 
 
 @pytest.mark.parametrize("words", QUERIES)
-def test_the_search_finds_what_people_type(site, page, words):
-    assert found(site, page, words)[0] in QUERIES[words]
+def test_the_search_finds_what_people_type(search, words):
+    assert found(search, words)[0] in QUERIES[words]
 
 
 @pytest.mark.parametrize("words", AMONG_TWO)
-def test_the_search_finds_messages_and_words_together(site, page, words):
-    assert set(found(site, page, words)[:2]) & set(AMONG_TWO[words])
+def test_the_search_finds_messages_and_words_together(search, words):
+    assert set(found(search, words)[:2]) & set(AMONG_TWO[words])

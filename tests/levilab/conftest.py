@@ -8,12 +8,20 @@ import pytest
 from support.commands import command
 from support.figures import without_figures
 from support.paths import SAMPLE_DATA
+from support.trials import with_few_trials
 from support.waiting import HANG_GUARD_S
 
 
 @pytest.fixture
 def sample_data():
     return SAMPLE_DATA
+
+
+@pytest.fixture(autouse=True, scope="session")
+def reports_make_few_trials():
+    """No test looks at the trials of a report; how many there are has a test of its own."""
+    with with_few_trials():
+        yield
 
 
 @pytest.fixture

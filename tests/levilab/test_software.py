@@ -1,25 +1,17 @@
 """How an extra is installed: as levilab itself was, out of its clone."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess
 import sys
 import tomllib
-from typing import TYPE_CHECKING
 
 from levilab.software import how_to_install
 from support.paths import ROOT
 from support.waiting import HANG_GUARD_S
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-    import pytest
-
-
-def test_an_extra_is_installed_from_the_clone_as_levilab_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_extra_is_installed_from_the_clone_as_levilab_was(tmp_path, monkeypatch):
     monkeypatch.setattr("sys.prefix", str(tmp_path))
     assert how_to_install("video") == 'type pip install ".[video]" in the folder of levilab\'s clone'
     (tmp_path / "uv-receipt.toml").touch()
@@ -27,7 +19,7 @@ def test_an_extra_is_installed_from_the_clone_as_levilab_was(tmp_path: Path, mon
     assert '".[live,pdf]"' in how_to_install("pdf")
 
 
-def test_every_extra_that_a_message_names_is_declared() -> None:
+def test_every_extra_that_a_message_names_is_declared():
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["optional-dependencies"]
     texts = [path.read_text(encoding="utf-8") for path in (ROOT / "levilab").rglob("*.py")]
     named = {name for text in texts for name in re.findall(r"how_to_install\([\'\"](\w+)", text)}
@@ -54,7 +46,7 @@ for words in ("acquire spin --mock --seed 1", "analyze spindown runs", "report r
 """
 
 
-def test_without_extras_runs_are_acquired_analyzed_and_reported(tmp_path: Path) -> None:
+def test_without_extras_runs_are_acquired_analyzed_and_reported(tmp_path):
     words = [sys.executable, "-c", WITHOUT_EXTRAS]
     options = {"capture_output": True, "text": True, "encoding": "utf-8", "timeout": HANG_GUARD_S}
     done = subprocess.run(words, cwd=tmp_path, check=False, **options)
@@ -63,7 +55,7 @@ def test_without_extras_runs_are_acquired_analyzed_and_reported(tmp_path: Path) 
     assert "Traceback" not in done.stderr
 
 
-def test_the_citation_has_the_version_of_the_program() -> None:
+def test_the_citation_has_the_version_of_the_program():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
     codemeta = json.loads((ROOT / "codemeta.json").read_text(encoding="utf-8"))

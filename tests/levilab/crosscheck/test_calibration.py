@@ -1,7 +1,5 @@
 """The calibration: a band that right ranks leave as often as it says, and wrong distributions that two moments hide."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import expon, t
@@ -12,7 +10,7 @@ from levilab.crosscheck.study import Spread, Study, Verdict
 from levilab.present.looks import BLUE, VERMILION
 
 
-def quantiles(law, n: int = 200) -> tuple[float, ...]:
+def quantiles(law, n=200):
     """Pulls at the middles of n equal parts of a distribution."""
     return tuple(law.ppf((np.arange(n) + 0.5) / n))
 

@@ -1,10 +1,7 @@
 """What a loss of power leaves of a simulated disk."""
 
-from __future__ import annotations
-
 import errno
 from random import Random
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -13,24 +10,19 @@ from levilab.files import replace_atomically
 from levilab.laboratory.disk import SimulatedComputer
 from levilab.laboratory.fate import Fate
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-
-def computer(seed: int) -> SimulatedComputer:
+def computer(seed):
     return SimulatedComputer(Fate(lambda _: None), Random(seed))
 
 
-def left(made: SimulatedComputer, path: Path) -> bytes | None:
+def left(made, path):
     """Content of a file after a loss of power; None: it is gone."""
     made.end_process(power=True)
     return path.read_bytes() if path.exists() else None
 
 
 @pytest.mark.parametrize(("sync", "sync_folder"), [(True, True), (True, False), (False, True)])
-def test_what_is_on_the_disk_with_its_name_stays_and_nothing_else_need(
-    tmp_path: Path, sync: bool, sync_folder: bool
-) -> None:
+def test_what_is_on_the_disk_with_its_name_stays_and_nothing_else_need(tmp_path, sync, sync_folder):
     found = set()
     for seed in range(40):
         made, path = computer(seed), tmp_path / f"{seed}"
@@ -55,7 +47,7 @@ def test_what_is_on_the_disk_with_its_name_stays_and_nothing_else_need(
 
 
 @pytest.mark.parametrize("whole", [True, False])
-def test_a_replaced_file_is_the_old_or_the_new_one(tmp_path: Path, whole: bool) -> None:
+def test_a_replaced_file_is_the_old_or_the_new_one(tmp_path, whole):
     found = set()
     for seed in range(20):
         made, path = computer(seed), tmp_path / "file"
@@ -76,7 +68,7 @@ def test_a_replaced_file_is_the_old_or_the_new_one(tmp_path: Path, whole: bool) 
     assert found == ({b"new"} if whole else {b"old", b"new"})
 
 
-def test_a_full_disk_takes_a_part_and_says_so(tmp_path: Path) -> None:
+def test_a_full_disk_takes_a_part_and_says_so(tmp_path):
     made = computer(0)
     made.room = 3
     with made.open(tmp_path / "file", "xb") as file:

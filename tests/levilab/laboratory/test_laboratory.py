@@ -1,11 +1,8 @@
 """The simulated laboratory: the same for the same seed, nothing is wrong in it, and it notices what would be."""
 
-from __future__ import annotations
-
 import re
 import signal
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -14,18 +11,14 @@ from levilab.cli.exit_codes import exit_status
 from levilab.laboratory import explore
 from levilab.laboratory.disk import SimulatedComputer
 from levilab.laboratory.fate import Event
-from levilab.laboratory.plan import Plan, draw
+from levilab.laboratory.plan import draw
 from levilab.laboratory.shrink import shrink
-from levilab.laboratory.visit import Told, visit
+from levilab.laboratory.visit import visit
 from levilab.runs.writer import RunWriter
 from levilab.workers.ways import this_process
 
-if TYPE_CHECKING:
-    import subprocess
-    from collections.abc import Callable, Sequence
 
-
-def a_plan(experiment: str, *settings: str, model: str = "", events: Sequence[Event] = ()) -> Plan:
+def a_plan(experiment, *settings, model="", events=()):
     """A laboratory with these events and no others; model: of the counter or the oscilloscope."""
     kind = "oscilloscope" if experiment == "trace" else "counter"
     return replace(
@@ -39,12 +32,12 @@ def a_plan(experiment: str, *settings: str, model: str = "", events: Sequence[Ev
     )
 
 
-def spin_down(*events: Event) -> Plan:
+def spin_down(*events):
     """A spin-down of a top that was spun by hand."""
     return a_plan("spin", "drive_waveform=NONE", "interval_s=5", events=events)
 
 
-def left_on_before(*events: Event) -> Plan:
+def left_on_before(*events):
     """A process that is killed while it drives, and another one."""
     return a_plan("spin", "drive_frequency_hz=35", events=[Event("kill", 0, 300), *events])
 
@@ -61,20 +54,20 @@ FAILED_ONCE = {
 
 
 @pytest.mark.parametrize("name", FAILED_ONCE)
-def test_a_laboratory_that_once_failed_does_not(name: str) -> None:
+def test_a_laboratory_that_once_failed_does_not(name):
     told = visit(FAILED_ONCE[name], exit_status)
     assert told.findings == (), "\n".join(told.story)
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_nothing_is_wrong_in_a_laboratory(seed: int) -> None:
+def test_nothing_is_wrong_in_a_laboratory(seed):
     told = visit(draw(seed), exit_status)
     assert told.findings == (), "\n".join(told.story)
 
 
 def test_a_seed_gives_the_same_trace_in_another_process(
-    levilab_process: Callable[..., subprocess.CompletedProcess[str]],
-) -> None:
+    levilab_process,
+):
     """Python orders sets differently there."""
     told = visit(draw(7), exit_status)
     assert len(told.trace) > 100
@@ -84,35 +77,35 @@ def test_a_seed_gives_the_same_trace_in_another_process(
 # --- what it would notice ---
 
 
-def oracles(told: Told) -> set[str]:
+def oracles(told):
     return {finding.oracle for finding in told.findings}
 
 
-def without_sync(patch: pytest.MonkeyPatch) -> None:
+def without_sync(patch):
     patch.setattr(SimulatedComputer, "sync", lambda *_: None)
 
 
-def shown_before_written(patch: pytest.MonkeyPatch) -> None:
+def shown_before_written(patch):
     patch.setattr(RunWriter, "reading", lambda *_: None)
 
 
-def written_twice(patch: pytest.MonkeyPatch) -> None:
+def written_twice(patch):
     once = RunWriter.reading
     patch.setattr(RunWriter, "reading", lambda *given: [once(*given), once(*given)])
 
 
-def left_on(patch: pytest.MonkeyPatch) -> None:
+def left_on(patch):
     patch.setattr(Bench, "outputs_off", lambda _: None)
 
 
-def with_a_defect(patch: pytest.MonkeyPatch) -> None:
+def with_a_defect(patch):
     patch.setattr(Bench, "changed_settings", lambda *_: {}["of no such name"])
 
 
-def off_by_a_turn(patch: pytest.MonkeyPatch) -> None:
+def off_by_a_turn(patch):
     once = RunWriter.reading
 
-    def reading(writer: RunWriter, row: dict[str, Any]) -> None:
+    def reading(writer, row):
         row["spin_frequency_hz"] += 0.5
         once(writer, row)
 
@@ -130,15 +123,13 @@ def off_by_a_turn(patch: pytest.MonkeyPatch) -> None:
         (left_on, "output", a_plan("spin", "drive_frequency_hz=35", events=[Event("ctrl-c", 0, 300)])),
     ],
 )
-def test_a_mistake_in_the_program_is_noticed(
-    mistake: Callable[[pytest.MonkeyPatch], None], oracle: str, plan: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_mistake_in_the_program_is_noticed(mistake, oracle, plan, monkeypatch):
     assert visit(plan, exit_status).findings == ()
     mistake(monkeypatch)
     assert oracle in oracles(visit(plan, exit_status))
 
 
-def test_ctrl_c_is_pressed_in_a_worker_too_which_ignores_its_own() -> None:
+def test_ctrl_c_is_pressed_in_a_worker_too_which_ignores_its_own():
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         told = visit(spin_down(Event("ctrl-c", 0, 154)), exit_status)
@@ -148,7 +139,7 @@ def test_ctrl_c_is_pressed_in_a_worker_too_which_ignores_its_own() -> None:
     assert "interrupted, status 130" in " ".join(told.story)
 
 
-def test_a_failure_is_shrunk_to_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failure_is_shrunk_to_what_it_needs(monkeypatch):
     without_sync(monkeypatch)
     events = [Event("slow disk", 0, 20, 0.01), Event("clock", 0, 40), Event("power", 0, 150), Event("lid", 1, 30)]
     plan = replace(spin_down(*events), typed={"group": "Group 7"}, models={"counter": "CNT-91"})
@@ -160,9 +151,7 @@ def test_a_failure_is_shrunk_to_what_it_needs(monkeypatch: pytest.MonkeyPatch) -
     assert re.search(r"step 150: the computer loses its power\nprocess 1: [1-9]\d* readings shown; killed", story)
 
 
-def test_many_laboratories_are_carried_out(
-    levilab: Callable[..., subprocess.CompletedProcess[str]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_many_laboratories_are_carried_out(levilab, monkeypatch):
     monkeypatch.setattr(explore, "processes", lambda _: this_process())
     told = levilab("fuzz", "--number", "3").stdout
     assert re.fullmatch(r"3 laboratories, \d+ a minute: 0 failed\n", told)

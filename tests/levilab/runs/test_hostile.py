@@ -1,7 +1,5 @@
 """Whatever stands in a file that a person can write: one line about it, never a traceback, and no other run suffers."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -47,7 +45,7 @@ ODD_JSON = ODD | {
 }
 
 
-def run_with(folder: Path, **texts: str) -> Path:
+def run_with(folder, **texts):
     """A copy of a run in which keys of run.json have the values that the texts say."""
     shutil.copytree(SAMPLE, folder)
     entries = {key: json.dumps(value) for key, value in RECORD.items()} | texts
@@ -57,7 +55,7 @@ def run_with(folder: Path, **texts: str) -> Path:
 
 
 @pytest.mark.parametrize("name", ODD_JSON)
-def test_an_odd_record_costs_one_line_and_no_other_run(tmp_path: Path, name: str) -> None:
+def test_an_odd_record_costs_one_line_and_no_other_run(tmp_path, name):
     runs = tmp_path / "runs"
     run_with(runs / "odd", configuration=ODD_JSON[name])
     shutil.copytree(SAMPLE, runs / "sound")
@@ -75,7 +73,7 @@ def test_an_odd_record_costs_one_line_and_no_other_run(tmp_path: Path, name: str
 
 
 @pytest.mark.parametrize("name", ODD_JSON)
-def test_an_odd_event_is_left_out(tmp_path: Path, name: str) -> None:
+def test_an_odd_event_is_left_out(tmp_path, name):
     folder = run_with(tmp_path / "run")
     lines = ['{"text": "before"}', f'{{"text": "odd", "time_s": {ODD_JSON[name]}}}', '{"text": "after"}', ""]
     (folder / "events.jsonl").write_text("\n".join(lines), encoding="utf-8")
@@ -86,7 +84,7 @@ def test_an_odd_event_is_left_out(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     "words", [["bench", "check", "--bench", "odd.toml"], ["simulate", "odd.toml"], ["stability", "odd.toml"]]
 )
-def test_an_odd_bench_or_scene_is_reported_in_one_line(tmp_path: Path, words: list[str], name: str) -> None:
+def test_an_odd_bench_or_scene_is_reported_in_one_line(tmp_path, words, name):
     (tmp_path / "odd.toml").write_text(f"x = {ODD[name]}", encoding="utf-8")
     ended = command(*words, cwd=tmp_path)
     assert ended.status == 1
@@ -95,14 +93,14 @@ def test_an_odd_bench_or_scene_is_reported_in_one_line(tmp_path: Path, words: li
 
 
 @pytest.mark.parametrize("name", [name for name, text in ODD.items() if len(text) < 10_000])  # as a word may be
-def test_an_odd_value_of_a_key_is_wrong_usage(tmp_path: Path, name: str) -> None:
+def test_an_odd_value_of_a_key_is_wrong_usage(tmp_path, name):
     ended = command("simulate", "undriven", "--set", f"top.mass_kg={ODD[name]}", cwd=tmp_path)
     assert ended.status == 2
     assert len(ended.err.splitlines()) == 1
 
 
 @pytest.mark.parametrize("name", ["a**b", "**", "*", "[a", "?", "a*b", "sp*n", ".", "a" * 5000, "\udcff"])
-def test_a_name_is_compared_and_never_a_pattern(tmp_path: Path, name: str) -> None:
+def test_a_name_is_compared_and_never_a_pattern(tmp_path, name):
     shutil.copytree(SAMPLE, tmp_path / "runs" / "20261120T101500Z-spin-7f3a")
     (tmp_path / "data").mkdir()
     for words in (["analyze", "spindown", name, "--no-save"], ["acquire", "spin", "--mock", "--resume", name]):
@@ -113,12 +111,12 @@ def test_a_name_is_compared_and_never_a_pattern(tmp_path: Path, name: str) -> No
         assert find_run(Path(name), tmp_path / "runs") == Path(name)
 
 
-def test_a_name_with_brackets_is_found_as_it_is(tmp_path: Path) -> None:
+def test_a_name_with_brackets_is_found_as_it_is(tmp_path):
     shutil.copytree(SAMPLE, tmp_path / "20261120T101500Z-[a]")
     assert find_run(Path("[a]"), tmp_path) == tmp_path / "20261120T101500Z-[a]"
 
 
-def test_markup_and_escapes_in_a_record_are_printed_as_text(tmp_path: Path) -> None:
+def test_markup_and_escapes_in_a_record_are_printed_as_text(tmp_path):
     odd = json.dumps("[/] [red]x \x1b[31m\n\u202e")
     run_with(tmp_path / "runs" / "odd", note=odd, experiment=odd, started_utc=odd)
     ended = command("runs", "runs", cwd=tmp_path)
@@ -134,7 +132,7 @@ posix_names = pytest.mark.skipif(os.name != "posix", reason="Windows has no such
 
 
 @posix_names
-def test_names_and_notes_do_not_steer_the_terminal_of_an_analysis(tmp_path: Path) -> None:
+def test_names_and_notes_do_not_steer_the_terminal_of_an_analysis(tmp_path):
     folder = tmp_path / f"run{STEERING}"
     shutil.copytree(SAMPLE_DATA / "loose-washers", folder)
     with (folder / "events.jsonl").open("a", encoding="utf-8") as events:
@@ -146,7 +144,7 @@ def test_names_and_notes_do_not_steer_the_terminal_of_an_analysis(tmp_path: Path
 
 
 @pytest.mark.parametrize("key", ["address", "model"])
-def test_an_address_and_a_model_do_not_steer_the_terminal(tmp_path: Path, key: str) -> None:
+def test_an_address_and_a_model_do_not_steer_the_terminal(tmp_path, key):
     entries = {"model": "53230A", "address": "no resource name"} | {key: f"x::{STEERING}"}
     lines = ["[counter]", *(f"{name} = {json.dumps(text)}" for name, text in entries.items())]
     (tmp_path / "bench.toml").write_text("\n".join(lines), encoding="utf-8")
@@ -173,7 +171,7 @@ def test_an_address_and_a_model_do_not_steer_the_terminal(tmp_path: Path, key: s
         ("experiment", '"../x"'),
     ],
 )
-def test_an_odd_run_is_not_resumed_or_is_resumed(tmp_path: Path, key: str, value: str) -> None:
+def test_an_odd_run_is_not_resumed_or_is_resumed(tmp_path, key, value):
     entries = {"status": '"interrupted"', "time_zero_utc": '"2026-11-20T10:15:00Z"'} | {key: value}
     folder = run_with(tmp_path / "run", **entries)
     for bench in (["--mock"], []):
@@ -183,12 +181,12 @@ def test_an_odd_run_is_not_resumed_or_is_resumed(tmp_path: Path, key: str, value
 
 
 @pytest.fixture(scope="module")
-def half(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def half(tmp_path_factory):
     """A virtual run that was interrupted after some readings."""
     return acquire(mock(tmp_path_factory.mktemp("half")), Impatient(8)).folder
 
 
-def refusal(half: Path, place: Path) -> str:
+def refusal(half, place):
     """The line with which a run is not resumed, and is left as it was."""
     before = {path.name: path.read_bytes() for path in half.iterdir()}
     ended = command("acquire", "spin", "--mock", "--resume", half, cwd=place)
@@ -217,9 +215,7 @@ TIME, SPIN, U = ({"name": name, "unit": "", "source": ""} for name in CANONICAL[
         (["channels"], [TIME, SPIN, U, {"name": "x"}], "channels"),
     ],
 )
-def test_a_run_with_an_odd_record_is_not_resumed(
-    tmp_path: Path, half: Path, way: list[str], value: object, says: str
-) -> None:
+def test_a_run_with_an_odd_record_is_not_resumed(tmp_path, half, way, value, says):
     folder = Path(shutil.copytree(half, tmp_path / "run"))
     record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     *tables, key = way
@@ -237,28 +233,28 @@ def test_a_run_with_an_odd_record_is_not_resumed(
     ("row", "says"),
     [("80,0,0.03", "spin_frequency_hz"), ("80,-1,0.03", "spin_frequency_hz"), ("1e9,30,0.03", "spin.longest_s")],
 )
-def test_a_run_with_odd_readings_is_not_resumed(tmp_path: Path, half: Path, row: str, says: str) -> None:
+def test_a_run_with_odd_readings_is_not_resumed(tmp_path, half, row, says):
     folder = Path(shutil.copytree(half, tmp_path / "run"))
     with (folder / "readings.csv").open("a", encoding="utf-8") as file:
         file.write(row + "\n")
     assert says in refusal(folder, tmp_path)
 
 
-def test_readings_without_a_declared_column_are_not_resumed(tmp_path: Path, half: Path) -> None:
+def test_readings_without_a_declared_column_are_not_resumed(tmp_path, half):
     folder = Path(shutil.copytree(half, tmp_path / "run"))
     (folder / "readings.csv").write_text("time_s\n0\n10\n20\n", encoding="utf-8")
     assert "readings.csv" in refusal(folder, tmp_path)
 
 
 @pytest.mark.parametrize("row", ["80,nan,0.03", "80,inf,0.03", "nan,30,0.03", "80,,", "80,30,"])
-def test_a_missed_reading_does_not_keep_a_run_from_going_on(tmp_path: Path, half: Path, row: str) -> None:
+def test_a_missed_reading_does_not_keep_a_run_from_going_on(tmp_path, half, row):
     folder = Path(shutil.copytree(half, tmp_path / "run"))
     with (folder / "readings.csv").open("a", encoding="utf-8") as file:
         file.write(row + "\n")
     assert command("acquire", "spin", "--mock", "--resume", folder, cwd=tmp_path).status == 0
 
 
-def test_a_ramp_of_days_is_refused(tmp_path: Path) -> None:
+def test_a_ramp_of_days_is_refused(tmp_path):
     (tmp_path / "slow.toml").write_text("[spin]\nramp_hz_per_s = 1e-6\n", encoding="utf-8")
     ended = command("acquire", "spin", "--mock", "--bench", "slow.toml", cwd=tmp_path)
     assert ended.status == 1
@@ -267,18 +263,18 @@ def test_a_ramp_of_days_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("text", "says"), [("noon", "time_zero_utc"), ("9999-12-31T23:59:59", "set back")])
-def test_a_time_zero_that_makes_no_sense_is_reported(tmp_path: Path, text: str, says: str) -> None:
+def test_a_time_zero_that_makes_no_sense_is_reported(tmp_path, text, says):
     with pytest.raises(DataError, match=says):
         Run.load(run_with(tmp_path / "run", time_zero_utc=json.dumps(text))).elapsed()
 
 
-def interrupted(out: Path) -> Path:
+def interrupted(out):
     return run_with(out, status='"interrupted"')
 
 
 @posix_only
 @pytest.mark.parametrize("name", ["readings.csv", "events.jsonl"])
-def test_a_link_is_not_written_through(tmp_path: Path, name: str) -> None:
+def test_a_link_is_not_written_through(tmp_path, name):
     folder = interrupted(tmp_path / "run")
     other = tmp_path / "precious"
     (folder / name).rename(other) if (folder / name).exists() else other.write_text("mine\n", encoding="utf-8")
@@ -290,7 +286,7 @@ def test_a_link_is_not_written_through(tmp_path: Path, name: str) -> None:
 
 
 @posix_only
-def test_a_link_in_the_place_of_the_new_file_is_not_written_through(tmp_path: Path) -> None:
+def test_a_link_in_the_place_of_the_new_file_is_not_written_through(tmp_path):
     (tmp_path / "precious").write_text("mine", encoding="utf-8")
     (tmp_path / f".run.json.{os.getpid()}.part").symlink_to(tmp_path / "precious")
     replace_atomically(tmp_path / "run.json", "new")
@@ -300,7 +296,7 @@ def test_a_link_in_the_place_of_the_new_file_is_not_written_through(tmp_path: Pa
 
 @posix_only
 @pytest.mark.parametrize("name", ["run.json", "readings.csv", "events.jsonl"])
-def test_a_pipe_in_a_run_is_waited_for_by_no_command(tmp_path: Path, name: str) -> None:
+def test_a_pipe_in_a_run_is_waited_for_by_no_command(tmp_path, name):
     folder = interrupted(tmp_path / "runs" / "run")
     (folder / name).unlink(missing_ok=True)
     os.mkfifo(folder / name)
@@ -311,7 +307,7 @@ def test_a_pipe_in_a_run_is_waited_for_by_no_command(tmp_path: Path, name: str) 
             RunWriter.reopen(Run.load(folder))
 
 
-def test_a_run_that_was_finished_meanwhile_is_not_reopened(tmp_path: Path) -> None:
+def test_a_run_that_was_finished_meanwhile_is_not_reopened(tmp_path):
     run = Run.load(interrupted(tmp_path / "run"))
     with RunWriter.reopen(run) as writer:
         writer.finish("finished")
@@ -319,7 +315,7 @@ def test_a_run_that_was_finished_meanwhile_is_not_reopened(tmp_path: Path) -> No
         RunWriter.reopen(run)
 
 
-def test_a_text_that_utf_8_cannot_hold_is_written_with_a_question_mark(tmp_path: Path) -> None:
+def test_a_text_that_utf_8_cannot_hold_is_written_with_a_question_mark(tmp_path):
     replace_atomically(tmp_path / "page.html", "runs/\udcff")
     assert (tmp_path / "page.html").read_bytes() == b"runs/?"
 
@@ -339,7 +335,7 @@ KEYS = sorted({*RECORD, "simulation", "instruments", "channels", "time_zero_utc"
 
 @given(st.dictionaries(st.sampled_from(KEYS), TREES, max_size=2), st.lists(TREES, max_size=3))
 @settings(max_examples=30)
-def test_whatever_a_record_says_the_list_of_runs_goes_on(changes: dict[str, object], events: list[object]) -> None:
+def test_whatever_a_record_says_the_list_of_runs_goes_on(changes, events):
     with tempfile.TemporaryDirectory() as place:
         folder = run_with(Path(place) / "run", **{key: json.dumps(value) for key, value in changes.items()})
         lines = [json.dumps({"text": "x", "time_s": event}) for event in events]
@@ -352,13 +348,13 @@ def test_whatever_a_record_says_the_list_of_runs_goes_on(changes: dict[str, obje
 
 
 @given(st.text() | st.binary(max_size=60).map(lambda data: data.decode("latin-1")))
-def test_whatever_a_text_says_it_is_read_or_refused(text: str) -> None:
+def test_whatever_a_text_says_it_is_read_or_refused(text):
     for parse in (parse_json, parse_toml):
         with contextlib.suppress(ValueError):
             parse(text)
 
 
-def test_python_refuses_numbers_as_long_as_those_that_are_tested() -> None:
+def test_python_refuses_numbers_as_long_as_those_that_are_tested():
     assert 0 < sys.get_int_max_str_digits() < 5000
 
 
@@ -373,7 +369,7 @@ main()
 
 @posix_only
 @pytest.mark.parametrize("files", [5, 8])
-def test_too_few_open_files_from_the_start_cost_one_line(tmp_path: Path, files: int) -> None:
+def test_too_few_open_files_from_the_start_cost_one_line(tmp_path, files):
     """A process of its own: with 5 it cannot import all that it needs, with 8 it writes a run."""
     program = [sys.executable, "-c", FEW_FILES.format(files=files, words=["acquire", "spin", "--mock", *QUICKLY])]
     done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, encoding="utf-8", check=False)
@@ -385,7 +381,7 @@ def test_too_few_open_files_from_the_start_cost_one_line(tmp_path: Path, files: 
     "words",
     [["acquire", "spin", "--mock", *QUICKLY], ["report", str(SAMPLE), "--no-crosscheck"], ["runs", str(SAMPLE)]],
 )
-def test_too_few_open_files_cost_one_line(tmp_path: Path, words: list[str]) -> None:
+def test_too_few_open_files_cost_one_line(tmp_path, words):
     """In this process, which has imported all by then; it may open ever more files than it has, until it succeeds.
 
     Figures are drawn the first time alone: that opens the fonts, and later ones open no file.
@@ -411,13 +407,13 @@ def test_too_few_open_files_cost_one_line(tmp_path: Path, words: list[str]) -> N
             break
 
 
-def costs_one_line(status: int, err: str) -> None:
+def costs_one_line(status, err):
     assert "Traceback" not in err
     assert status == 0 or "Too many open files" in err.splitlines()[-1]
 
 
 @posix_only
-def test_a_closed_standard_output_costs_no_command(tmp_path: Path) -> None:
+def test_a_closed_standard_output_costs_no_command(tmp_path):
     words = " ".join([sys.executable, "-m", "levilab", "runs", str(SAMPLE)])
     done = subprocess.run(["sh", "-c", f"{words} >&-"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")

@@ -4,8 +4,6 @@ A few processes are really killed: a `levilab acquire spin --mock`, of which wha
 error.  What a kill would leave at each other moment is copied in this process.
 """
 
-from __future__ import annotations
-
 import errno
 import json
 import os
@@ -14,7 +12,6 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, Self
 
 import numpy as np
 import pytest
@@ -22,14 +19,14 @@ import pytest
 from levilab.runs.listing import list_runs
 from levilab.runs.run import Run
 from support.acquisitions import QUICKLY
-from support.commands import Ended, command
+from support.commands import command
 from support.waiting import HANG_GUARD_S
 
 SHOWN = re.compile(r"^ *(\d+\.\d\d) s +(\d+\.\d{4}) Hz")
 posix_only = pytest.mark.skipif(os.name != "posix", reason="Windows has neither these signals nor resource limits")
 
 
-def start(out: Path, *, before: str = "") -> subprocess.Popen[str]:
+def start(out, *, before=""):
     """A levilab process; `before` is Python that it runs first."""
     program = f"{before}\nimport sys\nsys.argv[0] = 'levilab'\nfrom levilab.cli.main import main\nmain()"
     return subprocess.Popen(
@@ -41,16 +38,16 @@ def start(out: Path, *, before: str = "") -> subprocess.Popen[str]:
     )
 
 
-def shown_in(text: str) -> list[tuple[str, str]]:
+def shown_in(text):
     """Time and spin of each whole line that was shown, as text."""
     return [
         match.groups()
         for line in text.splitlines(keepends=True)
         if line.endswith("\n") and (match := SHOWN.match(line))
-    ]  # type: ignore[misc]
+    ]
 
 
-def stored_in(run: Run) -> list[tuple[str, str]]:
+def stored_in(run):
     frame = run.readings().frame
     return [(f"{t:.2f}", f"{f:.4f}") for t, f in zip(frame["time_s"], frame["spin_frequency_hz"], strict=True)]
 
@@ -73,7 +70,7 @@ os.fsync = counting
 KILL = "os.kill(os.getpid(), 9)"
 
 
-def loses_nothing(out: Path, shown: list[tuple[str, str]], *, finished: bool = False) -> None:
+def loses_nothing(out, shown, *, finished=False):
     """What a killed process has left holds each reading that it had shown."""
     listed = list_runs(out)
     assert listed or not shown  # killed before the record is there, it has shown nothing
@@ -83,7 +80,7 @@ def loses_nothing(out: Path, shown: list[tuple[str, str]], *, finished: bool = F
 
 
 @pytest.mark.parametrize(("n", "before"), [(5, True), (12, False)])
-def test_a_killed_process_loses_no_reading_that_it_had_shown(tmp_path: Path, n: int, before: bool) -> None:
+def test_a_killed_process_loses_no_reading_that_it_had_shown(tmp_path, n, before):
     """Killed before or after the n-th sync: one of the record, or of a reading, or of an event."""
     process = start(tmp_path, before=AT_THE_NTH.format(n=n, before=before, act=KILL))
     _, output = process.communicate(timeout=HANG_GUARD_S)
@@ -91,22 +88,20 @@ def test_a_killed_process_loses_no_reading_that_it_had_shown(tmp_path: Path, n: 
     loses_nothing(tmp_path, shown_in(output))
 
 
-def test_at_no_moment_would_a_kill_lose_a_reading_that_was_shown(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_at_no_moment_would_a_kill_lose_a_reading_that_was_shown(tmp_path, monkeypatch):
     """A kill leaves the files as they are: they are copied before and after each sync, with what was shown by then."""
     out, sync = tmp_path / "runs", os.fsync
-    going_on: list[bool] = []
-    analyzed: dict[int, int] = {}
+    going_on = []
+    analyzed = {}
 
-    def copying(descriptor: int) -> None:
+    def copying(descriptor):
         copy()
         sync(descriptor)
         copy()
 
-    def copy() -> None:
+    def copy():
         sys.stderr.flush()
-        shown = shown_in(sys.stderr.buffer.getvalue().decode("utf-8"))  # type: ignore[attr-defined]
+        shown = shown_in(sys.stderr.buffer.getvalue().decode("utf-8"))
         left = tmp_path / "left"
         shutil.copytree(out, left)
         record = next(left.rglob("run.json"), None)
@@ -130,7 +125,7 @@ def test_at_no_moment_would_a_kill_lose_a_reading_that_was_shown(
 
 @posix_only
 @pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
-def test_a_signal_ends_the_process_with_130_and_the_run_kept(tmp_path: Path, name: str) -> None:
+def test_a_signal_ends_the_process_with_130_and_the_run_kept(tmp_path, name):
     send = f"os.kill(os.getpid(), signal.{name})"
     process = start(tmp_path, before=AT_THE_NTH.format(n=14, before=True, act=send))
     out, err = process.communicate(timeout=HANG_GUARD_S)
@@ -146,14 +141,14 @@ def test_a_signal_ends_the_process_with_130_and_the_run_kept(tmp_path: Path, nam
 class Disk:
     """A disk with little room.  left: bytes; seen: how much had been written after each line of readings.csv."""
 
-    def __init__(self, left: int) -> None:
+    def __init__(self, left):
         self.left, self.written, self.seen = left, 0, list[int]()
 
-    def put_in(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def put_in(self, monkeypatch):
         """From now on the files of runs are written to this disk."""
         opened = Path.open
 
-        def small(path: Path, mode: str = "r", *args: Any, **named: Any) -> Any:
+        def small(path, mode="r", *args, **named):
             file = opened(path, mode, *args, **named)
             on_it = path.name.endswith((".csv", ".jsonl", ".part")) and mode[0] in "awx"
             return Small(file, self) if on_it else file
@@ -164,19 +159,19 @@ class Disk:
 class Small:
     """A file on it: what no longer fits is half written, then refused, as write(2) does."""
 
-    def __init__(self, file: Any, disk: Disk) -> None:
+    def __init__(self, file, disk):
         self.file, self.disk = file, disk
 
-    def __getattr__(self, name: str) -> Any:
+    def __getattr__(self, name):
         return getattr(self.file, name)
 
-    def __enter__(self) -> Self:
+    def __enter__(self):
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, *_):
         self.file.close()
 
-    def write(self, text: str) -> int:
+    def write(self, text):
         disk = self.disk
         self.file.write(text[: disk.left])
         self.file.flush()
@@ -206,7 +201,7 @@ os.fsync = limiting
 """
 
 
-def survives(out: Path, status: int, err: str, reason: str) -> int:
+def survives(out, status, err, reason):
     """The command has ended with one line and status 1, and what it had shown is there; returns how much that was."""
     assert status == 1, err
     assert "Traceback" not in err
@@ -221,14 +216,14 @@ def survives(out: Path, status: int, err: str, reason: str) -> int:
     return len(shown)
 
 
-def acquire_on(disk: Disk, out: Path) -> Ended:
+def acquire_on(disk, out):
     with pytest.MonkeyPatch.context() as patch:
         disk.put_in(patch)
         out.mkdir()
         return command("acquire", "spin", "--mock", *QUICKLY, "--seed", "7", "--out", out, cwd=out)
 
 
-def test_a_disk_that_fills_up_at_any_moment_loses_no_reading_that_was_shown(tmp_path: Path) -> None:
+def test_a_disk_that_fills_up_at_any_moment_loses_no_reading_that_was_shown(tmp_path):
     large = Disk(10**9)
     assert acquire_on(large, tmp_path / "whole").status == 0
     header, *readings = large.seen
@@ -243,7 +238,7 @@ def test_a_disk_that_fills_up_at_any_moment_loses_no_reading_that_was_shown(tmp_
 
 
 @posix_only
-def test_a_write_error_at_any_moment_loses_no_reading_that_was_shown(tmp_path: Path) -> None:
+def test_a_write_error_at_any_moment_loses_no_reading_that_was_shown(tmp_path):
     shown = []
     for room in (300, 512):
         out = tmp_path / str(room)

@@ -1,12 +1,9 @@
 """The list of runs: what it shows of thousands of them, and on a narrow terminal."""
 
-from __future__ import annotations
-
 import io
 import json
 import sys
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -18,13 +15,10 @@ from levilab.runs.run import READINGS, Run
 from many_runs import make_runs
 from support.commands import command
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 RUN = Listed("20261120T101500Z-spin-7f3a", "2026-11-20T10:15:00Z", "spin", "interrupted", 20, 190.0, True, "")
 
 
-def shown(monkeypatch: pytest.MonkeyPatch, root: Path, runs: list[Listed], width: int) -> list[str]:
+def shown(monkeypatch, root, runs, width):
     """The lines of the list on a terminal of this width."""
     written = io.StringIO()
     monkeypatch.setattr(sys, "stdout", written)
@@ -34,9 +28,7 @@ def shown(monkeypatch: pytest.MonkeyPatch, root: Path, runs: list[Listed], width
 
 
 @pytest.mark.parametrize(("width", "columns"), [(60, 4), (68, 5), (80, 6), (130, 7)])
-def test_the_list_stays_a_table_on_a_narrow_terminal(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: int, columns: int
-) -> None:
+def test_the_list_stays_a_table_on_a_narrow_terminal(tmp_path, monkeypatch, width, columns):
     runs = [replace(RUN, path=str(tmp_path / RUN.path), scene="loose-washers", note="warm")]
     lines = shown(monkeypatch, tmp_path, runs, width)
     assert all(len(line) <= width for line in lines)
@@ -46,7 +38,7 @@ def test_the_list_stays_a_table_on_a_narrow_terminal(
     assert any("spin-7f3a" in line and "interrupted" in line for line in lines)
 
 
-def test_of_many_broken_runs_the_first_are_explained(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_many_broken_runs_the_first_are_explained(tmp_path, monkeypatch):
     runs = [replace(RUN, path=str(tmp_path / RUN.path), problem=f"problem {k}") for k in range(MOST_PROBLEMS + 3)]
     notes = [line for line in shown(monkeypatch, tmp_path, runs, 120) if line.startswith("note:")]
     assert notes[0] == "note: problem 0"
@@ -54,7 +46,7 @@ def test_of_many_broken_runs_the_first_are_explained(tmp_path: Path, monkeypatch
     assert len(notes) == MOST_PROBLEMS + 1
 
 
-def test_the_fast_reader_finds_the_same_as_loading(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_fast_reader_finds_the_same_as_loading(tmp_path, monkeypatch):
     folders = make_runs(tmp_path, 8, broken=2)
     for folder, change in zip(
         folders[::2], ('"seed": -1', '"seed": NaN', '"status": "running"', '"seed": 3'), strict=True
@@ -71,9 +63,7 @@ def test_the_fast_reader_finds_the_same_as_loading(tmp_path: Path, monkeypatch: 
     assert sorted(run.status for run in quick) == ["finished"] * 4 + ["interrupted"] + ["unreadable"] * 3
 
 
-def test_the_fast_reader_leaves_a_missed_reading_to_the_slow_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_fast_reader_leaves_a_missed_reading_to_the_slow_one(tmp_path, monkeypatch):
     (folder,) = make_runs(tmp_path, 1, broken=0)
     head, first, *lines = (folder / READINGS).read_text(encoding="utf-8").splitlines()
     missed = ",".join([first.split(",")[0], "9.91e37", *first.split(",")[2:]])
@@ -84,7 +74,7 @@ def test_the_fast_reader_leaves_a_missed_reading_to_the_slow_one(
     assert quick.readings == len(lines)
 
 
-def test_the_latest_runs_alone(tmp_path: Path) -> None:
+def test_the_latest_runs_alone(tmp_path):
     make_runs(tmp_path / "runs", 5, broken=0)
     listed = json.loads(command("runs", "--last", "2", "--json", cwd=tmp_path).out)
     assert [run["note"] for run in listed] == ["run 3 of 5", "run 4 of 5"]

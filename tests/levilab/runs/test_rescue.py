@@ -1,13 +1,10 @@
 """A run folder that is removed, replaced or cut under way: what was shown is on the disk nevertheless."""
 
-from __future__ import annotations
-
 import errno
 import json
 import os
 import shutil
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -19,9 +16,6 @@ from support.acquisitions import QUICKLY
 from support.commands import command
 from support.paths import SAMPLE_DATA
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 CHANNELS = [
     {"name": "time_s", "unit": "s", "source": "clock"},
     {"name": "spin_frequency_hz", "unit": "Hz", "source": "counter"},
@@ -29,38 +23,38 @@ CHANNELS = [
 posix_only = pytest.mark.skipif(os.name != "posix", reason="Windows removes no file that is open")
 
 
-def create(out: Path, messages: list[str]) -> RunWriter:
+def create(out, messages):
     record = RunRecord(experiment="spin", status="running", started_utc="2026-11-20T10:15:00Z", channels=CHANNELS)
     return RunWriter.create(out, record, tell=messages.append)
 
 
-def row(k: int) -> dict[str, float | None]:
+def row(k):
     return {"time_s": 10.0 * k, "spin_frequency_hz": 40.0 - k}
 
 
-def times(folder: Path) -> list[float]:
+def times(folder):
     return list(Run.load(folder).readings().frame["time_s"])
 
 
-def replace_file(folder: Path) -> None:
+def replace_file(folder):
     """As an editor does that writes a new file and renames it."""
     other = folder / "other"
     other.write_bytes((folder / "readings.csv").read_bytes())
     other.replace(folder / "readings.csv")
 
 
-def link_file(folder: Path) -> None:
+def link_file(folder):
     (folder / "readings.csv").rename(folder.parent / "elsewhere.csv")
     (folder / "readings.csv").symlink_to(folder.parent / "elsewhere.csv")
 
 
-def replace_folder(folder: Path) -> None:
+def replace_folder(folder):
     shutil.rmtree(folder)
     folder.mkdir()
     (folder / "readings.csv").write_text("theirs\n", encoding="utf-8")
 
 
-LOSSES: dict[str, Callable[[Path], object]] = {
+LOSSES = {
     "the readings are removed": lambda folder: (folder / "readings.csv").unlink(),
     "the events are removed": lambda folder: (folder / "events.jsonl").unlink(),
     "the readings are replaced": replace_file,
@@ -75,8 +69,8 @@ LOSSES: dict[str, Callable[[Path], object]] = {
 
 @posix_only
 @pytest.mark.parametrize("name", LOSSES)
-def test_a_loss_is_noticed_at_the_next_reading_and_rescued(tmp_path: Path, name: str) -> None:
-    messages: list[str] = []
+def test_a_loss_is_noticed_at_the_next_reading_and_rescued(tmp_path, name):
+    messages = []
     with create(tmp_path / "runs", messages) as writer:
         before = writer.folder
         writer.event(None, "drive off", "drive off")
@@ -102,13 +96,13 @@ def test_a_loss_is_noticed_at_the_next_reading_and_rescued(tmp_path: Path, name:
 
 @posix_only
 @pytest.mark.parametrize("step", ["event", "update", "finish"])
-def test_a_loss_is_noticed_by_whatever_is_written_next(tmp_path: Path, step: str) -> None:
-    steps: dict[str, Callable[[RunWriter], None]] = {
+def test_a_loss_is_noticed_by_whatever_is_written_next(tmp_path, step):
+    steps = {
         "event": lambda writer: writer.event(None, "fell", "the top fell"),
         "update": lambda writer: writer.update(time_zero_utc="2026-11-20T10:16:00Z"),
         "finish": lambda writer: writer.finish("finished"),
     }
-    messages: list[str] = []
+    messages = []
     with create(tmp_path, messages) as writer:
         writer.reading(row(0))
         shutil.rmtree(writer.folder)
@@ -118,8 +112,8 @@ def test_a_loss_is_noticed_by_whatever_is_written_next(tmp_path: Path, step: str
 
 
 @posix_only
-def test_a_run_that_is_lost_twice_is_rescued_twice(tmp_path: Path) -> None:
-    messages: list[str] = []
+def test_a_run_that_is_lost_twice_is_rescued_twice(tmp_path):
+    messages = []
     with create(tmp_path, messages) as writer:
         first = writer.folder
         for k in range(3):
@@ -133,7 +127,7 @@ def test_a_run_that_is_lost_twice_is_rescued_twice(tmp_path: Path) -> None:
 
 @posix_only
 @pytest.mark.parametrize("torn", [False, True])
-def test_a_folder_that_was_cut_stays_readable_after_each_rescue(tmp_path: Path, torn: bool) -> None:
+def test_a_folder_that_was_cut_stays_readable_after_each_rescue(tmp_path, torn):
     folders = []
     with create(tmp_path, []) as writer:
         writer.reading(row(0))
@@ -152,7 +146,7 @@ def test_a_folder_that_was_cut_stays_readable_after_each_rescue(tmp_path: Path, 
     assert times(writer.folder) == [0, 10, 20]
 
 
-def test_a_torn_record_is_written_anew_with_the_next_reading(tmp_path: Path) -> None:
+def test_a_torn_record_is_written_anew_with_the_next_reading(tmp_path):
     with create(tmp_path, []) as writer:
         writer.reading(row(0))
         (writer.folder / "run.json").write_text('{"schema', encoding="utf-8")
@@ -161,7 +155,7 @@ def test_a_torn_record_is_written_anew_with_the_next_reading(tmp_path: Path) -> 
 
 
 @posix_only
-def test_a_resumed_run_is_rescued_with_its_earlier_readings(tmp_path: Path) -> None:
+def test_a_resumed_run_is_rescued_with_its_earlier_readings(tmp_path):
     with create(tmp_path, []) as writer:
         writer.reading(row(0))
         writer.event(0.0, "drive off", "drive off")
@@ -176,9 +170,7 @@ def test_a_resumed_run_is_rescued_with_its_earlier_readings(tmp_path: Path) -> N
 
 @posix_only
 @posix_only
-def test_readings_that_cannot_be_written_again_are_not_said_to_be_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_readings_that_cannot_be_written_again_are_not_said_to_be_kept(tmp_path, monkeypatch):
     with create(tmp_path, []) as writer:
         for k in range(3):
             writer.reading(row(k))
@@ -189,11 +181,11 @@ def test_readings_that_cannot_be_written_again_are_not_said_to_be_kept(
     assert "kept" not in str(refused.value)
 
 
-def full(*_: object) -> None:
+def full(*_):
     raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
-def test_what_else_lies_in_the_folder_is_rescued_with_it(tmp_path: Path) -> None:
+def test_what_else_lies_in_the_folder_is_rescued_with_it(tmp_path):
     with create(tmp_path, []) as writer:
         writer.wire("GPIB0::1::INSTR", ">", b"*IDN?\n")
         (writer.folder / "traces").mkdir()
@@ -206,8 +198,8 @@ def test_what_else_lies_in_the_folder_is_rescued_with_it(tmp_path: Path) -> None
 
 
 @posix_only
-def test_a_record_that_is_removed_is_written_again(tmp_path: Path) -> None:
-    messages: list[str] = []
+def test_a_record_that_is_removed_is_written_again(tmp_path):
+    messages = []
     with create(tmp_path, messages) as writer:
         (writer.folder / "run.json").unlink()
         writer.reading(row(0))
@@ -215,8 +207,8 @@ def test_a_record_that_is_removed_is_written_again(tmp_path: Path) -> None:
     assert messages == []
 
 
-def test_a_run_without_a_loss_is_not_rescued(tmp_path: Path) -> None:
-    messages: list[str] = []
+def test_a_run_without_a_loss_is_not_rescued(tmp_path):
+    messages = []
     with create(tmp_path, messages) as writer:
         for k in range(5):
             writer.reading(row(k))
@@ -229,7 +221,7 @@ def test_a_run_without_a_loss_is_not_rescued(tmp_path: Path) -> None:
 # --- what is never discarded ---
 
 
-def test_a_run_is_discarded_that_never_began_and_no_other(tmp_path: Path) -> None:
+def test_a_run_is_discarded_that_never_began_and_no_other(tmp_path):
     with create(tmp_path, []) as writer:
         assert writer.discard()
     assert list(tmp_path.iterdir()) == []
@@ -248,7 +240,7 @@ def test_a_run_is_discarded_that_never_began_and_no_other(tmp_path: Path) -> Non
     assert (resumed.folder / "run.json").exists()
 
 
-def test_a_resume_at_a_bench_that_does_not_answer_keeps_the_run(tmp_path: Path) -> None:
+def test_a_resume_at_a_bench_that_does_not_answer_keeps_the_run(tmp_path):
     """Nothing listens on port 9 of this machine; the run names no instruments, as those of other programs may not."""
     folder = tmp_path / "run"
     shutil.copytree(SAMPLE_DATA / "spin-down-1", folder)
@@ -273,7 +265,7 @@ def test_a_resume_at_a_bench_that_does_not_answer_keeps_the_run(tmp_path: Path) 
 
 # --- a whole acquisition ---
 
-ACTS: dict[str, Callable[[Path], object]] = {
+ACTS = {
     "folder": shutil.rmtree,
     "readings": lambda folder: (folder / "readings.csv").unlink(),
     "all runs": lambda folder: shutil.rmtree(folder.parent),
@@ -283,13 +275,11 @@ ACTS: dict[str, Callable[[Path], object]] = {
 @posix_only
 @pytest.mark.parametrize("act", ACTS)
 @pytest.mark.parametrize("at", [12, 20, 30])
-def test_an_acquisition_whose_run_is_removed_loses_no_reading(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, act: str, at: int
-) -> None:
+def test_an_acquisition_whose_run_is_removed_loses_no_reading(tmp_path, monkeypatch, act, at):
     """Removed when something is put on the disk for the n-th time."""
     out, sync, count = tmp_path / "runs", os.fsync, 0
 
-    def removing(descriptor: int) -> None:
+    def removing(descriptor):
         nonlocal count
         sync(descriptor)
         count += 1

@@ -6,7 +6,6 @@ import json
 import os
 import re
 import tempfile
-from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -32,17 +31,17 @@ CHANNELS = [
 ]
 
 
-def record(**changes: object) -> RunRecord:
+def record(**changes):
     return RunRecord(
         experiment="spin", status="running", started_utc="2026-11-20T10:15:00.000000Z", channels=CHANNELS
     ).model_copy(update=changes)
 
 
-def row(k: int) -> dict[str, float | None]:
+def row(k):
     return {"time_s": 10.0 * k, "spin_frequency_hz": 40.0 - k / 3, "spin_frequency_u_hz": None if k == 1 else 0.03}
 
 
-def written(out: Path, rows: int = 4) -> Path:
+def written(out, rows=4):
     with RunWriter.create(out, record()) as writer:
         for k in range(rows):
             writer.reading(row(k))
@@ -51,16 +50,16 @@ def written(out: Path, rows: int = 4) -> Path:
     return writer.folder
 
 
-def failing(number: int) -> Callable[..., None]:
+def failing(number):
     """Stands for a function of the system that fails."""
 
-    def fail(*_: object) -> None:
+    def fail(*_):
         raise OSError(number, os.strerror(number))
 
     return fail
 
 
-def test_a_run_that_was_written_loads_as_it_was_and_with_numpy_alone(tmp_path: Path) -> None:
+def test_a_run_that_was_written_loads_as_it_was_and_with_numpy_alone(tmp_path):
     run = Run.load(written(tmp_path))
     assert (run.status, run.record.experiment) == ("finished", "spin")
     frame = run.readings().frame
@@ -72,7 +71,7 @@ def test_a_run_that_was_written_loads_as_it_was_and_with_numpy_alone(tmp_path: P
     assert table["spin_frequency_hz"][3] == 39.0
 
 
-def test_the_datapackage_holds_units_and_hashes(tmp_path: Path) -> None:
+def test_the_datapackage_holds_units_and_hashes(tmp_path):
     folder = written(tmp_path)
     package = json.loads((folder / "datapackage.json").read_text(encoding="utf-8"))
     readings = next(r for r in package["resources"] if r["path"] == "readings.csv")
@@ -80,7 +79,7 @@ def test_the_datapackage_holds_units_and_hashes(tmp_path: Path) -> None:
     assert [field["unit"] for field in readings["schema"]["fields"]] == ["s", "Hz", "Hz"]
 
 
-def test_a_torn_last_line_is_left_out_with_a_warning(tmp_path: Path) -> None:
+def test_a_torn_last_line_is_left_out_with_a_warning(tmp_path):
     folder = written(tmp_path)
     whole = (folder / "readings.csv").read_bytes()
     (folder / "readings.csv").write_bytes(whole + b"40.0,38.")
@@ -89,14 +88,14 @@ def test_a_torn_last_line_is_left_out_with_a_warning(tmp_path: Path) -> None:
     assert any("cut off" in warning or "torn" in warning for warning in table.warnings)
 
 
-def test_a_run_whose_process_is_gone_is_interrupted_and_one_that_lives_is_running(tmp_path: Path) -> None:
+def test_a_run_whose_process_is_gone_is_interrupted_and_one_that_lives_is_running(tmp_path):
     with RunWriter.create(tmp_path, record()) as writer:
         writer.reading(row(0))
         assert Run.load(writer.folder).status == "running"
     assert Run.load(writer.folder).status == "interrupted"
 
 
-def test_reopening_cuts_a_torn_line_and_goes_on(tmp_path: Path) -> None:
+def test_reopening_cuts_a_torn_line_and_goes_on(tmp_path):
     with RunWriter.create(tmp_path, record()) as writer:
         writer.reading(row(0))
     with (writer.folder / "readings.csv").open("ab") as file:
@@ -118,9 +117,7 @@ def test_reopening_cuts_a_torn_line_and_goes_on(tmp_path: Path) -> None:
         ('{"schema": "levilab-run/1", "experiment": "spin", "status": "lost", "started_utc": null}', "status"),
     ],
 )
-def test_a_broken_run_json_says_what_is_wrong_and_how_to_save_the_readings(
-    tmp_path: Path, text: str, says: str
-) -> None:
+def test_a_broken_run_json_says_what_is_wrong_and_how_to_save_the_readings(tmp_path, text, says):
     folder = written(tmp_path)
     (folder / "run.json").write_text(text, encoding="utf-8")
     with pytest.raises(DataError, match=says) as caught:
@@ -130,9 +127,7 @@ def test_a_broken_run_json_says_what_is_wrong_and_how_to_save_the_readings(
     assert [run.status for run in listed] == ["unreadable"]
 
 
-def test_replacing_a_file_leaves_the_old_one_whole_when_writing_fails(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_replacing_a_file_leaves_the_old_one_whole_when_writing_fails(tmp_path, monkeypatch):
     path = tmp_path / "run.json"
     replace_atomically(path, "old")
     monkeypatch.setattr("levilab.runs.writer.os.fsync", failing(errno.ENOSPC))
@@ -143,9 +138,7 @@ def test_replacing_a_file_leaves_the_old_one_whole_when_writing_fails(
 
 
 @pytest.mark.parametrize("rows_until_full", range(6))
-def test_when_the_disk_is_full_every_earlier_reading_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rows_until_full: int
-) -> None:
+def test_when_the_disk_is_full_every_earlier_reading_is_kept(tmp_path, monkeypatch, rows_until_full):
     with RunWriter.create(tmp_path, record()) as writer:
         for k in range(rows_until_full):
             writer.reading({"time_s": k, "spin_frequency_hz": 40 - k, "spin_frequency_u_hz": 0.03})
@@ -157,7 +150,7 @@ def test_when_the_disk_is_full_every_earlier_reading_is_kept(
     assert run.readings().frame["time_s"].tolist()[:rows_until_full] == list(range(rows_until_full))
 
 
-def test_a_folder_that_cannot_be_made_is_reported_in_one_line(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported_in_one_line(tmp_path):
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
     (tmp_path / "link").symlink_to(tmp_path / "gone" / "away")
     for name in ("file", "link"):
@@ -165,7 +158,7 @@ def test_a_folder_that_cannot_be_made_is_reported_in_one_line(tmp_path: Path) ->
             RunWriter.create(tmp_path / name, record())
 
 
-def test_runs_are_found_below_a_folder_and_listed_oldest_first(tmp_path: Path) -> None:
+def test_runs_are_found_below_a_folder_and_listed_oldest_first(tmp_path):
     late = RunWriter.create(tmp_path / "b", record(started_utc="2026-11-21T00:00:00Z", note="late"))
     early = RunWriter.create(tmp_path / "a" / "deep", record(started_utc="2026-11-20T00:00:00Z", note="early"))
     for writer in (late, early):
@@ -180,7 +173,7 @@ def test_runs_are_found_below_a_folder_and_listed_oldest_first(tmp_path: Path) -
     ]
 
 
-def test_the_length_of_a_run_is_from_time_zero_or_not_known(tmp_path: Path) -> None:
+def test_the_length_of_a_run_is_from_time_zero_or_not_known(tmp_path):
     """The first reading of a limit comes when the first top has fallen; a list of limits has no times."""
     with RunWriter.create(tmp_path / "1", record(time_zero_utc="2026-11-20T00:00:00Z")) as one:
         one.reading(row(5))
@@ -191,7 +184,7 @@ def test_the_length_of_a_run_is_from_time_zero_or_not_known(tmp_path: Path) -> N
     assert [run.length_s for run in listed] == [50.0, None]
 
 
-def test_a_run_is_found_by_its_name_below_a_folder(tmp_path: Path) -> None:
+def test_a_run_is_found_by_its_name_below_a_folder(tmp_path):
     folder = written(tmp_path)
     assert re.fullmatch(r"\d{8}T\d{6}Z-spin-[0-9a-f]{4}", folder.name)  # when and what
     short = folder.name.split("Z-")[1]
@@ -200,7 +193,7 @@ def test_a_run_is_found_by_its_name_below_a_folder(tmp_path: Path) -> None:
     assert find_run(Path("spin-none"), tmp_path) == Path("spin-none")
 
 
-def test_going_on_with_an_empty_file_writes_its_header_first(tmp_path: Path) -> None:
+def test_going_on_with_an_empty_file_writes_its_header_first(tmp_path):
     folder = written(tmp_path)
     (folder / "readings.csv").write_text("", encoding="utf-8")
     with RunWriter.reopen(Run.load(folder)) as writer:
@@ -208,14 +201,14 @@ def test_going_on_with_an_empty_file_writes_its_header_first(tmp_path: Path) -> 
     assert Run.load(folder).count() == 1
 
 
-def test_rows_are_not_written_below_another_header(tmp_path: Path) -> None:
+def test_rows_are_not_written_below_another_header(tmp_path):
     folder = written(tmp_path)
     (folder / "readings.csv").write_text("time_s,height_m\n", encoding="utf-8")
     with pytest.raises(CannotWrite, match="its header is"):
         RunWriter.reopen(Run.load(folder))
 
 
-def test_damaged_events_are_left_out(tmp_path: Path) -> None:
+def test_damaged_events_are_left_out(tmp_path):
     folder = written(tmp_path)
     with (folder / "events.jsonl").open("ab") as file:
         file.write(b'{"kind": 1\n[]\n{"text": 3}\n\xff\xfe\n{"text": "fine", "time_s": "soon"}\n')
@@ -223,7 +216,7 @@ def test_damaged_events_are_left_out(tmp_path: Path) -> None:
     assert [(event["text"], event["time_s"]) for event in events] == [("drive off", 0.0), ("fine", None)]
 
 
-def test_a_clock_that_was_set_back_is_found_before_a_run_is_gone_on_with(tmp_path: Path) -> None:
+def test_a_clock_that_was_set_back_is_found_before_a_run_is_gone_on_with(tmp_path):
     ahead = (datetime.now(UTC) + timedelta(hours=1)).isoformat()
     run = Run.load(written(tmp_path))
     changed = run.record.model_copy(update={"time_zero_utc": ahead})
@@ -235,7 +228,7 @@ def test_a_clock_that_was_set_back_is_found_before_a_run_is_gone_on_with(tmp_pat
     assert 100 <= elapsed <= (datetime.now(UTC) - past).total_seconds()
 
 
-def test_a_linked_run_is_found_once(tmp_path: Path) -> None:
+def test_a_linked_run_is_found_once(tmp_path):
     folder = written(tmp_path / "real")
     (tmp_path / "look").mkdir()
     (tmp_path / "look" / "link").symlink_to(folder, target_is_directory=True)
@@ -256,7 +249,7 @@ ENDS = st.sampled_from(["\n", "\n", "\n", "\r\n", "\n\n", "\n# note\n", ""])
 #: A line lacks a field, and the next one has one too many.
 @example(lines=[(["0.0", "10.5"], "\n"), (["0.0", "10.5", "1", "2"], "\n")], three=False)
 @settings(max_examples=60)
-def test_a_glance_at_readings_says_what_reading_them_does(lines: list[tuple[list[str], str]], three: bool) -> None:
+def test_a_glance_at_readings_says_what_reading_them_does(lines, three):
     channels = CHANNELS if three else [*CHANNELS[:2], {"name": "record"}]
     header = ",".join(channel["name"] for channel in channels)
     with tempfile.TemporaryDirectory() as place:
@@ -269,7 +262,7 @@ def test_a_glance_at_readings_says_what_reading_them_does(lines: list[tuple[list
             assert glanced == list_runs(Path(place))
 
 
-def test_a_sound_run_is_listed_by_a_glance_at_its_readings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sound_run_is_listed_by_a_glance_at_its_readings(tmp_path, monkeypatch):
     with RunWriter.create(tmp_path, record()) as writer:
         for k in (0, 2, 3):
             writer.reading(row(k))
@@ -278,7 +271,7 @@ def test_a_sound_run_is_listed_by_a_glance_at_its_readings(tmp_path: Path, monke
     assert [(run.readings, run.length_s) for run in list_runs(tmp_path)] == [(3, 30.0)]
 
 
-def test_a_long_run_is_listed_with_all_its_readings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_long_run_is_listed_with_all_its_readings(tmp_path, monkeypatch):
     with RunWriter.create(tmp_path, record(channels=CHANNELS[:2])) as writer:
         for k in range(40):
             writer.reading({"time_s": 10 * k + 1 / 7, "spin_frequency_hz": 40 - k / 7})
@@ -289,7 +282,7 @@ def test_a_long_run_is_listed_with_all_its_readings(tmp_path: Path, monkeypatch:
         assert [run.readings for run in list_runs(tmp_path)] == [40]
 
 
-def test_a_list_of_many_runs_looks_like_one_of_a_few(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_list_of_many_runs_looks_like_one_of_a_few(capsys):
     run = Listed(
         "r/20261120T101500Z-spin-7f3a", "2026-11-20T10:15", "spin", "finished", 20, 190.0, synthetic=True, note="n ü"
     )
@@ -307,19 +300,17 @@ def test_a_list_of_many_runs_looks_like_one_of_a_few(capsys: pytest.CaptureFixtu
 # --- the disk ---
 
 
-def test_every_new_folder_above_a_run_is_on_the_disk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    synchronised: list[Path] = []
+def test_every_new_folder_above_a_run_is_on_the_disk(tmp_path, monkeypatch):
+    synchronised = []
     monkeypatch.setattr(Computer, "sync_folder", lambda _, folder: synchronised.append(folder))
     with RunWriter.create(tmp_path / "a" / "b" / "c", record()):
         pass
     assert {tmp_path, tmp_path / "a", tmp_path / "a" / "b", tmp_path / "a" / "b" / "c"} <= set(synchronised)
 
 
-def test_a_file_that_begins_under_way_keeps_its_name_when_power_is_lost(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_that_begins_under_way_keeps_its_name_when_power_is_lost(tmp_path, monkeypatch):
     """Its content alone is not enough: POSIX promises the name of a new file only when its folder is synchronised."""
-    synchronised: list[Path] = []
+    synchronised = []
     with RunWriter.create(tmp_path, record()) as writer:
         monkeypatch.setattr(Computer, "sync_folder", lambda _, folder: synchronised.append(folder))
         writer.event(None, RunEvent.DRIVE_ON, "drive on")
@@ -330,16 +321,14 @@ def test_a_file_that_begins_under_way_keeps_its_name_when_power_is_lost(
 @pytest.mark.parametrize(
     ("number", "advice"), [(errno.ENOSPC, "free space"), (errno.EIO, "look at the folder and its disk")]
 )
-def test_a_disk_that_fails_is_no_full_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, advice: str
-) -> None:
+def test_a_disk_that_fails_is_no_full_one(tmp_path, monkeypatch, number, advice):
     with RunWriter.create(tmp_path, record()) as writer:
         monkeypatch.setattr("os.fsync", failing(number))
         with pytest.raises(CannotWrite, match=advice):
             writer.reading(row(0))
 
 
-def test_a_run_folder_that_cannot_be_filled_is_taken_away(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_run_folder_that_cannot_be_filled_is_taken_away(tmp_path, monkeypatch):
     monkeypatch.setattr("levilab.runs.writer.replace_atomically", failing(errno.ENOSPC))
     with pytest.raises(CannotWrite):
         RunWriter.create(tmp_path / "runs", record())

@@ -1,10 +1,7 @@
 """An adaptive map in its store: right where it is computed, marked where not, the same however it came about."""
 
-from __future__ import annotations
-
 import contextlib
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -19,13 +16,10 @@ from levilab.sweeps.plan import Axis, Plan
 from levilab.sweeps.store import Store
 from levilab.workers import this_process, threads
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 SCENE = preset("undriven").changed({"start.place": "given"})
 
 
-def plan(spins: int, masses: int, duration: float = 3.0) -> Plan:
+def plan(spins, masses, duration=3.0):
     """The upper edge, with its islands."""
     axes = (Axis("start.spin_hz", np.linspace(46, 94, spins)), Axis("top.mass_kg", np.linspace(0.0251, 0.0259, masses)))
     made = Plan.of(SCENE, axes, ("survived", "lifetime_s"), duration)
@@ -33,13 +27,13 @@ def plan(spins: int, masses: int, duration: float = 3.0) -> Plan:
     return replace(made, step_share=share)
 
 
-def made_up(task: Any) -> dict[str, np.ndarray]:
+def made_up(task):
     """An edge and an island that cost nothing."""
     spin, mass = task.values["start.spin_hz"], 1e5 * task.values["top.mass_kg"]
     return {"survived": (spin < 65) | ((spin - 80) ** 2 + (mass - 2550) ** 2 < 9), "lifetime_s": spin + mass}
 
 
-def test_a_map_with_islands_agrees_with_the_full_one_within_its_limit() -> None:
+def test_a_map_with_islands_agrees_with_the_full_one_within_its_limit():
     asked = plan(61, 41)
     store = Store.create(None, asked)
     begin_adaptive(store, stride=4, audit=60)
@@ -61,7 +55,7 @@ def test_a_map_with_islands_agrees_with_the_full_one_within_its_limit() -> None:
     assert "a box of 3.2 Hz (spin at the start) by 0.08 g (mass) is sure to be seen" in said
 
 
-def test_the_result_does_not_depend_on_the_workers(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_result_does_not_depend_on_the_workers(monkeypatch):
     monkeypatch.setattr(adaptive, "compute", made_up)
     asked, found = plan(41, 41, 0.01), []
     for workers in (this_process(), threads(3)):
@@ -72,19 +66,17 @@ def test_the_result_does_not_depend_on_the_workers(monkeypatch: pytest.MonkeyPat
     assert found[0] == found[1]
 
 
-def test_a_map_that_was_interrupted_goes_on_without_computing_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_map_that_was_interrupted_goes_on_without_computing_anew(tmp_path, monkeypatch):
     asked, computed = plan(41, 41, 0.01), []
 
     class Cut(Exception):
         pass
 
-    def counted(task: Any) -> dict[str, np.ndarray]:
+    def counted(task):
         computed.extend(task.part.tolist())
         return made_up(task)
 
-    def cut(share: float) -> None:
+    def cut(share):
         if share > 0.5:
             raise Cut
 
@@ -93,7 +85,7 @@ def test_a_map_that_was_interrupted_goes_on_without_computing_anew(
     stores = [Store.create(tmp_path / name, asked) for name in ("whole.zarr", "cut.zarr")]
     for store in stores:
         begin_adaptive(store, audit=100)
-    shares: list[float] = []
+    shares = []
     run_adaptive(stores[0], this_process(), shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1.0)
@@ -113,10 +105,10 @@ def test_a_map_that_was_interrupted_goes_on_without_computing_anew(
     assert again.done == asked.chunk_count
 
 
-def test_ctrl_c_costs_only_the_points_under_way(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_costs_only_the_points_under_way(monkeypatch):
     tasks = []
 
-    def interrupted(task: Any) -> dict[str, np.ndarray]:
+    def interrupted(task):
         if len(tasks) == 5:
             raise KeyboardInterrupt
         tasks.append(task)
@@ -129,7 +121,7 @@ def test_ctrl_c_costs_only_the_points_under_way(monkeypatch: pytest.MonkeyPatch)
     assert np.count_nonzero(store.group["status"][...]) == sum(task.part.size for task in tasks) > 0
 
 
-def test_what_has_no_boundary_cannot_be_refined() -> None:
+def test_what_has_no_boundary_cannot_be_refined():
     asked = plan(5, 5, 0.01)
     with pytest.raises(UsageError, match="adaptive = lifetime_s: a boundary lies between yes and no"):
         begin_adaptive(Store.create(None, asked), "lifetime_s")

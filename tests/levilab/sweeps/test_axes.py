@@ -1,18 +1,11 @@
 """What is no axis is refused before anything is computed, with what to write instead."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 
 from levilab.errors import UsageError
 from levilab.simulator.scene import preset
 from levilab.sweeps.axes import check_axes, parse_axis, read_points
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @pytest.mark.parametrize(
@@ -35,7 +28,7 @@ if TYPE_CHECKING:
         ("drive.waveform=sine:square:2", "words are swept by a table of `points`"),
     ],
 )
-def test_a_text_that_is_no_axis_is_refused_with_what_is_expected(text: str, said: str) -> None:
+def test_a_text_that_is_no_axis_is_refused_with_what_is_expected(text, said):
     with pytest.raises(UsageError) as refused:
         parse_axis(text)
     assert said in refused.value.text
@@ -65,13 +58,13 @@ def test_a_text_that_is_no_axis_is_refused_with_what_is_expected(text: str, said
         ),
     ],
 )
-def test_axes_that_the_scene_lacks_or_that_are_invalid_are_named(axes: tuple[str, ...], said: str) -> None:
+def test_axes_that_the_scene_lacks_or_that_are_invalid_are_named(axes, said):
     with pytest.raises(UsageError) as refused:
         check_axes(preset("undriven"), tuple(map(parse_axis, axes)), {"start.velocity_m_s.0"})
     assert said in refused.value.text
 
 
-def test_a_start_at_equilibrium_is_refused_where_the_top_floats_nowhere() -> None:
+def test_a_start_at_equilibrium_is_refused_where_the_top_floats_nowhere():
     scene = preset("undriven").changed({"start.place": "equilibrium"})
     with pytest.raises(UsageError, match=r"top\.mass_kg = 0\.0265.*does not float"):
         check_axes(scene, [parse_axis("top.mass_kg=0.0250:0.0265:3")])
@@ -79,7 +72,7 @@ def test_a_start_at_equilibrium_is_refused_where_the_top_floats_nowhere() -> Non
         check_axes(scene, [parse_axis("start.position_m.2=0.07:0.08:3")])
 
 
-def points(folder: Path, text: str) -> Path:
+def points(folder, text):
     path = folder / "points.csv"
     path.write_text(text, encoding="utf-8")
     return path
@@ -93,14 +86,14 @@ def points(folder: Path, text: str) -> Path:
         "start.spin_hz\tdrive.waveform\r\n2e1\tsine\r\n25.5\tsquare\r\n",
     ],
 )
-def test_a_table_of_points_may_be_of_commas_semicolons_or_tabs(text: str, tmp_path: Path) -> None:
+def test_a_table_of_points_may_be_of_commas_semicolons_or_tabs(text, tmp_path):
     spin, waveform = read_points(points(tmp_path, text))
     assert (spin.key, spin.values.tolist(), spin.scale) == ("start.spin_hz", [20.0, 25.5], "table")
     assert waveform.values.tolist() == ["sine", "square"]
     check_axes(preset("driven"), (spin, waveform))
 
 
-def test_a_key_without_effect_at_some_points_alone_is_an_axis(tmp_path: Path) -> None:
+def test_a_key_without_effect_at_some_points_alone_is_an_axis(tmp_path):
     table = read_points(points(tmp_path, "drive.waveform,drive.amplitude_t\nsine,4e-4\noff,0\n"))
     check_axes(preset("driven"), table)
     with pytest.raises(UsageError, match=r"it changes nothing, since drive\.waveform = off"):
@@ -120,18 +113,18 @@ def test_a_key_without_effect_at_some_points_alone_is_an_axis(tmp_path: Path) ->
         ("start.spin_hz,top.mass_kg\n20,\n", "line 2: 2 values are expected"),
     ],
 )
-def test_a_table_without_points_is_refused_with_its_line(text: str, said: str, tmp_path: Path) -> None:
+def test_a_table_without_points_is_refused_with_its_line(text, said, tmp_path):
     with pytest.raises(UsageError, match=said):
         read_points(points(tmp_path, text))
 
 
-def test_words_in_a_column_of_numbers_are_refused(tmp_path: Path) -> None:
+def test_words_in_a_column_of_numbers_are_refused(tmp_path):
     axes = read_points(points(tmp_path, "start.spin_hz\n20\nfast\n"))
     with pytest.raises(UsageError, match="numbers are expected in its column, not 'fast'"):
         check_axes(preset("undriven"), axes)
 
 
-def test_a_logarithmic_axis_has_a_constant_ratio() -> None:
+def test_a_logarithmic_axis_has_a_constant_ratio():
     values = parse_axis("start.tilt_rad=0.001:0.1:5:log").values
     assert values[[0, -1]].tolist() == [0.001, 0.1]
     assert np.allclose(values[1:] / values[:-1], 10**0.5, rtol=1e-14)

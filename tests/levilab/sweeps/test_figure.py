@@ -1,23 +1,16 @@
 """Figures of maps, drawn from maps that are made up: what is drawn, where, and what it says."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
 from levilab.errors import UsageError
 from levilab.present.looks import LOOKS
-from levilab.simulator.scene import Scene, preset
+from levilab.simulator.scene import preset
 from levilab.sweeps.figure import KINDS, MOST_PANELS, map_figure
 from levilab.sweeps.plan import Axis, Plan
 from levilab.sweeps.store import Map
 from support.figures import faults
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 UNDRIVEN, DRIVEN = preset("undriven"), preset("driven")
 SPIN = Axis("start.spin_hz", np.linspace(18, 90, 37))
@@ -25,9 +18,7 @@ MASS = Axis("top.mass_kg", np.linspace(0.0246, 0.0257, 12))
 HEIGHT = Axis("start.position_m.2", np.linspace(0.0695, 0.0765, 5))
 
 
-def a_map(
-    *axes: Axis, names: tuple[str, ...] = ("survived", "lifetime_s"), scene: Scene = UNDRIVEN, adaptive: bool = False
-) -> Map:
+def a_map(*axes, names=("survived", "lifetime_s"), scene=UNDRIVEN, adaptive=False):
     plan = Plan.of(scene, axes, names, 10.0)
     first = np.indices(plan.shape)[0]
     yes = first % 3 > 0
@@ -37,21 +28,21 @@ def a_map(
     return Map(plan, values, np.ones(plan.shape, dtype=np.bool_) if filled is None else ~filled, filled)
 
 
-def legend(figure: Figure) -> list[str]:
+def legend(figure):
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def caption(figure: Figure) -> str:
+def caption(figure):
     return " ".join(" ".join(text.get_text().split()) for text in figure.texts)
 
 
-def upright_lines(figure: Figure) -> set[float]:
+def upright_lines(figure):
     """Places of lines that stand upright in the first panel."""
     lines = [np.asarray(line.get_xdata(), dtype=np.float64) for line in figure.axes[0].lines]
     return {round(float(x[0]), 2) for x in lines if len(x) == 2 and x[0] == x[1]}
 
 
-def test_spin_and_mass_have_both_windows_and_the_limits_of_the_thesis() -> None:
+def test_spin_and_mass_have_both_windows_and_the_limits_of_the_thesis():
     figure = map_figure(a_map(MASS, SPIN))
     (axes,) = figure.axes
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("spin at the start  [Hz]", "mass  [g]")
@@ -72,18 +63,18 @@ def test_spin_and_mass_have_both_windows_and_the_limits_of_the_thesis() -> None:
     assert not any("thesis" in text for text in legend(other))
 
 
-def test_spin_and_height_have_the_window_of_their_mass_as_upright_lines() -> None:
+def test_spin_and_height_have_the_window_of_their_mass_as_upright_lines():
     figure = map_figure(a_map(SPIN, HEIGHT, scene=UNDRIVEN.changed({"top.mass_kg": 0.02526})))
     assert {21.65, 80.6} <= {round(x, 1) if x > 30 else x for x in upright_lines(figure)}
     assert "heights that are stable (adiabatic): 7.00 to 7.57 cm" in legend(figure)
 
 
-def test_spins_the_other_way_round_have_their_window_there() -> None:
+def test_spins_the_other_way_round_have_their_window_there():
     figure = map_figure(a_map(Axis("start.spin_hz", np.linspace(-90, -18, 9)), HEIGHT))
     assert {-21.6, -80.6} <= {round(x, 1) for x in upright_lines(figure)}
 
 
-def test_every_text_lies_inside_of_the_picture_and_off_the_map() -> None:
+def test_every_text_lies_inside_of_the_picture_and_off_the_map():
     fine = Axis(MASS.key, np.linspace(0.0248, 0.0252, 9))  # its ticks have two decimals
     for found in (a_map(fine, SPIN, adaptive=True), a_map(SPIN, fine, HEIGHT)):
         figure = map_figure(found, "lifetime_s", notes=["a sentence of a map that was refined " * 8])
@@ -94,7 +85,7 @@ def test_every_text_lies_inside_of_the_picture_and_off_the_map() -> None:
             assert not any(artist.get_window_extent().overlaps(panel) for panel in panels), artist
 
 
-def test_lost_tops_are_hatched_and_only_these() -> None:
+def test_lost_tops_are_hatched_and_only_these():
     found = a_map(MASS, SPIN)
     (axes,) = map_figure(found).axes
     (hatched,) = [one for one in axes.collections if one.get_hatch()]
@@ -103,7 +94,7 @@ def test_lost_tops_are_hatched_and_only_these() -> None:
     assert sum(widths) == pytest.approx(2.0 * np.count_nonzero(lost))  # a cell spans 2 Hz
 
 
-def test_filled_points_are_paler_and_the_report_is_below() -> None:
+def test_filled_points_are_paler_and_the_report_is_below():
     figure = map_figure(a_map(MASS, SPIN, adaptive=True), notes=["5 of 9 points were computed", "few are wrong"])
     assert legend(figure)[:4] == [
         "still up after 10 s", "filled in: still up", "lost before", "filled in: lost before",
@@ -111,19 +102,19 @@ def test_filled_points_are_paler_and_the_report_is_below() -> None:
     assert "5 of 9 points were computed. Few are wrong." in caption(figure)
 
 
-def test_the_kinds_of_cells_differ_in_grey() -> None:
+def test_the_kinds_of_cells_differ_in_grey():
     grey = sorted(float(np.dot(to_rgb(kind.colour), [0.299, 0.587, 0.114])) for kind in list(KINDS.values())[:4])
     assert np.diff(grey).min() > 0.1
 
 
-def test_a_map_of_lifetimes_has_blue_for_tops_that_are_still_up() -> None:
+def test_a_map_of_lifetimes_has_blue_for_tops_that_are_still_up():
     figure = map_figure(a_map(MASS, SPIN), "lifetime_s")
     assert figure.axes[-1].get_ylabel() == "time until the fall  [s]"
     assert legend(figure)[0] == "still up after 10 s"
     assert "lost before" not in legend(figure)
 
 
-def test_a_lock_map_tells_tops_that_slip_from_tops_that_are_lost() -> None:
+def test_a_lock_map_tells_tops_that_slip_from_tops_that_are_lost():
     axes = (
         Axis("drive.frequency_hz", np.linspace(28, 32, 9)),
         Axis("drive.amplitude_t", np.geomspace(1e-5, 1e-3, 5), "log"),
@@ -138,7 +129,7 @@ def test_a_lock_map_tells_tops_that_slip_from_tops_that_are_lost() -> None:
     assert "a factor 3.16 (amplitude of the drive)" in caption(figure)
 
 
-def test_a_third_axis_gives_small_multiples_with_their_values() -> None:
+def test_a_third_axis_gives_small_multiples_with_their_values():
     figure = map_figure(a_map(SPIN, MASS, HEIGHT))
     titles = [axes.get_title(loc="left") for axes in figure.axes]
     assert len(titles) == 5
@@ -151,14 +142,14 @@ def test_a_third_axis_gives_small_multiples_with_their_values() -> None:
     assert "12 of 16 values of the third axis are shown." in caption(many)
 
 
-def test_the_legend_has_lines_that_the_last_panel_does_not_have() -> None:
+def test_the_legend_has_lines_that_the_last_panel_does_not_have():
     masses = Axis(MASS.key, np.array([0.0250, 0.0256]))  # the second floats nowhere
     figure = map_figure(a_map(SPIN, masses, HEIGHT, names=("survived",)))
     assert len(figure.axes) == 2
     assert "slowest and fastest spin for small motions (linear)" in legend(figure)
 
 
-def test_points_that_are_not_computed_yet_are_white_and_counted() -> None:
+def test_points_that_are_not_computed_yet_are_white_and_counted():
     found = a_map(MASS, SPIN)
     found.computed[:, :5] = False
     figure = map_figure(found)
@@ -166,14 +157,14 @@ def test_points_that_are_not_computed_yet_are_white_and_counted() -> None:
     assert "60 of 444 points are not computed yet." in caption(figure)
 
 
-def test_what_is_no_map_has_no_figure() -> None:
+def test_what_is_no_map_has_no_figure():
     with pytest.raises(UsageError, match="a figure needs two or three axes"):
         map_figure(a_map(SPIN))
     with pytest.raises(UsageError, match="observe = locked: the map has survived, lifetime_s"):
         map_figure(a_map(SPIN, MASS), "locked")
 
 
-def test_an_error_of_zero_is_drawn_as_the_smallest_and_the_colour_bar_fits() -> None:
+def test_an_error_of_zero_is_drawn_as_the_smallest_and_the_colour_bar_fits():
     found = a_map(SPIN, MASS, names=("energy_error",))
     found.values["energy_error"][...] = np.linspace(1e-3, 9e-3, found.computed.size).reshape(found.computed.shape)
     found.values["energy_error"][0, 0] = 0.0

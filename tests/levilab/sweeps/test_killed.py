@@ -1,22 +1,14 @@
 """Processes of a sweep are really killed under way: what is in the store stays, and going on gives the same bits."""
 
-from __future__ import annotations
-
 import multiprocessing
 import re
 from functools import partial
-from typing import TYPE_CHECKING
 
 from levilab.sweeps.run import run
 from levilab.sweeps.store import Store
 from levilab.workers import processes, results_of
 from support.commands import command
 from support.dask_cluster import DaskCluster
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    import pytest
 
 #: A map of 16 chunks.
 SWEEP = (
@@ -25,17 +17,17 @@ SWEEP = (
 )  # fmt: skip
 
 
-def bits(store: Store) -> dict[str, bytes]:
+def bits(store):
     return {name: values.tobytes() for name, values in store.load().values.items()}
 
 
-def test_killed_workers_and_a_killed_scheduler_change_no_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_killed_workers_and_a_killed_scheduler_change_no_bit(tmp_path, monkeypatch):
     write, written = Store.write, []
     with DaskCluster(workers=2) as dask, monkeypatch.context() as patched:
         scheduler, worker, _ = dask.processes
         kill_after = {1: worker, 3: scheduler}
 
-        def write_and_kill(self: Store, *arguments) -> None:
+        def write_and_kill(self, *arguments):
             write(self, *arguments)
             written.append(arguments)
             if len(written) in kill_after:
@@ -55,7 +47,7 @@ def test_killed_workers_and_a_killed_scheduler_change_no_bit(tmp_path: Path, mon
 
     killed = []
 
-    def kill_one(share: float) -> None:
+    def kill_one(share):
         if not killed:
             killed.append(multiprocessing.active_children()[0])
             killed[0].kill()

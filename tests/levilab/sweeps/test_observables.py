@@ -1,9 +1,6 @@
 """What is observed at a point is what a single simulation says of it, whatever lies beside it."""
 
-from __future__ import annotations
-
 import math
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +10,7 @@ from analysis.stability import wobble_resonance
 from levilab.errors import UsageError
 from levilab.motion.summary import as_document, summarise
 from levilab.simulator.equilibrium import stability_of
-from levilab.simulator.scene import Scene, preset
+from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 from levilab.sweeps import observables
 from levilab.sweeps.observables import GROUPS, NAMES, OBSERVABLES, check_observables, columns_of, observe
@@ -23,18 +20,18 @@ UNDRIVEN, DRIVEN = preset("undriven"), preset("driven")
 SPINS = np.array([19.0, 22.0, 30.0])
 
 
-def plan(scene: Scene, names: tuple[str, ...], duration: float, *axes: Axis) -> Plan:
+def plan(scene, names, duration, *axes):
     made = Plan.of(scene, axes or (Axis("start.spin_hz", SPINS),), names, duration)
     # a drift turns the axis by 0.1 rad at most
     return Plan(made.scene, made.axes, names, duration, 1e-7, chunk=made.chunk, step_share=0.05)
 
 
-def summary_of(scene: Scene, duration: float, rate: float) -> dict[str, Any]:
+def summary_of(scene, duration, rate):
     motion = simulate(scene, duration, tolerance=1e-7, rate=rate)
     return as_document(summarise(motion, duration, rate, 1.0))
 
 
-def test_the_ends_are_those_of_single_simulations() -> None:
+def test_the_ends_are_those_of_single_simulations():
     names = ("survived", "lifetime_s", "fall_spin_hz", "end_spin_hz", "energy_error", "position_error_m")
     found = observe(plan(UNDRIVEN, names, 4.0), {"start.spin_hz": SPINS})
     assert [found[name].dtype.kind for name in names] == list("bfffff")
@@ -53,7 +50,7 @@ def test_the_ends_are_those_of_single_simulations() -> None:
         assert 0 < found["position_error_m"][i] < 1e-5
 
 
-def test_observables_from_samples_are_those_that_simulate_prints() -> None:
+def test_observables_from_samples_are_those_that_simulate_prints():
     names = ("survived", "locked", "height_spread_m", "lines")
     drives = np.array([30.0, 33.0])
     asked = plan(DRIVEN, names, 10.0, Axis("drive.frequency_hz", drives))
@@ -83,7 +80,7 @@ def test_observables_from_samples_are_those_that_simulate_prints() -> None:
         (UNDRIVEN, ("survived", "fall_spin_hz", "energy_error", "height_spread_m")),
     ],
 )
-def test_a_point_has_the_same_bits_alone_and_among_others(scene: Scene, names: tuple[str, ...]) -> None:
+def test_a_point_has_the_same_bits_alone_and_among_others(scene, names):
     asked = plan(scene, names, 10.0 if "locked" in names else 1.0)
     values = {"start.spin_hz": SPINS[:, None], "top.mass_kg": np.array([0.0244, 0.0249])}
     together = observe(asked, values)
@@ -94,11 +91,11 @@ def test_a_point_has_the_same_bits_alone_and_among_others(scene: Scene, names: t
             assert alone[column.name].tobytes() == together[column.name][i, j].tobytes()
 
 
-def test_ends_alone_are_simulated_without_samples_or_errors(monkeypatch: pytest.MonkeyPatch) -> None:
-    given: dict[str, Any] = {}
+def test_ends_alone_are_simulated_without_samples_or_errors(monkeypatch):
+    given = {}
     many = observables.simulate_many
 
-    def watched(*arguments: Any, **named: Any) -> Any:
+    def watched(*arguments, **named):
         given.update(named)
         return many(*arguments, **named)
 
@@ -109,13 +106,13 @@ def test_ends_alone_are_simulated_without_samples_or_errors(monkeypatch: pytest.
     assert given["cores"] == 1
 
 
-def test_the_energy_has_no_error_where_drag_or_drive_change_it() -> None:
+def test_the_energy_has_no_error_where_drag_or_drive_change_it():
     for name in ("friction", "driven"):
         found = observe(plan(preset(name), ("energy_error",), 0.1), {"start.spin_hz": SPINS})
         assert np.all(np.isnan(found["energy_error"]))
 
 
-def test_each_observable_has_a_unit_and_a_meaning() -> None:
+def test_each_observable_has_a_unit_and_a_meaning():
     for name, one in OBSERVABLES.items():
         assert one.name == name
         assert one.meaning.endswith(".")
@@ -134,17 +131,17 @@ def test_each_observable_has_a_unit_and_a_meaning() -> None:
         (preset("friction").changed({"observed": "spin"}), "survived", 10.0, "take observed = motion"),
     ],
 )
-def test_an_observable_that_no_point_can_have_is_an_error(scene: Scene, name: str, duration: float, said: str) -> None:
+def test_an_observable_that_no_point_can_have_is_an_error(scene, name, duration, said):
     with pytest.raises(UsageError, match=said):
         check_observables(plan(scene, (name,), duration) if name != "lifetme_s" else _unknown(scene, name))
     check_observables(plan(UNDRIVEN, ("locked",), 10.0, Axis("drive.amplitude_t", np.array([0.0, 4e-4]))))
 
 
-def _unknown(scene: Scene, name: str) -> Plan:
+def _unknown(scene, name):
     return Plan(scene, (Axis("start.spin_hz", SPINS),), (name,), 10.0)
 
 
-def test_the_highest_spin_on_a_ramp_is_where_pull_equals_drag_and_ramp() -> None:
+def test_the_highest_spin_on_a_ramp_is_where_pull_equals_drag_and_ramp():
     """In full motion, against the closed form: where a top leans in step with its moment, it is pulled more."""
     scene = preset("ramp").changed({"drive.off_s": 1000.0})
     values = {"drive.amplitude_t": np.repeat([3e-4, 4e-4], 2), "drive.ramp_hz_per_s": np.tile([0.05, 0.1], 2)}
@@ -162,7 +159,7 @@ def test_the_highest_spin_on_a_ramp_is_where_pull_equals_drag_and_ramp() -> None
     assert np.ptp(expected) > 15
 
 
-def test_the_highest_spin_of_a_top_that_falls_or_coasts_is_on_the_way() -> None:
+def test_the_highest_spin_of_a_top_that_falls_or_coasts_is_on_the_way():
     values = {"start.spin_hz": np.array([19.0, 30.0])}
     found = observe(plan(preset("friction"), ("highest_spin_hz",), 4.0), values)["highest_spin_hz"]
     assert found == pytest.approx([19.0, 30.0], rel=1e-9)

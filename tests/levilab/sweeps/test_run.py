@@ -1,10 +1,7 @@
 """A run that is interrupted goes on where it was, and ends with the same bits."""
 
-from __future__ import annotations
-
 import random
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -17,38 +14,31 @@ from levilab.sweeps.plan import Axis, Plan
 from levilab.sweeps.run import ChunksFailed, compute, run, tasks_of, with_step
 from levilab.sweeps.store import Store, differences
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from levilab.sweeps.store import Map
-
 
 @pytest.fixture(scope="module")
-def plan() -> Plan:
+def plan():
     axes = parse_axis("start.spin_hz=18:24:40"), parse_axis("top.mass_kg=0.0250:0.0254:20")
     return with_step(Plan.of(preset("undriven"), axes, ("survived", "lifetime_s"), 0.3), print)
 
 
 @pytest.fixture(scope="module")
-def whole(plan: Plan) -> Map:
+def whole(plan):
     store = Store.create(None, plan)
     run(store)
     return store.load()
 
 
-def bits(found: Map) -> dict[str, bytes]:
+def bits(found):
     return {name: values.tobytes() for name, values in found.values.items()}
 
 
 @pytest.mark.parametrize("when", ["before the values", "between values and mark"])
-def test_an_interrupted_run_goes_on_to_the_same_bits(
-    when: str, plan: Plan, whole: Map, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_run_goes_on_to_the_same_bits(when, plan, whole, tmp_path, monkeypatch):
     store = Store.create(tmp_path / "map.zarr", plan)
     assert plan.chunk_count == 4
     write, chunks = Store.write, []
 
-    def interrupted(self: Store, chunk, values) -> None:
+    def interrupted(self, chunk, values):
         chunks.append(chunk.number)
         if len(chunks) == 3:
             if when == "between values and mark":
@@ -62,13 +52,13 @@ def test_an_interrupted_run_goes_on_to_the_same_bits(
             run(store)
     again = Store.open(tmp_path / "map.zarr", writable=True)
     assert (again.done, [chunk.number for chunk in again.missing()]) == (2, [2, 3])
-    shares: list[float] = []
+    shares = []
     run(again, progress=shares.append)
     assert shares == [0.75, 1.0]
     assert bits(Store.open(tmp_path / "map.zarr").load()) == bits(whole)
 
 
-def test_the_order_of_the_chunks_and_what_is_beside_a_point_change_no_bit(plan: Plan, whole: Map) -> None:
+def test_the_order_of_the_chunks_and_what_is_beside_a_point_change_no_bit(plan, whole):
     store = Store.create(None, plan)
     tasks = list(tasks_of(store))
     random.Random(1).shuffle(tasks)
@@ -79,7 +69,7 @@ def test_the_order_of_the_chunks_and_what_is_beside_a_point_change_no_bit(plan: 
     assert whole.values["lifetime_s"][tasks[0].part.box].shape == one["lifetime_s"].shape
 
 
-def test_chunks_follow_from_the_plan_and_cover_it_once() -> None:
+def test_chunks_follow_from_the_plan_and_cover_it_once():
     axes = tuple(Axis(key, np.arange(n, dtype=float)) for key, n in (("a", 317), ("b", 91), ("c", 5)))
     plan = Plan.of(preset("undriven"), axes, ("survived",), 30.0)
     times = np.zeros(plan.shape, dtype=int)
@@ -93,7 +83,7 @@ def test_chunks_follow_from_the_plan_and_cover_it_once() -> None:
     assert plan.chunk_count >= 32
 
 
-def test_a_plan_of_ten_million_points_has_small_attributes_and_tasks() -> None:
+def test_a_plan_of_ten_million_points_has_small_attributes_and_tasks():
     axes = parse_axis("start.spin_hz=18:90:3200"), parse_axis("top.mass_kg=0.0247:0.0256:3200")
     plan = Plan.of(preset("undriven"), axes, ("survived", "lifetime_s"), 30.0)
     assert plan.size > 1e7
@@ -104,7 +94,7 @@ def test_a_plan_of_ten_million_points_has_small_attributes_and_tasks() -> None:
     assert sum(values.size for values in task.values.values()) <= 800
 
 
-def test_a_table_is_swept_row_by_row_with_words_in_it(tmp_path: Path) -> None:
+def test_a_table_is_swept_row_by_row_with_words_in_it(tmp_path):
     path = tmp_path / "points.csv"
     path.write_text("start.spin_hz,drive.waveform\n30.03,sine\n18,sine\n30.03,off\n", encoding="utf-8")
     plan = with_step(Plan.of(preset("driven"), read_points(path), ("survived",), 0.5), print)
@@ -115,7 +105,7 @@ def test_a_table_is_swept_row_by_row_with_words_in_it(tmp_path: Path) -> None:
     assert found.load().values["survived"].tolist() == [True, False, True]
 
 
-def test_a_chunk_that_fails_is_named_and_the_others_are_kept(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_chunk_that_fails_is_named_and_the_others_are_kept(plan, monkeypatch):
     def fails_once(task):
         if task.part.number == 1:
             raise SimulationError("a top was lost in numbers")
@@ -128,7 +118,7 @@ def test_a_chunk_that_fails_is_named_and_the_others_are_kept(plan: Plan, monkeyp
     assert store.marks.tolist() == [1, 0, 1, 1]
 
 
-def test_a_point_that_the_scene_refuses_is_named(tmp_path: Path) -> None:
+def test_a_point_that_the_scene_refuses_is_named(tmp_path):
     scene, masses = (
         preset("undriven").changed({"start.place": "equilibrium"}),
         np.array([0.0250, 0.0251, 0.030, 0.0252]),
@@ -141,7 +131,7 @@ def test_a_point_that_the_scene_refuses_is_named(tmp_path: Path) -> None:
         run(Store.create(None, asked))
 
 
-def test_what_differs_from_the_plan_of_a_store_is_named(plan: Plan) -> None:
+def test_what_differs_from_the_plan_of_a_store_is_named(plan):
     axes = parse_axis("start.spin_hz=18:24:41"), plan.axes[1]
     other = Plan.of(preset("undriven").changed({"top.moment_a_m2": -0.7}), axes, plan.observables, 0.4)
     assert differences(plan, plan) == []

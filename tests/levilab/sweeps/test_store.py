@@ -1,11 +1,8 @@
 """A store keeps what was computed, and any reader of Zarr can read it."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -17,22 +14,19 @@ from levilab.sweeps.plan import Axis, Plan
 from levilab.sweeps.run import run, tasks_of
 from levilab.sweeps.store import Store
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-
-def plan() -> Plan:
+def plan():
     axes = (Axis("start.spin_hz", np.linspace(18, 26, 40)), Axis("top.mass_kg", np.linspace(0.0250, 0.0254, 15)))
     return Plan.of(preset("undriven"), axes, ("survived", "lifetime_s"), duration_s=0.2)
 
 
-def made_up(task) -> dict[str, np.ndarray]:
+def made_up(task):
     """Values that differ at every point."""
     spin, mass = np.broadcast_arrays(task.values["start.spin_hz"], task.values["top.mass_kg"])
     return {"survived": spin > 20, "lifetime_s": spin + mass}
 
 
-def test_a_store_that_is_opened_again_has_the_plan_and_the_values(tmp_path: Path) -> None:
+def test_a_store_that_is_opened_again_has_the_plan_and_the_values(tmp_path):
     made = Store.create(tmp_path / "map.zarr", plan())
     assert made.plan.chunk_count > 2
     *tasks, last = tasks_of(made)
@@ -49,7 +43,7 @@ def test_a_store_that_is_opened_again_has_the_plan_and_the_values(tmp_path: Path
     assert np.count_nonzero(~found.computed) == np.prod(last.part.shape)
 
 
-def test_plain_zarr_reads_arrays_coordinates_and_units(tmp_path: Path) -> None:
+def test_plain_zarr_reads_arrays_coordinates_and_units(tmp_path):
     import zarr
 
     run(Store.create(tmp_path / "map.zarr", plan()))
@@ -62,7 +56,7 @@ def test_plain_zarr_reads_arrays_coordinates_and_units(tmp_path: Path) -> None:
     assert json.loads(group.attrs["plan"])["scene"]["base"]["inner_radius_m"] == 0.03
 
 
-def test_every_attribute_is_one_that_netcdf_has(tmp_path: Path) -> None:
+def test_every_attribute_is_one_that_netcdf_has(tmp_path):
     import zarr
 
     run(Store.create(tmp_path / "map.zarr", plan()))
@@ -71,7 +65,7 @@ def test_every_attribute_is_one_that_netcdf_has(tmp_path: Path) -> None:
     assert [name for name, value in attributes if type(value) not in {str, int, float}] == []
 
 
-def test_a_store_of_an_earlier_version_is_read(tmp_path: Path) -> None:
+def test_a_store_of_an_earlier_version_is_read(tmp_path):
     import zarr
 
     made = Store.create(tmp_path / "map.zarr", plan())
@@ -84,9 +78,9 @@ def test_a_store_of_an_earlier_version_is_read(tmp_path: Path) -> None:
     assert again.notes() == []
 
 
-def test_values_are_on_the_disk_before_their_mark(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_values_are_on_the_disk_before_their_mark(tmp_path, monkeypatch):
     made = Store.create(tmp_path / "map.zarr", plan())
-    marks: list[int] = []
+    marks = []
     monkeypatch.setattr(os, "fsync", lambda _: marks.append(int(made.group["done"][:].sum())))
     for task in tasks_of(made):
         made.write(task.part, made_up(task))
@@ -97,7 +91,7 @@ def test_values_are_on_the_disk_before_their_mark(tmp_path: Path, monkeypatch: p
     assert sorted(set(marks)) == list(range(made.plan.chunk_count))
 
 
-def test_two_processes_cannot_write_into_one_store(tmp_path: Path) -> None:
+def test_two_processes_cannot_write_into_one_store(tmp_path):
     made = Store.create(tmp_path / "map.zarr", plan())
     second = Store.open(tmp_path / "map.zarr", writable=True)
     with made.lock(), pytest.raises(CannotWrite, match="another process is computing it"), second.lock():
@@ -107,7 +101,7 @@ def test_two_processes_cannot_write_into_one_store(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
 
 
-def test_a_store_that_is_damaged_is_an_error_that_names_it(tmp_path: Path) -> None:
+def test_a_store_that_is_damaged_is_an_error_that_names_it(tmp_path):
     made = Store.create(tmp_path / "map.zarr", plan())
     task = next(tasks_of(made))
     made.write(task.part, made_up(task))
@@ -122,7 +116,7 @@ def test_a_store_that_is_damaged_is_an_error_that_names_it(tmp_path: Path) -> No
         Store.open(tmp_path / "nothing")
 
 
-def test_a_store_that_is_moved_while_it_is_written_is_an_error_that_names_it(tmp_path: Path) -> None:
+def test_a_store_that_is_moved_while_it_is_written_is_an_error_that_names_it(tmp_path):
     made = Store.create(tmp_path / "map.zarr", plan())
     (tmp_path / "map.zarr").rename(tmp_path / "elsewhere.zarr")
     task = next(tasks_of(made))
@@ -130,14 +124,14 @@ def test_a_store_that_is_moved_while_it_is_written_is_an_error_that_names_it(tmp
         made.write(task.part, made_up(task))
 
 
-def test_a_store_whose_marks_are_torn_is_an_error(tmp_path: Path) -> None:
+def test_a_store_whose_marks_are_torn_is_an_error(tmp_path):
     run(Store.create(tmp_path / "map.zarr", plan()))
     (tmp_path / "map.zarr" / "done" / "c" / "0").write_bytes(b"")  # as a power cut may leave a file
     with pytest.raises(DataError, match="no store of a sweep"):
         Store.open(tmp_path / "map.zarr")
 
 
-def test_the_slower_of_two_sweeps_is_refused_as_if_it_had_come_later(tmp_path: Path) -> None:
+def test_the_slower_of_two_sweeps_is_refused_as_if_it_had_come_later(tmp_path):
     path, other = tmp_path / "map.zarr", tmp_path / "other.zarr"
     Store.create(other, plan())
     refused = []
@@ -149,8 +143,8 @@ def test_the_slower_of_two_sweeps_is_refused_as_if_it_had_come_later(tmp_path: P
     assert [one.name for one in tmp_path.iterdir()] == ["map.zarr"]
 
 
-def test_a_store_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
-    def killed(store: Store) -> None:
+def test_a_store_is_there_whole_or_not_at_all(tmp_path):
+    def killed(store):
         assert not (tmp_path / "map.zarr").exists()
         raise KeyboardInterrupt
 
@@ -161,7 +155,7 @@ def test_a_store_is_there_whole_or_not_at_all(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["map.zarr"]
 
 
-def test_a_store_that_has_lost_a_column_is_not_gone_on_with(tmp_path: Path) -> None:
+def test_a_store_that_has_lost_a_column_is_not_gone_on_with(tmp_path):
     Store.create(tmp_path / "map.zarr", plan())
     shutil.rmtree(tmp_path / "map.zarr" / "lifetime_s")
     with pytest.raises(DataError, match="no whole store of a sweep, 'lifetime_s' is missing"):
