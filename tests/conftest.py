@@ -72,7 +72,6 @@ def pytest_collection_finish():
 
     Nor every 700 objects: that took a twentieth of the processor's time.
     """
-    gc.collect()
     gc.freeze()
     gc.set_threshold(20_000, 10, 10)
     gc.enable()

@@ -10,8 +10,8 @@ import pytest
 
 from support.commands import command
 from support.figures import without_drawing
+from support.less_work import with_less_work
 from support.paths import ROOT
-from support.trials import with_few_trials
 
 PAGES = [
     ROOT / "README.md",
@@ -19,6 +19,12 @@ PAGES = [
     *sorted((ROOT / "docs").rglob("*.md")),
     ROOT / "sample_data/README.md",
 ]
+
+
+@pytest.fixture(autouse=True, scope="module")
+def less_work():
+    with with_less_work():
+        yield
 
 
 def blocks(language):
@@ -40,7 +46,7 @@ def copy_samples(text, place):
 def test_python_in_the_pages_prints_what_it_says(page, code, tmp_path):
     copy_samples(code, tmp_path)
     shown = io.StringIO()
-    with contextlib.chdir(tmp_path), contextlib.redirect_stdout(shown), without_drawing(), with_few_trials():
+    with contextlib.chdir(tmp_path), contextlib.redirect_stdout(shown), without_drawing():
         exec(compile(code, page, "exec"), {"__name__": "__main__"})
     assert shown.getvalue().splitlines() == re.findall(r"print\(.*\)  # (.*)", code)
 
@@ -87,7 +93,7 @@ DRAWN = "README.md"
 @pytest.mark.parametrize("page", steps())
 def test_the_commands_of_a_page_work_one_after_another(tmp_path, page):
     copy_samples(" ".join(steps()[page]), tmp_path)
-    with with_few_trials(), contextlib.nullcontext() if page == DRAWN else without_drawing():
+    with contextlib.nullcontext() if page == DRAWN else without_drawing():
         follow(steps()[page], tmp_path)
 
 

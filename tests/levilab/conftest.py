@@ -7,8 +7,8 @@ import pytest
 
 from support.commands import command
 from support.figures import without_figures
+from support.less_work import with_less_work
 from support.paths import SAMPLE_DATA
-from support.trials import with_few_trials
 from support.waiting import HANG_GUARD_S
 
 
@@ -18,9 +18,9 @@ def sample_data():
 
 
 @pytest.fixture(autouse=True, scope="session")
-def reports_make_few_trials():
+def less_work():
     """No test looks at the trials of a report; how many there are has a test of its own."""
-    with with_few_trials():
+    with with_less_work():
         yield
 
 

@@ -6,6 +6,7 @@ import html
 import io
 import math
 import re
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -19,7 +20,8 @@ from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 from support.browser import PHONE, watch
 
-pytest.importorskip("nicegui", reason="three.js comes out of it: pip install 'levilab[live]'")
+if find_spec("nicegui") is None:  # which takes a second to import
+    pytest.skip("three.js comes out of it: pip install 'levilab[live]'", allow_module_level=True)
 
 HOSTILE = "</script><img src=x onerror=alert(1)>{{ 7 * 7 }}<!--"
 #: Small, since a processor draws it.

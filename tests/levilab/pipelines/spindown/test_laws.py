@@ -27,8 +27,8 @@ import json
 from pathlib import Path
 sys.path.append("tests")
 from support.commands import command
-from support.trials import with_few_trials
-with with_few_trials():
+from support.less_work import with_less_work
+with with_less_work():
     for words in json.loads(sys.argv[1]):
         ended = command(*words, cwd=Path.cwd())
         assert ended.status == 0, ended.err
