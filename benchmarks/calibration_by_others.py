@@ -24,7 +24,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import expit
 
-from analysis.spindown.tilt import THESIS_TOP, TILT2
+from analysis.spindown.tilt import RELEASE, RELEASE_U, THESIS_TOP, TILT2
 from levilab.benchmark.simulator.motion import A2, B2, MU, G, K
 from levilab.benchmark.simulator.taylor import VARIABLES, heyoka_system
 from levilab.crosscheck.calibration import by_ranks
@@ -117,8 +117,6 @@ def field(seed: int, folder: Path) -> list[Pull]:
 # The top is drawn from the priors of analysis.spindown.tilt, and half of the tops are read until they fall.
 
 ALONG, RESONANCE_U = 0.97, 0.04
-#: Mean of the square of the nutation's angle: 95 % are below 0.02 rad.
-NUTATION2 = 0.02**2 / 3
 #: β where a tilted top floats above this base.
 BETAS = (2.2, 4.6)
 #: First readings; the others end anywhere up to so far above the fall, with no fewer readings.
@@ -170,7 +168,7 @@ class Drawn:
     i3: float
     pull: float  # P = |μ|B
     tilt: float
-    nutation: Any
+    nutation: Any  # angle [rad] along x and y
     first_hz: float
 
 
@@ -178,15 +176,16 @@ def draw_top(by: np.random.Generator) -> Drawn:
     """Draw tilt and nutation; β, which says where it floats; ν_r and κ, which say its moments of inertia."""
     top = THESIS_TOP
     tilt = math.atan(math.sqrt(by.exponential(TILT2)))
-    angle = math.sqrt(by.exponential(NUTATION2)) * np.exp(1j * by.uniform(0, 2 * math.pi))
+    share, turn = max(by.normal(RELEASE, RELEASE_U), 0.0), np.exp(1j * by.uniform(0, 2 * math.pi))
     beta = float(np.clip(by.normal(top.beta, top.beta_u), *BETAS))
     height = float(brentq(lambda z: (f := on_axis(z))[1] ** 2 / (f[0] * f[2]) - beta, 0.0705, 0.0755))
     flux, slope, _ = np.abs(on_axis(height))
     pull, rate = abs(MU) * ALONG * flux, 2 * math.pi * top.resonance_hz * by.normal(1, RESONANCE_U)
     kappa = by.normal(top.kappa, top.kappa_u)
     i3 = pull / (kappa * rate**2)
-    mass = abs(MU) * ALONG * slope / G
-    return Drawn(height, mass, (1 - kappa) * i3, i3, pull, tilt, (angle.real, angle.imag), by.uniform(*FIRST_HZ))
+    mass, first = abs(MU) * ALONG * slope / G, by.uniform(*FIRST_HZ)
+    angle = math.sqrt(share) * math.tan(tilt) / ((2 * math.pi * first / rate) ** 2 - 1) * turn
+    return Drawn(height, mass, (1 - kappa) * i3, i3, pull, tilt, (angle.real, angle.imag), first)
 
 
 def start_of(top: Drawn) -> list[float]:

@@ -22,7 +22,7 @@ import numpy as np
 
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
-from levilab.crosscheck.subject import acquire_mock
+from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.subjects.motion import draw_scene
 from levilab.simulator.kernels.motion import R
 from levilab.simulator.start import start_of, steady_rates

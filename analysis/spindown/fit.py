@@ -15,7 +15,7 @@ from analysis.spindown.lawfit import LawFit, Solution, fit_law, solution
 from analysis.spindown.posterior import INDEPENDENT, RHO
 from analysis.spindown.readings import Readings, check_readings
 from analysis.spindown.selection import NO_FIT, Statistics, weigh
-from analysis.spindown.tilt import CALM, DRIVEN, THESIS_TOP, Nutation, Top
+from analysis.spindown.tilt import THESIS_TOP, Top
 from analysis.spindown.verdict import Verdict, verdict
 from analysis.uncertainty import ROUNDING, Estimate
 
@@ -41,16 +41,16 @@ class CountModel:
     Attributes:
         tilt: whether the count has the tilt of the top.
         top: the top that is counted.
-        nutation: as expected.
+        released_hz: see `fit_spin_down`.
     """
 
     tilt: bool
     top: Top
-    nutation: Nutation
+    released_hz: float | None
 
     def fit(self, law: DragLaw, readings: Readings, rho: Array = RHO) -> Solution:
         """Return the best point of one law."""
-        return solution(law, readings, tilt=self.tilt, top=self.top, nutation=self.nutation, rho=rho)
+        return solution(law, readings, tilt=self.tilt, top=self.top, released_hz=self.released_hz, rho=rho)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ def fit_spin_down(
     laws: Iterable[str] = tuple(LAWS),
     keep_outliers: bool = False,
     tilt: bool = True,
-    driven: bool = False,
+    released_hz: float | None = None,
     gate: float | None = None,
     top: Top = THESIS_TOP,
 ) -> SpinDown:
@@ -132,7 +132,8 @@ def fit_spin_down(
         laws: names from `analysis.spindown.drag.LAWS`.
         keep_outliers: fit gross outliers too, instead of leaving them out. Both ways a remark names them.
         tilt: whether the count has the tilt of the top (see `analysis.spindown.tilt`); False: it is known to have none.
-        driven: whether a drive brought the top to its spin; it nutates more then.
+        released_hz: the spin at which it was set free, or a drive took hold of it [Hz]; the slower, the more it
+            nutates. None: that of the first reading.
         gate: over which each reading is a mean [s]; None: not known.  The fits say what it does, and are not changed.
         top: whose count it is.
 
@@ -151,7 +152,7 @@ def fit_spin_down(
     """
     chosen = _check_names("drag law", laws, LAWS)
     given = check_readings(time, spin_frequency, u)
-    model = CountModel(tilt, top, DRIVEN if driven else CALM)
+    model = CountModel(tilt, top, released_hz)
     outliers = _search_outliers(given, model)
     while True:
         readings = given if keep_outliers or not len(outliers) else given.without(outliers)
@@ -163,7 +164,9 @@ def fit_spin_down(
         if keep_outliers or not agree.any():
             break
         outliers = outliers[~agree]
-    decision = verdict(stats, criterion, change=_change(found[best], found.get("power")))
+    unsettled = frozenset(name for name, each in found.items() if not each.converged)
+    change = _change(found[best], found.get("power"))
+    decision = verdict(stats, criterion, change=change, unsettled=unsettled)
     best = decision.best
     return SpinDown(
         fits=tuple(replace(fits[name], statistics=stats[name]) for name in chosen),

@@ -15,7 +15,7 @@ from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.posterior import RHO, Posterior, posterior
 from analysis.spindown.readings import Readings
 from analysis.spindown.selection import Statistics, statistics
-from analysis.spindown.tilt import CALM, MORE, THESIS_TOP, CountedLaw, Nutation, Top, count_of
+from analysis.spindown.tilt import MORE, THESIS_TOP, CountedLaw, Top, count_of
 from analysis.uncertainty import ROUNDING, Estimate, propagate
 
 Array = NDArray[np.float64]
@@ -23,8 +23,8 @@ Array = NDArray[np.float64]
 #: A search ends where a step moves no parameter by more of its u; the answer is within the square of that.
 _CLOSE = 0.05
 _MOST_STEPS = 30
-#: Share of each step, in a search begun again where whole steps led to and fro.
-_SHORTER = 0.5
+#: Share of each step that is taken; a search that led to and fro is begun again with the next.
+_SHARES = (1.0, 0.5, 0.25)
 #: Of more readings means over neighbours are fitted, for which a spin-down is straight within the noise.
 _MOST = 3000
 #: Of a step: the longest in a, and in A in units of its prior u.  The tilt bends more than linearly beyond.
@@ -220,7 +220,7 @@ class Solution:
         expected, u = self.counted.expected if self.counted else (np.empty(0), np.empty(0))
         p, sigma = len(self.q) - len(u), np.sqrt(found.variance)
         moved = np.zeros(len(self.q))
-        moved[p + MORE :] = found.step[p + MORE :]  # κ and β, which the fit itself keeps
+        moved[p + MORE :] = found.step[p + MORE :]  # what the fit itself keeps
         left = np.append(self.residuals - moved @ self.slopes, sigma * ((self.q + moved)[p:] - expected) / u)
         own = np.append(
             np.einsum("pn,pq,qn->n", self.slopes, found.covariance, self.slopes) / found.variance,
@@ -235,7 +235,7 @@ def solution(
     *,
     tilt: bool = False,
     top: Top = THESIS_TOP,
-    nutation: Nutation = CALM,
+    released_hz: float | None = None,
     rho: Array = RHO,
 ) -> Solution:
     """Return the best point of one law: the mean of what is known after the readings.
@@ -245,7 +245,7 @@ def solution(
         readings: what it is fitted to.
         tilt: whether the count has the tilt of the top.
         top: whose count it is.
-        nutation: as expected.
+        released_hz: at which it was set free, or a drive took hold of it; None: the spin of the first reading.
         rho: correlations of neighbouring readings' noise that are possible.
     """
     few = readings.means(_MOST)
@@ -253,14 +253,16 @@ def solution(
     q, converged = solve(
         lambda q: (law.spin(tau, q) - few.x) * weight, lambda q: law.gradient(tau, q) * weight, _start(law, few)
     )
-    with_tilt = CountedLaw(law, float(readings.x[-1]), readings.reference_hz, top, nutation) if tilt else None
+    unit = readings.reference_hz
+    released = released_hz and released_hz / unit
+    with_tilt = CountedLaw(law, float(readings.x[0]), float(readings.x[-1]), unit, top, released) if tilt else None
     form: DragLaw | CountedLaw = with_tilt or law
     expected, u = with_tilt.expected if with_tilt else (np.empty(0), np.empty(0))
     start = np.concatenate([q, expected])
-    q, close, found = _search(form, few, start, (expected, u), share=1.0, rho=rho)
-    if not close:
-        with_shorter = _search(form, few, start, (expected, u), share=_SHORTER, rho=rho)
-        q, close, found = with_shorter if with_shorter[1] else (q, close, found)
+    for share in _SHARES:
+        q, close, found = _search(form, few, start, (expected, u), share=share, rho=rho)
+        if close:
+            break
     left, slopes = _of_readings(form, readings, q)
     return Solution(law, with_tilt, readings, q, converged and close, left, slopes, found)
 
@@ -298,7 +300,7 @@ def _search(
             if found is None:
                 break
             step, own = found.step.copy(), np.sqrt(np.diagonal(found.covariance))
-            step[p + MORE :] = 0.0  # κ and β stay as they were given
+            step[p + MORE :] = 0.0  # κ, β and the share of the nutation stay as they were given
             if not np.isfinite(step).all():
                 return q, False, found
             if (np.abs(step) <= _CLOSE * own).all():
@@ -369,7 +371,7 @@ def _of_priors(found: Solution, slopes: Array) -> Array:
 
 def _shared_u(found: Solution, slopes: Array) -> dict[str, float]:
     """Return the part of each u that all runs of one top share: by A, a, κ and β, not by the nutation."""
-    rows = np.delete(_of_priors(found, slopes), MORE - 1, axis=0)
+    rows = np.delete(_of_priors(found, slopes), (MORE - 1, -1), axis=0)
     shared = np.linalg.norm(rows, axis=0)
     return {n: float(part) for n, part in zip(found.form.parameters, shared, strict=True) if np.isfinite(part)}
 

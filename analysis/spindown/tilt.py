@@ -34,8 +34,8 @@ Array = NDArray[np.float64]
 PARAMETERS = ("moment_tilt", "resonance", "wobble")
 UNITS = ("rad", "Hz", "Hz")
 MORE = len(PARAMETERS)
-#: The same, and κ and β: what the model has beside the law's own parameters.
-UNCERTAIN = MORE + 2
+#: The same, and κ, β and the share of the nutation (RELEASE): what the model has beside the law's own parameters.
+UNCERTAIN = MORE + 3
 
 #: Mean of δ²: makers of magnets give 3° as the largest error of direction (95 % of a Rayleigh distribution).
 TILT2 = 0.000915
@@ -58,28 +58,27 @@ STANDING = np.array([
     [1.60, 1.000, 0.040, 1.03, 1.06],
 ])  # fmt: skip
 
-
-@dataclass(frozen=True)
-class Nutation:
-    """K/ν_ref as it is expected, and its standard uncertainty; 0.001 of it change C by 0.12 %."""
-
-    value: float
-    u: float
-
-
-#: A nutation by the angle α at the first reading has K/ν_ref = 1.1 α² from 34 Hz on and 1.6 α² from 40 Hz on, by the
-#: equations above; here 1.2 α².  Both components are normal, so α² is exponential: standard deviation and mean are
-#: equal.  An angle of 0.02 rad moves the rim by 0.3 mm, which the eye sees from 1 m (1′); 95 % of the tops that seem
-#: calm have less.
-CALM = Nutation(0.00016, 0.00016)
-#: A drive takes hold at 1.15 ν_r, where its 0.2 mT across 18 mT tilt the axis by 0.2/18/(1.15² − 1) = 0.034 rad.  Its
-#: field at the top is known to 30 %, and α² to 60 %.
-DRIVEN = Nutation(0.0014, 0.0008)
+#: A top that is set free, or that a drive takes hold of, stands upright, where its moment would have it lean by the
+#: synchronous tilt: so it nutates by the angle α, α² = RELEASE δ²/((ν/ν_r)² − 1)², as a pendulum that is let go beside
+#: its place.  The hand, the plate and the drive's own 0.2 mT in 18 mT (0.011 rad beside δ of 0.03) add to α or take
+#: from it; this was not checked at a bench.
+RELEASE, RELEASE_U = 1.0, 0.6
+#: u of K/ν_ref beside it: 95 % of the nutations of calm tops are below 0.02 rad, which move the rim by 0.3 mm, as much
+#: as the eye sees from 1 m; K/ν_ref = 1.2 α² there.
+CALM_U = 0.00016
+#: No hand and no drive starts a top below so many ν_r: it falls within half a minute there.
+_SLOWEST_START = 1.15
 
 _NODES = 120
 _GRID = np.linspace(0.0, 1.0, _NODES)
+#: Least slope of spin and momentum with ln η, in units of the resonance: half a second before the fall, where the spin
+#: still drops at a third of its usual rate.  The line that goes on from there keeps the count smooth in all parameters;
+#: in the half second it is 7 mHz off.
+_EDGE = 0.01
 # Counts at so many times are worked out at once: for few readings numpy's calls cost more than their numbers.
 _AT_ONCE = 20_000
+#: Steps of A, a, K/ν_ref, κ, β and RELEASE for slopes by differences.
+_STEPS = (1e-4, 1e-3, 1e-4, 1e-3, 1e-2, 1e-2)
 _LARGEST_TILT2 = 0.3  # tan²θ: far beyond what a top survives
 # Times at which the wobble is worked out; between them it is a straight line, good to 1e-5 Hz.
 _MOST_POINTS = 1000
@@ -114,21 +113,23 @@ class CountedLaw:
 
     The additional parameters are A, tan²θ at the last reading by linear theory, and a, by which the last reading
     stands above the resonance, x = 1 + exp(a): these two hardly depend on each other, δ and ν_r do.
-    The third is K/ν_ref.  κ and β follow; they keep the values of the top, and only add to uncertainties.
+    The third is K/ν_ref beyond that of a release.  κ, β and the share of the nutation follow; they keep the values that
+    are expected, and only add to uncertainties.
 
     Attributes:
         law: of the drag.
-        last: the last reading, in units of ν_ref.
+        first, last: readings, in units of ν_ref.
         reference_hz: ν_ref [Hz].
         top: whose count it is.
-        nutation: K/ν_ref as expected.
+        released: the spin at which it was set free, or a drive took hold of it, in units of ν_ref.
     """
 
     law: DragLaw
+    first: float
     last: float
     reference_hz: float
     top: Top = THESIS_TOP
-    nutation: Nutation = CALM
+    released: float | None = None
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -142,21 +143,35 @@ class CountedLaw:
 
     @property
     def expected(self) -> tuple[Array, Array]:
-        """A, a, K/ν_ref, κ and β before the readings, and their standard uncertainties, shape (5,) each."""
+        """A, a, K/ν_ref, κ, β, RELEASE before the readings, and their standard uncertainties, shape (6,) each."""
         top = self.top
         last = max(self.last * self.reference_hz / top.resonance_hz, float(STANDING[0, 0]))
         resonance, resonance_u, tilt2, tilt2_u = (np.interp(last, STANDING[:, 0], row) for row in STANDING.T[1:])
         x = (last / resonance) ** 2
         gap = x - 1
-        value = np.array([TILT2 * tilt2 / gap**2, np.log(gap), self.nutation.value, top.kappa, top.beta])
+        value = np.array([TILT2 * tilt2 / gap**2, np.log(gap), 0.0, top.kappa, top.beta, RELEASE])
         gap_u = 2 * resonance_u / resonance * x / gap
-        return value, np.array([tilt2_u * value[0], gap_u, self.nutation.u, top.kappa_u, top.beta_u])
+        return value, np.array([tilt2_u * value[0], gap_u, CALM_U, top.kappa_u, top.beta_u, RELEASE_U])
 
     def shape(self, q: Array) -> tuple[float, float, float]:
-        """Return δ², ν_r/ν_ref, and K/ν_ref, from A, a and K/ν_ref."""
+        """Return δ², ν_r/ν_ref, and K/ν_ref, from A, a, K/ν_ref beyond that of a release, κ, β and RELEASE."""
         a = min(max(float(q[1]), -5.0), 40.0)
         s = min(max(float(q[0]) * float(np.exp(min(2 * a, 8.0))), -0.01), 0.1)
-        return s, self.last / float(np.sqrt(1 + np.exp(a))), float(q[2])
+        resonance = self.last / float(np.sqrt(1 + np.exp(a)))
+        return s, resonance, float(q[2]) + float(q[5]) * s * self._nutation(resonance, float(q[3]))
+
+    def _nutation(self, resonance: float, kappa: float) -> float:
+        """Return K/ν_ref over δ², of a top that was released upright.
+
+        It nutates by α = δ/((ν/ν_r)² − 1) at the frequency f = ν(1 + w)/2(1 − κ), w = √(1 − (ν_s/ν)²); while a drive
+        changes its spin fα² stays the same, and K = fα²/2 √((ν/ν_s)² − 1) at the first reading.
+        """
+        sleeping, slowest = 2 * float(np.sqrt(kappa * (1 - kappa))) * resonance, _SLOWEST_START * resonance
+        first = max(self.first, slowest)
+        released = max(self.released or first, slowest)
+        alpha2 = 1 / ((released / resonance) ** 2 - 1) ** 2
+        frequency = released * (1 + float(np.sqrt(1 - (sleeping / released) ** 2))) / (2 * (1 - kappa))
+        return frequency * alpha2 / 2 * float(np.sqrt((first / sleeping) ** 2 - 1))
 
     def spin(self, tau: Array, q: Array) -> Array:
         """Return the counted frequency, shape (n,)."""
@@ -165,7 +180,7 @@ class CountedLaw:
     def gradient(self, tau: Array, q: Array) -> Array:
         """Return the slopes with q, shape (p, n), by differences: good to 1e-6 of themselves."""
         sizes = 1e-5 * np.maximum(np.abs(q), 0.1)
-        sizes[-UNCERTAIN:] = [1e-4, 1e-3, 1e-4, 1e-3, 1e-2]
+        sizes[-UNCERTAIN:] = _STEPS
         steps, p = np.diag(sizes), len(q)
         spins = self.spins(tau, np.vstack([q + steps, q - steps]))
         return np.asarray((spins[:p] - spins[p:]) / (2 * sizes[:, None]))
@@ -173,7 +188,7 @@ class CountedLaw:
     def spins(self, tau: Array, rows: Array) -> Array:
         """Return the same for several q, shape (r, p) → (r, n)."""
         p = len(self.law.parameters)
-        shapes = np.array([[*self.shape(q[p:]), *q[p + MORE :]] for q in rows])
+        shapes = np.array([[*self.shape(q[p:]), *q[p + MORE : p + MORE + 2]] for q in rows])
         with np.errstate(all="ignore"):
             if len(tau) <= _MOST_POINTS:
                 return counts(self.law, tau, rows[:, :p], shapes)
@@ -184,7 +199,7 @@ class CountedLaw:
             )
 
     def natural(self, q: Array, reference_hz: float, duration: float) -> tuple[Array, Array]:
-        """Return `DragLaw.natural`, then δ [rad], ν_r [Hz] and K [Hz]; slopes of shape (p + 3, p + 5).
+        """Return `DragLaw.natural`, then δ [rad], ν_r [Hz] and K [Hz]; slopes of shape (p + 3, p + 6).
 
         δ is the root of δ², which noise may make negative: then it is 0, with the slope of the uncertainty's own root.
         """
@@ -200,7 +215,11 @@ class CountedLaw:
         full[n, n] = growth / (2 * max(delta, 0.5 * float(np.sqrt(self.expected[1][0] * growth))))
         full[n, n + 1] = delta
         full[n + 1, n + 1] = -share * resonance * reference_hz
-        full[n + 2, n + 2] = reference_hz
+        steps = np.diag(_STEPS)
+        full[n + 2, n:] = [
+            reference_hz * (self.shape(q[n:] + step)[2] - self.shape(q[n:] - step)[2]) / (2 * size)
+            for step, size in zip(steps, _STEPS, strict=True)
+        ]
         return np.array([*values, delta, resonance * reference_hz, wobble * reference_hz]), full
 
     def solution(self, q: Array) -> Array:
@@ -301,7 +320,7 @@ def counts(law: DragLaw, tau: Array, q: Array, shapes: Array) -> Array:
         shapes: δ² of either sign, ν_r/ν_ref, K/ν_ref, κ and β of each, shape (r, 5).
 
     Returns:
-        Shape (r, n); beyond the fall, which a search may meet, a straight line.
+        Shape (r, n); beyond the edge of the fall, which a search may meet, the straight line that goes on from there.
     """
     many = max(_AT_ONCE // max(len(tau), 1), 1)
     parts = [_counts(law, tau, q[k : k + many], shapes[k : k + many]) for k in range(0, len(q), many)]
@@ -329,7 +348,7 @@ def _counts(law: DragLaw, tau: Array, q: Array, shapes: Array) -> Array:
 
 
 def _nodes(first: Array, s: Array, kappa: Array, beta: Array) -> tuple[Array, _Path]:
-    """From a little above the start down to the fall, where the spin would rise again, or to the resonance.
+    """From a little above the start down to the edge of the fall, where the spin would rise again, or to the resonance.
 
     first, s: shape (r, 1).
     """
@@ -338,12 +357,15 @@ def _nodes(first: Array, s: Array, kappa: Array, beta: Array) -> tuple[Array, _P
     end = np.log(np.maximum(last, 1.5 * first))
     log_eta = begin + (end - begin) * _GRID
     path = _path(log_eta, s, kappa, beta)
-    turned = np.minimum(-path.slope, -path.momentum_slope) <= 1e-4
-    falls = turned.any(axis=1)
+    left = np.minimum(-path.slope, -path.momentum_slope) - _EDGE
+    falls = np.asarray((left <= 0).any(axis=1))
     if not falls.any():
         return log_eta, path
-    at = np.maximum(np.argmax(turned, axis=1) - 1, 2)
-    end[falls, 0] = log_eta[falls, at[falls]]
+    after = np.maximum(np.argmax(left <= 0, axis=1), 3)
+    before, here = (np.take_along_axis(left, k[:, None], axis=1) for k in (after - 1, after))
+    share = np.clip(before / np.maximum(before - here, 1e-12), 0.0, 1.0)
+    edge = np.take_along_axis(log_eta, after[:, None] - 1, axis=1) + share * (end - begin) / (_NODES - 1)
+    end = np.where(falls[:, None], edge, end)
     log_eta = begin + (end - begin) * _GRID
     return log_eta, _path(log_eta, s, kappa, beta)
 

@@ -124,7 +124,7 @@ def spin_down(columns: Mapping[str, Array], size: int, *_: object) -> Running:
     time, spin, u = columns["time_s"], columns["spin_frequency_hz"], columns.get("spin_frequency_u_hz")
     used = np.isfinite(spin) & (np.isfinite(u) if u is not None else True)
     time, spin = time[used], spin[used]
-    found = fit_spin_down(time, spin, None if u is None else u[used] / np.sqrt(size), driven=True)
+    found = fit_spin_down(time, spin, None if u is None else u[used] / np.sqrt(size))
     best = found.fit(found.best)
     last, duration = float(time[-1]), float(time[-1] - time[0])
     end = _times_of_fall(best, last, duration)

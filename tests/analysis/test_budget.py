@@ -84,7 +84,7 @@ def squares(parts):
 @pytest.mark.parametrize("u", [0.03, 0.004, None])
 @pytest.mark.parametrize("tilt", [False, True])
 def test_the_parts_of_every_constant_add_up_to_its_u(u, tilt):
-    found = fit_spin_down(TIME, readings(3), u, laws=["disc", "mixed", "power"], tilt=tilt, driven=True)
+    found = fit_spin_down(TIME, readings(3), u, laws=["disc", "mixed", "power"], tilt=tilt)
     for fit in found.fits:
         assert set(fit.parts) == set(fit.parameters)
         for name, parts in fit.parts.items():

@@ -46,7 +46,7 @@ class _Run:
         rho: correlation of neighbours.
         step: last digit of the readings [Hz]; 0: they are not rounded.
         gate: of the counter [s]; 0: not known.
-        tilt, driven: as the analysis had them.
+        tilt, released_hz: as the analysis had them.
     """
 
     time: Array
@@ -57,7 +57,7 @@ class _Run:
     step: float
     gate: float
     tilt: bool
-    driven: bool
+    released_hz: float | None
 
     def readings(self, random: np.random.Generator, factors: Sequence[float]) -> Array:
         """Made-up readings, the constants multiplied by factors, shape (n,) [Hz]."""
@@ -117,7 +117,7 @@ def _run(found: SpinDownAnalysis, k: int, fit: LawFit, run: SpinDown) -> _Run:
         step=step or 0.0,
         gate=gate_of(source, EXPERIMENT) or 0.0,
         tilt=fit.has_tilt,
-        driven=source.readings.driven,
+        released_hz=run.model.released_hz,
     )
 
 
@@ -169,7 +169,13 @@ def _trial(
         readings = run.readings(random, factors)
         fits.append(
             fit_spin_down(
-                run.time, readings, run.u, tilt=run.tilt, driven=run.driven, gate=run.gate or None, top=run.fit.top
+                run.time,
+                readings,
+                run.u,
+                tilt=run.tilt,
+                released_hz=run.released_hz,
+                gate=run.gate or None,
+                top=run.fit.top,
             )
         )
         if several:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.spindown.tilt import DRIVEN
+from analysis.spindown.tilt import RELEASE_U
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.mock import acquire_mock
@@ -21,11 +21,9 @@ from levilab.simulator.start import nutating_start, start_of, steady_rates
 from levilab.world.bench import scene_world, virtual_wiring
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
     from pathlib import Path
 
     from analysis.spindown.fit import SpinDown
-    from analysis.uncertainty import Estimate
     from levilab.acquisition.loop import AcquisitionRequest
     from levilab.bench.wiring import Wiring
     from levilab.runs.run import Run
@@ -83,8 +81,8 @@ def _fall(found: SpinDown, run: Run, scene: Scene) -> Pull:
 
     It was seen to have fallen between the end of the gate of its last reading and that of the next one, which came to
     none.  A drive leaves a nutation, and the more of it the earlier a top falls; the counts show how much.  The
-    prediction is the middle between the least and the most of it that they allow, half their distance a part of its
-    uncertainty.
+    prediction is the middle between the least and the most of it that they and the prior allow, half their distance a
+    part of its uncertainty.
     """
     parameters = found.fit("disc").parameters
     constant, start = parameters["c32"], parameters["start_frequency"].value
@@ -92,7 +90,8 @@ def _fall(found: SpinDown, run: Run, scene: Scene) -> Pull:
         raise TrialFailed("disc c32: the analysis gives no value with an uncertainty")
     fitted = scene.changed({"drag.coefficient": constant.value, "start.spin_hz": start})
     readings = run.readings()
-    wobble, u_wobble = _wobble(parameters, float(np.exp(np.log(readings.column("spin_frequency_hz")).mean())))
+    wobble = parameters["wobble"].value or 0.0
+    u_wobble = math.hypot(parameters["wobble"].u or 0.0, RELEASE_U * wobble)
     late, early = (_simulated_fall(fitted, max(wobble + sign * u_wobble, _LEAST_HZ)) for sign in (-1, 1))
     times = readings.column("time_s")
     interval, gate = float(np.median(np.diff(times))), float(run.record.configuration["spin"]["gate_s"])
@@ -100,18 +99,6 @@ def _fall(found: SpinDown, run: Run, scene: Scene) -> Pull:
     by_constant = (late + early) / 2 * constant.u / constant.value
     u = math.hypot(interval / math.sqrt(12), (late - early) / 2, by_constant)
     return Pull("fall", found.start_time + (late + early) / 2, u, float(times[-1]) + (interval + gate) / 2)
-
-
-def _wobble(parameters: Mapping[str, Estimate], typical_hz: float) -> tuple[float, float]:
-    """Return K of the nutation and its u [Hz], as fitted, or as a drive leaves it where the fit has none.
-
-    One top in ten has two to five times what is expected, and the fit draws that back to it: so far from normal is what
-    a drive leaves that its spread is added to u.
-    """
-    fitted, spread = parameters.get("wobble"), DRIVEN.u * typical_hz
-    if fitted and fitted.value is not None and fitted.u:
-        return fitted.value, math.hypot(fitted.u, spread)
-    return DRIVEN.value * typical_hz, 2 * spread
 
 
 def nutation(scene: Scene, wobble_hz: float) -> float:

@@ -25,6 +25,7 @@ from levilab.pipelines.sources import Doubt, Readings
 from levilab.pipelines.spin.magnetometer import findings_of, read_field_record
 from levilab.pipelines.spin.readings import track_of_record
 from levilab.pipelines.spin.words import finding_text
+from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -51,7 +52,7 @@ LEAST_FALL = 0.01
 class SpinReadings(Readings):
     """Spin readings, each array of shape (n,): increasing `time` [s], positive `frequency` and its `u` [Hz].
 
-    driven: whether a drive is known to have brought the top to its spin.
+    released_hz: the spin at which a drive took hold of the top [Hz]; None: not known, or none did.
     upright: whether the top is known to have no tilt: it stands on a virtual bench, and only spins there.
     doubtful: whether the unit is in doubt; means over several runs leave such a run out.
     """
@@ -60,7 +61,7 @@ class SpinReadings(Readings):
     frequency: "NDArray[np.float64]"
     u: "NDArray[np.float64] | None"
     warnings: tuple[str, ...]
-    driven: bool = False
+    released_hz: float | None = None
     upright: bool = False
     doubtful: bool = False
 
@@ -69,7 +70,9 @@ class SpinReadings(Readings):
 
 def read_run_readings(run: "Run", options: "InputOptions") -> SpinReadings:
     """Return the readings of a run of the experiment `spin`, which drives the top up."""
-    readings = replace(spin_readings(run.readings()), driven=True, upright=run.record.world == "spin")
+    drives = [event for event in run.events() if event["kind"] == RunEvent.DRIVE_ON]
+    slowest = min((event["frequency_hz"] for event in drives if event.get("frequency_hz")), default=None)
+    readings = replace(spin_readings(run.readings()), released_hz=slowest, upright=run.record.world == "spin")
     return _between(readings, options, run.folder)
 
 

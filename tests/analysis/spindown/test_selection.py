@@ -33,8 +33,18 @@ def penalty(n, k):
     return 2 * k + 2 * k * (k + 1) / (n - k - 1)
 
 
-def judged(**fits):
-    return verdict(*weigh(fits))
+def judged(unsettled=frozenset(), **fits):
+    return verdict(*weigh(fits), unsettled=frozenset(unsettled))
+
+
+def test_a_law_whose_fit_did_not_converge_is_neither_crowned_nor_excluded():
+    ends = {"mixed": fit(18.0, p=3), "disc": fit(40.0), "stokes": fit(90.0)}
+    assert judged(**ends).decided
+    found = judged(unsettled=["disc"], **ends)
+    assert not found.decided
+    assert (found.best, found.unsettled, found.weak, found.excluded) == ("mixed", ("disc",), ("disc",), ("stokes",))
+    alike = judged(unsettled=["disc"], disc=fit(18.0), stokes=fit(19.0))
+    assert (alike.best, alike.decided) == ("stokes", False)
 
 
 @pytest.mark.parametrize(
