@@ -10,6 +10,7 @@ For scripts and notebooks, each with `help`:
     levilab.sweep("undriven", spin_hz=…)         # a scene over its parameters → a map
     levilab.stability("undriven")                # where its top floats
     levilab.export(run, "run.nc")                # readings, traces and result for other programs
+    levilab.crosscheck("spindown")               # are its numbers and uncertainties right?
 
 What they need is imported when they are called.  Known failures are `levilab.LevilabError`s.
 """
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from levilab.bench.person import Task
+    from levilab.crosscheck.study import Study
     from levilab.notebook.motion import SimulatedMotion
     from levilab.notebook.result import AnalysisResult
     from levilab.notebook.run import RecordedRun, RunList
@@ -45,14 +47,15 @@ if TYPE_CHECKING:
 _DATA = {"data", "kind", "time", "frequency", "light"}
 
 __all__ = [
-    "LevilabError", "acquire", "analyze", "export", "load", "open_sweep", "report", "runs", "scenes", "simulate",
-    "stability", "sweep",
+    "LevilabError", "acquire", "analyze", "crosscheck", "export", "load", "open_sweep", "report", "runs", "scenes",
+    "simulate", "stability", "sweep",
 ]  # fmt: skip
 
 
 #: What other libraries call the functions → our names.
 _INSTEAD = {
-    "read": "load", "open": "load", "load_run": "load", "fit": "analyze", "read_csv": "analyze", "run": "runs",
+    "read": "load", "open": "load, for a run, or analyze, for a data file",
+    "load_run": "load", "fit": "analyze", "read_csv": "analyze", "run": "runs",
     "save": "export", "plot": "load(…).plot() or analyze(…).plot()", "version": "__version__",
 }  # fmt: skip
 
@@ -504,6 +507,26 @@ def export(
     from levilab.notebook.export import export_data
 
     return export_data(data, output, creator=creator, licence=licence, force=force)
+
+
+@bare
+def crosscheck(*subjects: str, trials: int | None = None, seed: int = 0) -> list[Study]:
+    """Check analyses against known truths, in worlds at random.
+
+    Args:
+        *subjects: names, as `levilab crosscheck --help` lists them; none: all, which takes minutes.
+        trials: of each; by default 40.
+        seed: of the first trial; the next have the next.
+
+    Returns:
+        A study for each: `holds`, `spreads` of its quantities, `failures`.
+
+    Raises:
+        UsageError: there is no such subject, or too few trials.
+    """
+    from levilab.crosscheck.command import study_worlds
+
+    return study_worlds(subjects, trials, seed)
 
 
 sys.modules[__name__].__class__ = _FrontDoor

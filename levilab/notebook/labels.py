@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError
 from levilab.present.html import table_as_html
-from levilab.present.units import split
 from levilab.report.export.contents import attributes_of, variables_of
 from levilab.software import how_to_install
 
@@ -33,26 +32,6 @@ def head_as_html(frame: pd.DataFrame, rows: int, texts: int = 1) -> str:
 
 class MissingXarray(LevilabError):
     """xarray is not installed."""
-
-
-def as_dataset(frame: pd.DataFrame, dimension: str) -> xarray.Dataset:
-    """Return a table as a Dataset: a variable for each column, with the attribute `units` where its name has a unit.
-
-    Args:
-        frame: columns with the unit in their names.
-        dimension: of its rows, where no times that increase are; a column of that name is its coordinate.
-
-    Raises:
-        MissingXarray: xarray is not installed.
-    """
-    if "time_s" in frame and frame["time_s"].is_monotonic_increasing and frame["time_s"].is_unique:
-        dimension = "time_s"
-    units = {str(name): unit.si for name in frame if (unit := split(str(name))[1])}
-    variables = {
-        str(name): ((dimension,), frame[name].to_numpy(), {"units": units[name]} if name in units else {})
-        for name in frame
-    }
-    return dataset_of(variables).set_coords({"time_s", "input", dimension} & set(variables))
 
 
 def dataset_of_contents(contents: Contents) -> xarray.Dataset:

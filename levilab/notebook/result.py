@@ -19,7 +19,7 @@ from analysis.numbers import how_many
 from levilab.errors import UsageError, unquote
 from levilab.files import CannotWrite, as_json, replace_atomically
 from levilab.notebook.fit import FIT, METHODS, FittedModel, axes_of
-from levilab.notebook.labels import as_dataset, head_as_html
+from levilab.notebook.labels import dataset_of_contents, head_as_html
 from levilab.notebook.names import Exportable, bare
 from levilab.notebook.quantity import Named, Quantity, correlate
 from levilab.pipelines.catalogue import ANALYSES, print_analysis
@@ -28,7 +28,7 @@ from levilab.pipelines.suits import save as save_result
 from levilab.present.html import facts_as_html, fold, paragraphs, table_as_html
 from levilab.present.numbers import plain, without_unit
 from levilab.present.units import unit
-from levilab.report.export.contents import facts_of
+from levilab.report.export.contents import contents_of_readings
 from levilab.report.export.write import FORMATS
 from levilab.report.page import render_part
 from levilab.report.tables.latex import to_latex
@@ -392,17 +392,18 @@ class AnalysisResult(Exportable):
         return levilab.report(self, output, **options)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return the readings with their residuals as a Dataset with units, and where they come from; needs xarray.
+        """Return readings and residuals, values and models as a Dataset, as `export` writes it; needs xarray.
 
         Raises:
             MissingXarray: it is not installed.
         """
-        first, *others = sources = self.found.sources
-        about = facts_of(first.run, first.path, [(self.analysis, self.found)])
-        if others:
-            synthetic = any(source.synthetic for source in sources)
-            about = {"source": "; ".join(source.name for source in sources), "synthetic": str(synthetic).lower()}
-        return as_dataset(self.to_dataframe("readings"), "reading").assign_attrs(about)
+        frame = self.to_dataframe("readings")
+        whose = frame.pop("input").to_numpy()
+        data = dataset_of_contents(contents_of_readings(self.analysis, self.found, frame))
+        if len(self.inputs) == 1:
+            return data
+        (dimension,) = data[frame.columns[-1]].dims
+        return data.assign_coords({"input": (dimension, whose)})
 
     @property
     def residuals(self) -> np.ndarray:

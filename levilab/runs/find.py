@@ -62,7 +62,8 @@ def no_such_path(path: Path) -> DataError:
     folder = next(place for place in (path.parent, *path.parent.parents) if place.is_dir())
     wanted = path.relative_to(folder).parts[0] if folder != path.parent else path.name
     near = difflib.get_close_matches(wanted, sorted(one.name for one in folder.iterdir()), n=1, cutoff=0.8)
-    files = name_files(folder, (*TEXTS, *SPREADSHEETS))
+    ends = (*TEXTS, *SPREADSHEETS)
+    files = name_files(folder, ends) if path.suffix.casefold() in ends else ""
     there = f"its data files are {files}" if files else "check the name; levilab runs lists the runs of a folder"
     advice = f"did you mean {folder / near[0]}?" if near else there
     return DataError(f"{path}: there is no such file or folder in {folder.resolve()}: {advice}")

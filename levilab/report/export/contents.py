@@ -187,6 +187,25 @@ def contents_of_results(path: Path, run: Run | None, results: Results) -> Conten
     )
 
 
+def contents_of_readings(analysis: Analysis[Any], found: Any, frame: Any) -> Contents:
+    """Return the readings of one result in a DataFrame, with its values and models.
+
+    Args:
+        analysis: the row of the catalogue.
+        found: what it found, of one or several inputs.
+        frame: a row for each reading, with their residuals.
+    """
+    first, *others = found.sources
+    about = facts_of(first.run, first.path, [(analysis, found)])
+    if others:
+        synthetic = any(source.synthetic for source in found.sources)
+        about = {"source": "; ".join(source.name for source in found.sources), "synthetic": str(synthetic).lower()}
+    written = analysis.result_of(found, Place(Path()))
+    about |= {"best_model": getattr(written, "best_model", None) or ""}
+    title, table = f"{analysis.name} of {about['source']}", table_of(frame, "readings", "a reading")
+    return Contents(first.name, title, (table,), about, values=tuple(_values(written)))
+
+
 def _several(path: Path, count: int) -> DataError:
     return DataError(f"{path}: holds {count} runs, and one is exported at a time: name one of them")
 
@@ -256,14 +275,21 @@ def facts_of(run: Run | None, path: Path, results: Results = ()) -> dict[str, st
     warnings = dict.fromkeys(unquote(text) for _, found in results for text in found.all_warnings)
     facts = {"warnings": "; ".join(warnings)}
     if run is None:
-        facts |= {"source": f"the file {path.name}", "history": f"read by levilab {version('levilab')}"}
+        names = dict.fromkeys(source.name for _, found in results for source in found.sources)
+        source = f"the file {path.name}" if path.name in names or not names else "; ".join(names)  # or arrays
+        facts |= {"source": source, "history": f"read by levilab {version('levilab')}"}
         return {name: text for name, text in facts.items() if text}
     record = run.record
     models = [str(about.get("identity", "")) for about in record.instruments.values()]
     facts |= {
         "source": record.synthetic_how or "synthetic" if record.synthetic else "; ".join(filter(None, models)),
         "synthetic": str(record.synthetic).lower(),
-        "history": f"{record.started_utc or ''} {' '.join(record.command_line)}".strip(),
+        "history": "\n".join(
+            [
+                f"{record.started_utc or ''} {' '.join(record.command_line)}".strip(),
+                *([f"analyzed by levilab {version('levilab')}"] if results else []),
+            ]
+        ).strip(),
         "comment": record.note,
         "creator_name": record.group,
         "date_created": record.started_utc or "",
@@ -476,7 +502,8 @@ def _spread(variable: Variable, rows: list[int], length: int) -> Variable:
     missing = {"_FillValue": variable.attributes.get("_FillValue", variable.values.dtype.type(-1))}
     values = np.full(length, missing["_FillValue"])
     values[rows] = variable.values
-    return replace(variable, values=values, attributes={**variable.attributes, **missing})
+    attributes = {name: value for name, value in variable.attributes.items() if name != "dtype"}  # no bool is missing
+    return replace(variable, values=values, attributes=attributes | missing)
 
 
 def _of_traces(traces: Sequence[Table], taken: set[str]) -> Iterator[Variable]:
@@ -534,7 +561,7 @@ def _variable(
     comment = {"comment": column.source} if column.source else {}
     values, attributes = column.values, {"long_name": column.meaning or column.name, **comment, **(more or {})}
     if values.dtype.kind == "b":
-        flags = {"flag_values": np.array([0, 1], dtype=np.int8), "flag_meanings": "no yes"}
+        flags = {"flag_values": np.array([0, 1], dtype=np.int8), "flag_meanings": "no yes", "dtype": "bool"}  # xarray's
         return Variable(name, dimensions, values.astype(np.int8), attributes | flags)
     if values.dtype.kind in "US":
         words, numbers = np.unique(values, return_inverse=True)

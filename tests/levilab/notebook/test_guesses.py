@@ -73,7 +73,10 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "result.plot()": lambda figure: len(figure.axes) > 5,
     "result.plot('residuals')": lambda figure: len(figure.axes) == 2,
     "run.to_xarray().attrs['synthetic'] + result.to_xarray().attrs['synthetic']": lambda said: said == "truetrue",
-    "result.to_xarray()": lambda data: data["residual_hz"].attrs == {"units": "Hz"},
+    "result.to_xarray().result_spindown_disc_c32.item() == result.models['disc']['c32'].value": bool,
+    "levilab.analyze((t, f)).to_xarray().attrs['source']": lambda said: said == "arrays",
+    "levilab.crosscheck('spin', trials=2)[0].name": lambda name: name == "spin",
+    "result.to_xarray()": lambda data: data["residual_hz"].attrs["units"] == "Hz",
     "pickle.loads(pickle.dumps(result)).values == result.values": bool,
     "help(levilab.analyze)": lambda _: True,
     # the fit, as in lmfit; of the best law and of any other
@@ -193,7 +196,7 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "levilab.analyze(levilab.runs(folder), 'limit').inputs": lambda names: "lower-limits" in names,
     "repr(levilab.analyze((1000 * t, f))).splitlines()[1]": lambda line: "if the times are not in seconds" in line,
     "levilab.analyze((1000 * t, f)).warnings[0]": lambda text: "if the times are not in seconds" in text,
-    "levilab.analyze((1000 * t, f)).summary()": lambda text: "\nBefore you use the numbers. " in text,
+    "levilab.analyze((1000 * t, f)).summary()": lambda text: text.startswith("Before you use the numbers. "),
     # the other commands
     "levilab.__version__": lambda text: text[0].isdigit(),
     "levilab.runs(folder)": lambda runs: len(runs) > 10 and "spin-down-1" in runs._repr_html_(),
