@@ -10,11 +10,12 @@ import typer
 
 from analysis.numbers import how_many
 from levilab.cli.later import Later, NamedLast
-from levilab.cli.options import Json, Paths, existing_path, flag, number, option, place
+from levilab.cli.options import Json, Language, Paths, existing_path, flag, number, option, place
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError
 from levilab.pipelines.options import KINDS, OPTIONS, Option, options_of, read_options, typed_name
+from levilab.texts.text import speak
 
 if TYPE_CHECKING:
     from levilab.pipelines.document import Analysis
@@ -122,8 +123,10 @@ def _command(kind: str) -> Callable[..., None]:
             bool, flag("Keep the rows of an earlier --table; analyze what is new, changed or failed.", "--resume")
         ] = False,
         as_json: Json = False,
+        language: Language = "en",
         **given: Any,
     ) -> None:
+        speak(language)
         if table is not None:
             writing = Writing(table, cores=cores, resume=resume, save=bool(save))
             _tabulate(kind, paths or (), read_options(given, typed=True), writing, out=out, as_json=as_json)

@@ -4,9 +4,10 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import HEADING, Json, Paths, argument, existing_path, flag, option, place, writable
+from levilab.cli.options import HEADING, Json, Language, Paths, argument, existing_path, flag, option, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.pipelines.options import OF_REPORT, read_options
+from levilab.texts.text import speak
 
 
 @takes_options(OF_REPORT, HEADING)
@@ -38,9 +39,11 @@ def report(
     short: Annotated[
         bool, flag("Answer, values, figure and notes alone; of a few spin-downs one page.", "--short")
     ] = False,
+    language: Language = "en",
     **given: Any,
 ) -> None:
     """Write the report."""
+    speak(language)
     from levilab.report.page import write_report
     from levilab.report.reproduction import Heading
 

@@ -11,10 +11,9 @@ import sys
 import threading
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import unquote
 from levilab.files import stamp
 from levilab.pipelines.result import RESULT, beside
-from levilab.texts.text import Text, text_from
+from levilab.texts.text import ENGLISH, Text, text_from
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -56,8 +55,14 @@ class Analyses:
         self._is_over = False
         self._lock = threading.Lock()
 
-    def begin(self, path: Path, options: Sequence[str] = ()) -> None:
-        """Analyze an input and write its report, if that is not under way; earlier ones stay until then."""
+    def begin(self, path: Path, options: Sequence[str] = (), language: str = ENGLISH) -> None:
+        """Analyze an input and write its report, if that is not under way; earlier ones stay until then.
+
+        Args:
+            path: of the input.
+            options: words that say how it is read.
+            language: of figures and report.
+        """
         if path in self.running:
             return
         self.running[path] = "analyze"
@@ -66,7 +71,7 @@ class Analyses:
         files = (place.file(RESULT), place.file(REPORT), *(place.file(name) for name in _figures(place)))
         self._before |= {file: stamp(file) for file in files}
         self._threads = {thread for thread in self._threads if thread.is_alive()}
-        thread = threading.Thread(target=self._carry_out, args=(path, options), daemon=True)
+        thread = threading.Thread(target=self._carry_out, args=(path, [*options, "--language", language]), daemon=True)
         thread.start()
         self._threads.add(thread)
 
@@ -164,13 +169,11 @@ def _result(path: Path) -> dict[str, Any]:
         found = json.loads(path.read_text(encoding="utf-8"))
     if not isinstance(found, dict):
         return {}
-    doubts = _texts(found.get("doubts"))
-    said = {unquote(text) for text in doubts}
     return {
         "analysis": str(found.get("analysis", ""))[:40],
         "verdict": _texts(found.get("sentences") or [found.get("text")]),
-        "doubts": doubts,
-        "warnings": [text for text in _texts(found.get("warnings")) if text not in said],
+        "doubts": _texts(found.get("doubts")),
+        "warnings": _texts(found.get("notes")),
     }
 
 

@@ -303,7 +303,7 @@ class Pages:
         path = self._input(request)
         about: dict[str, Any] = self.hall.analyses.about(path) if path else {"failed": ""}
         language = _language(request, self.hall)
-        for what in ("verdict", "doubts"):
+        for what in ("verdict", "doubts", "warnings"):
             about[what] = [unquote_names(in_language(text, language)) for text in about.get(what, ())]
         return self._json(about | {"failed": in_language(about["failed"], language)})
 
@@ -325,9 +325,10 @@ class Pages:
             body += piece
             if len(body) > _LONGEST_ASK:
                 return self._json({"error": "the command is too long"}, 413)
-        answer, status = await _carry_out(self.hall, request.headers.get("x-levilab-token"), body)
+        language = _language(request, self.hall)
+        answer, status = await _carry_out(self.hall, request.headers.get("x-levilab-token"), body, language)
         if error := answer.get("error"):
-            answer["error"] = unquote_names(in_language(error, _language(request, self.hall)))
+            answer["error"] = unquote_names(in_language(error, language))
         return self._json(answer, status)
 
     async def frames(self, socket: WebSocket) -> None:
@@ -423,24 +424,24 @@ def _table(text: str) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-async def _carry_out(hall: Hall, token: str | None, body: bytes) -> tuple[dict[str, Any], int]:
-    """Carry out the command of a page with the token.  Return the answer and the status of the request."""
+async def _carry_out(hall: Hall, token: str | None, body: bytes, language: str) -> tuple[dict[str, Any], int]:
+    """Carry out the command of a page with the token.  Return the answer, and the status of the request."""
     if not hall.doors.knows(token):
         return {"error": _ONLY_LOOK}, 403
     try:
-        return await _do(hall, _table(body.decode("utf-8", "replace")))
+        return await _do(hall, _table(body.decode("utf-8", "replace")), language)
     except LevilabError as error:
         return {"error": text_of(error)}, 400
 
 
-async def _do(hall: Hall, wanted: dict[str, Any]) -> tuple[dict[str, Any], int]:
+async def _do(hall: Hall, wanted: dict[str, Any], language: str) -> tuple[dict[str, Any], int]:
     """Carry out a command.  Raises LevilabError."""
     if act := _FILE_COMMANDS.get(str(wanted.get("do"))):
-        return await asyncio.to_thread(act, hall, wanted), 200
+        return await asyncio.to_thread(act, hall, wanted | {"language": language}), 200
     if hall.desk is None:
         return {"error": "there is no bench for practice: levilab live --mock brings one"}, 404
     if wanted.get("do") == "analyze":
-        return _analyze(hall, str(wanted.get("run")))
+        return _analyze(hall, str(wanted.get("run")), language)
     number = hall.desk.carry_out(wanted)
     answer = await hall.wait_for_answer(hall.desk, number)
     if answer is not None and answer.kind == "refused":
@@ -448,10 +449,10 @@ async def _do(hall: Hall, wanted: dict[str, Any]) -> tuple[dict[str, Any], int]:
     return {"number": number}, 202 if answer is None else 200
 
 
-def _analyze(hall: Hall, name: str) -> tuple[dict[str, Any], int]:
+def _analyze(hall: Hall, name: str, language: str) -> tuple[dict[str, Any], int]:
     if not hall.is_run(name):
         return {"error": "there is no such run"}, 404
-    hall.analyses.begin(hall.root / name)
+    hall.analyses.begin(hall.root / name, language=language)
     return {}, 200
 
 
@@ -475,7 +476,7 @@ def _keep(hall: Hall, wanted: dict[str, Any]) -> dict[str, Any]:
 
 def _analyze_file(hall: Hall, wanted: dict[str, Any]) -> dict[str, Any]:
     one = hall.opened.get(wanted.get("file"))
-    hall.analyses.begin(one.path, one.words)
+    hall.analyses.begin(one.path, one.words, wanted["language"])
     return {}
 
 

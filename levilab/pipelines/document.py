@@ -280,6 +280,7 @@ class Analysis(Needs[Any], Generic[A]):
             "text": found.text,
             "sentences": as_tables(found.text.each if isinstance(found.text, Sentences) else (found.text,)),
             "doubts": as_tables(found.doubts),
+            "notes": as_tables(text for text in found.all_warnings if text not in found.doubts),
             "models": [],
             "runs": [
                 {

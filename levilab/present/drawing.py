@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.present.looks import GREY, MARKERS, SERIES, Look
+from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -53,6 +54,7 @@ def headline(figure: Figure, text: str, synthetic: str = "") -> None:
         text: the finding; it takes two lines at the most.
         synthetic: the mark, empty for measured data.
     """
+    text, synthetic = in_language(text), in_language(synthetic)
     width = figure.get_size_inches()[0] - 0.1
     room = width - 0.4 - (len(synthetic) + 1) * 0.075 if synthetic else width - 0.1
     lines = textwrap.wrap(text, int(room / _LETTER), max_lines=2, placeholder=" …")
@@ -71,7 +73,7 @@ def synthetic_mark(made_up: Sequence[bool]) -> str:
     count = sum(made_up)
     if not count:
         return ""
-    return "SYNTHETIC" if count == len(made_up) else f"{count} of {len(made_up)} SYNTHETIC"
+    return "SYNTHETIC" if count == len(made_up) else Text("{count} of {n} SYNTHETIC", count=count, n=len(made_up))
 
 
 def sigma_bands(axes: Axes) -> None:

@@ -11,12 +11,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
+import matplotlib.text
+import matplotlib.ticker
 
 from levilab.files import replace_atomically
 from levilab.present.looks import MARKERS
 from levilab.present.numbers import short_name
+from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Figure  # noqa: PLC0414 - for others, who may not name matplotlib
 
@@ -47,9 +52,25 @@ _NOT_STYLE = frozenset({
 STYLE: Any = _sheet()
 
 
+def _say(figure: Figure) -> None:
+    """Let the texts and the numbers of a figure be in the language of this process."""
+    for text in figure.findobj(mpl.text.Text):
+        text.set_text(in_language(text.get_text()))
+    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+        formatter = axis.get_major_formatter()
+        if isinstance(formatter, mpl.ticker.ScalarFormatter):
+            vars(formatter)["format_ticks"] = partial(_numbers, type(formatter).format_ticks, formatter)
+
+
+def _numbers(format_ticks: Callable[..., list[str]], formatter: Any, values: Any) -> list[str]:
+    """Return the numbers of an axis with the decimal sign of the language."""
+    return [in_language(Text("{number:n}", number=text)) for text in format_ticks(formatter, values)]
+
+
 def as_png(figure: Figure, dpi: float = 150) -> bytes:
     """Return a figure as a picture."""
     buffer = io.BytesIO()
+    _say(figure)
     with mpl.rc_context(STYLE):
         figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})
     return buffer.getvalue()
@@ -63,6 +84,7 @@ def save_png(figure: Figure, path: Path) -> None:
 def as_pdf(figure: Figure) -> bytes:
     """Return a figure as a page of PDF of its own size, with its fonts."""
     buffer = io.BytesIO()
+    _say(figure)
     with mpl.rc_context(STYLE):
         figure.savefig(buffer, format="pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
     return buffer.getvalue()
@@ -82,6 +104,7 @@ def as_svg(figure: Figure, prefix: str = "", title: str = "") -> str:
         title: the figure's name for screen readers.
     """
     buffer = io.StringIO()
+    _say(figure)
     with mpl.rc_context(STYLE):
         figure.savefig(buffer, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     return _for_a_page(buffer.getvalue(), prefix, title)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 FOLDER = Path(__file__).parent
 ENGLISH = "en"
-#: A value in a template: its name, and how it is written, as in an f-string; ``n`` is a text of numbers.
+#: A value in a template: its name, and how it is written, as in an f-string; ``n``: text of numbers, ``s``: a name.
 _FIELD = re.compile(r"\{(\w+)(?::([+,]?[0-9]{0,2}(?:\.[0-9]{1,2})?[a-z%]?))?\}")
 _POINT = re.compile(r"(?<=\d)\.(?=\d)")
 
@@ -83,6 +83,10 @@ class Text(str):
         self.template, self.values = template, MappingProxyType(values)
         return self
 
+    def __str__(self) -> str:
+        """Return it as it is: what takes a text by ``str``, as matplotlib does, can still say it in a language."""
+        return self
+
     def __reduce__(self) -> Any:
         """Return how it is made again in another process."""
         return text_from, (self.as_table(),)
@@ -133,7 +137,7 @@ def in_language(text: str, code: str | None = None) -> str:
     """
     code = code or _of_process
     if code == ENGLISH:  # no file is needed, which may not be opened where everything fails
-        return str(text)
+        return str.__str__(text)
     if isinstance(text, Text):
         return _fill(language_of(code).texts.get(text.template, text.template), text.values, code)
     return language_of(code).texts.get(text, text)
@@ -157,6 +161,8 @@ def _write(value: Any, how: str, code: str) -> str:
     decimal = "." if code == ENGLISH else language_of(code).decimal
     if isinstance(value, tuple):
         return ("; " if decimal == "," else ", ").join(_write(one, how, code) for one in value)
+    if how == "s":
+        return str(value)
     if isinstance(value, str):
         said = in_language(value, code)
         return _POINT.sub(decimal, said) if how == "n" else said

@@ -72,7 +72,7 @@ class FieldAnalysis(Analyzed[FieldReadings, FieldRun, None, FieldOptions]):
     def text(self) -> str:
         """What the data say, in a few sentences."""
         if len(self.runs) == 1:
-            return self.runs[0].text
+            return scan_as_text(self.runs[0].scan, self.runs[0].floating)
         found = means([run.values for run in self.runs])
         return scans_as_text(found, len(self.runs), found["strength"].scatter)
 

@@ -13,9 +13,10 @@ from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, statistic
 from levilab.pipelines.sources import warning
 from levilab.present.numbers import enumeration, with_uncertainty
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterator, Mapping
 
     from analysis.field.fit import FieldScan
     from analysis.field.floating import Floating
@@ -82,77 +83,84 @@ def scans_as_text(means: Mapping[str, Estimate], runs: int, scatter: float) -> s
     """
     strength = means["strength"]
     share = 100 * scatter / abs(strength.value or 1.0)
-    return (
-        f"{runs} scans: {_format('strength', strength)} in the mean; one differs from another by {digits(share)} %. "
-        f"{_advice(means)}"
+    said = Text(
+        "{runs} scans: {strength:n} in the mean; one differs from another by {percent:n} %.",
+        runs=runs,
+        strength=_format("strength", strength),
+        percent=digits(share),
     )
+    return Sentences(said, *_advice(means))
 
 
 def scan_as_text(scan: FieldScan, floating: Floating | None) -> str:
     """Return what a scan says, in a few sentences."""
-    base = (
-        f"The base has the strength ρ = {_format('strength', scan.parameters['strength'])}, its middle at "
-        f"{_format('origin', scan.parameters['origin'])}; its field points {_pole(scan)} above it."
+    base = Text(
+        "The base has the strength ρ = {strength:n}, its middle at {origin:n}; its field points {pole} above it.",
+        strength=_format("strength", scan.parameters["strength"]),
+        origin=_format("origin", scan.parameters["origin"]),
+        pole=_pole(scan),
     )
-    parts = [_advice(floating.values) if floating else "No top floats above this base.", base, _learned_as_text(scan)]
-    return " ".join(part for part in parts if part)
+    tops = _advice(floating.values) if floating else ("No top floats above this base.",)
+    return Sentences(*tops, base, *_learned(scan))
 
 
 def _pole(scan: FieldScan) -> str:
     return "up" if scan.values[0] > 0 else "down (by the sign of the probe)"
 
 
-def _learned_as_text(scan: FieldScan) -> str:
-    """Return what the scan can tell, and what it cannot."""
+def _learned(scan: FieldScan) -> Iterator[str]:
+    """Yield what the scan can tell, and what it cannot."""
     of_calliper = [
         name.replace("_", " ")
         for name in scan.fitted
         if name in _OF_CALLIPER and (scan.learned(name) or 0.0) > LEARNS_NOTHING
     ]
-    said = []
     if of_calliper:
-        said.append(f"The scan does not tell {enumeration(of_calliper)} better than the calliper.")
+        yield Text("The scan does not tell {sizes} better than the calliper.", sizes=enumeration(of_calliper))
     pairs = [
         (one, other)
         for k, one in enumerate(scan.fitted)
         for other in scan.fitted[k + 1 :]
         if abs(scan.correlation(one, other)) > _STRONG
     ]
-    said += [
-        f"{one.replace('_', ' ').capitalize()} and {other.replace('_', ' ')} can hardly be distinguished "
-        f"(correlation {digits(scan.correlation(one, other))})."
-        for one, other in pairs
-    ]
-    return " ".join(said)
+    for one, other in pairs:
+        yield Text(
+            "{one} and {other} can hardly be distinguished (correlation {correlation:n}).",
+            one=one.replace("_", " ").capitalize(),
+            other=other.replace("_", " "),
+            correlation=digits(scan.correlation(one, other)),
+        )
 
 
-def _advice(values: Mapping[str, Estimate]) -> str:
-    """Return the mass to set, and what to mind."""
+def _advice(values: Mapping[str, Estimate]) -> Iterator[str]:
+    """Yield the mass to set, and what to mind."""
     if "mass_to_set" not in values:
-        return ""
+        return
     shown = {name: _format(name, value) for name, value in values.items() if name in QUANTITIES}
     per_mass = QUANTITIES["height_per_mass"].show(values["height_per_mass"]).value or 0.0  # mm/g
     mass = values["mass_to_set"].value or 0.0
     per_kelvin = 2 * FERRITE_PER_K * mass * 1e3
-    tops = (
-        f"Tops float from {shown['lowest_height']} to {shown['highest_height']} if they weigh {shown['lightest_mass']} "
-        f"to {shown['heaviest_mass']}. Set {shown['mass_to_set']}: such a top floats at {shown['height_at_mass']}, "
-        f"0.1 g more lowers it by {0.1 * abs(per_mass):.2f} mm, and it must spin at {shown['slowest_spin']} to "
-        f"{shown['fastest_spin']}."
+    yield Text(
+        "Tops float from {lowest_height:n} to {highest_height:n} if they weigh {lightest_mass:n} to {heaviest_mass:n}.",
+        **shown,
     )
-    texts = [tops]
+    yield Text(
+        "Set {mass_to_set:n}: such a top floats at {height_at_mass:n}, 0.1 g more lowers it by {lowers:.2f} mm, and it "
+        "must spin at {slowest_spin:n} to {fastest_spin:n}.",
+        lowers=0.1 * abs(per_mass),
+        **shown,
+    )
     if "moment" in values:
-        texts.append(f"From the height at which it floats its moment is {shown['moment']}.")
+        yield Text("From the height at which it floats its moment is {moment:n}.", moment=shown["moment"])
     if "mass_to_add" in values:
         add = values["mass_to_add"].value or 0.0
-        word = "add" if add > 0 else "take off"
         amount = with_uncertainty(QUANTITIES["mass_to_add"].show(Estimate(abs(add), values["mass_to_add"].u, "kg")))
-        texts.append(f"To this top {word} {amount}." if add > 0 else f"From this top {word} {amount}.")
-    texts.append(
-        f"Ferrite loses 0.2 % of its strength per kelvin, base and top alike: 1 K warmer, and the mass to set is "
-        f"{abs(per_kelvin):.2f} g less."
+        yield Text("To this top add {mass:n}." if add > 0 else "From this top take off {mass:n}.", mass=amount)
+    yield Text(
+        "Ferrite loses 0.2 % of its strength per kelvin, base and top alike: 1 K warmer, and the mass to set is "
+        "{less:.2f} g less.",
+        less=abs(per_kelvin),
     )
-    return " ".join(texts)
 
 
 # --- remarks -------------------------------------------------------------------------------------------

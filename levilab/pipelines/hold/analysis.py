@@ -17,8 +17,9 @@ from levilab.pipelines.options import HoldOptions, SpinDownOptions
 from levilab.pipelines.row import Quantity, columns_of
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.words import SYMBOLS
-from levilab.present.numbers import list_in_words, plain, with_uncertainty
+from levilab.present.numbers import enumeration, plain, with_uncertainty
 from levilab.runs.run import read_record
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -71,8 +72,14 @@ class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
     def text(self) -> str:
         """What the data say, in a few sentences."""
         spins = [run.spin.value or 0.0 for run in self.runs]
-        several = f"One top was held at {len(spins)} spins, {min(spins):.1f} Hz to {max(spins):.1f} Hz."
-        return " ".join([*_of_laws(self.combined), several if len(spins) > 1 else text_of(self.runs[0])])
+        several = Text(
+            "One top was held at {n} spins, {low:.1f} Hz to {high:.1f} Hz.",
+            n=len(spins),
+            low=min(spins),
+            high=max(spins),
+        )
+        last = (several,) if len(spins) > 1 else text_of(self.runs[0]).each
+        return Sentences(*_of_laws(self.combined), *last)
 
     def about_run(self, run: Hold) -> Iterable[str]:
         """Return what to know of one held spin."""
@@ -80,30 +87,39 @@ class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
             yield "the run has no gain at the full amplitude, so that no drag follows: hold the top by less than 90 %"
 
 
-def text_of(run: Hold) -> str:
-    """Return what a held spin says, in a sentence."""
-    drag = f", {with_uncertainty(run.drag)}" if run.drag else ""
-    return (
-        f"{100 * run.share:.1f} % of the drive's amplitude held the top at {with_uncertainty(run.spin)}: so much "
-        f"balanced the drag of the air{drag}. A reading scatters by {plain(run.scatter.value, 2)} Hz."
+def text_of(run: Hold) -> Sentences:
+    """Return what a held spin says, in two sentences."""
+    held = Text(
+        "{percent:.1f} % of the drive's amplitude held the top at {spin:n}: so much balanced the drag of the "
+        "air{drag}.",
+        percent=100 * run.share,
+        spin=with_uncertainty(run.spin),
+        drag=Text(", {drag:n}", drag=with_uncertainty(run.drag)) if run.drag else "",
     )
+    return Sentences(held, Text("A reading scatters by {hz:n} Hz.", hz=plain(run.scatter.value, 2)))
 
 
 def _of_laws(found: HeldTogether) -> Iterable[str]:
     if best := found.best:
-        constants = [f"{SYMBOLS[name]} = {with_uncertainty(one)}" for name, one in best.constants.items()]
-        chi = best.statistics.reduced_chi_square
-        off = "" if chi is None else f"; the held spins scatter about it by {plain(math.sqrt(chi), 2)} of their u"
-        yield f"The {best.name} law fits best: {list_in_words(constants)}{off}."
+        constants = [
+            Text("{symbol} = {value:n}", symbol=SYMBOLS[name], value=with_uncertainty(one))
+            for name, one in best.constants.items()
+        ]
+        yield Text("The {law} law fits best: {how}.", law=best.name, how=enumeration(constants))
+        if (chi := best.statistics.reduced_chi_square) is not None:
+            yield Text("The held spins scatter about it by {times:n} of their u.", times=plain(math.sqrt(chi), 2))
     for law in found.laws[: 1 if best else None]:  # a single drag lies on each
         if law.name in found.beside:
             (name,) = law.constants
             spindown, pull = found.beside[law.name]
-            agrees = "agrees with" if abs(pull) < _ENOUGH else "DISAGREES with"
-            yield (
-                f"By the {law.name} law {SYMBOLS[name]} {agrees} the spin-down's {with_uncertainty(spindown)}: "
-                f"{plain(pull, 2)} standard uncertainties off."
+            agrees = (
+                "By the {law} law {symbol} agrees with the spin-down's {value:n}: {pull:n} standard uncertainties off."
+                if abs(pull) < _ENOUGH
+                else "By the {law} law {symbol} DISAGREES with the spin-down's {value:n}: {pull:n} standard "
+                "uncertainties off."
             )
+            value = with_uncertainty(spindown)
+            yield Text(agrees, law=law.name, symbol=SYMBOLS[name], value=value, pull=plain(pull, 2))
 
 
 def fit_source(source: Source[HoldReadings], _: HoldOptions) -> Hold:

@@ -33,6 +33,7 @@ from levilab.pipelines.spin.magnetometer import findings_of, spin_of_line, track
 from levilab.pipelines.spin.readings import Records, track_of_record
 from levilab.pipelines.spin.words import finding_text
 from levilab.present.numbers import with_uncertainty
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -190,7 +191,7 @@ class SpinRun:
         if len(self.series) < 2:
             return ""
         place = int(np.abs(self.series.time - self.spin.reference_time).argmin()) + 1
-        return f"{self.series.of} {place} of {len(self.series)}"
+        return Text("{of} {place} of {n}", of=self.series.of, place=place, n=len(self.series))
 
     @property
     def trend(self) -> Estimate | None:
@@ -423,27 +424,50 @@ def in_a_sentence(run: SpinRun) -> str:
     """Return what the data say of one input."""
     spin, series = run.spin, run.series
     folds = run.line.folds[1:] if run.line and run.line.doubtful else ()
-    other = "".join(f" or {fold.frequency:.2f} Hz" for fold in folds)
-    at = f"{with_uncertainty(spin.frequency)}{other} at {spin.reference_time:.4g} s"
-    if len(series) == 1:
-        return f"The spin is {at}, its slope {with_uncertainty(spin.chirp)}.{_about_drive(run)}"
-    ends = f"{series.frequency[0]:.3f} Hz at {series.time[0]:.1f} s to {series.frequency[-1]:.3f} Hz"
-    phases = ", ".join(f"{kind} {round(start, 1) + 0.0:.1f} to {end:.1f} s" for kind, start, end in series.phases[:6])
-    in_phases = f"; {phases}" if phases else ""
-    slope = f" Its slope through all {series.of}s is {with_uncertainty(run.trend)}." if run.trend else ""
-    return (
-        f"The spin goes from {ends} at {series.time[-1]:.1f} s ({len(series)} {series.of}s{in_phases}); {at}, "
-        f"{run.which}.{slope}{_about_drive(run)}"
+    at = Text(
+        "{spin:n}{others} at {time:.4g} s",
+        spin=with_uncertainty(spin.frequency),
+        others=Text(" or {folds:.2f} Hz", folds=tuple(fold.frequency for fold in folds)) if folds else "",
+        time=spin.reference_time,
     )
+    drive = _about_drive(run)
+    if len(series) == 1:
+        return Sentences(
+            Text("The spin is {at}, its slope {slope:n}.", at=at, slope=with_uncertainty(spin.chirp)), drive
+        )
+    phases = tuple(
+        Text("{kind} {start:.1f} to {end:.1f} s", kind=kind, start=round(start, 1) + 0.0, end=end)
+        for kind, start, end in series.phases[:6]
+    )
+    way = Text(
+        "The spin goes from {first:.3f} Hz at {begin:.1f} s to {last:.3f} Hz at {end:.1f} s ({n} {of}{phases}).",
+        first=series.frequency[0],
+        begin=series.time[0],
+        last=series.frequency[-1],
+        end=series.time[-1],
+        n=len(series),
+        of=f"{series.of}s",
+        phases=Text("; {phases}", phases=phases) if phases else "",
+    )
+    trend = (
+        Text("Its slope through all {of} is {slope:n}.", of=f"{series.of}s", slope=with_uncertainty(run.trend))
+        if run.trend
+        else ""
+    )
+    return Sentences(way, Text("It is {at}, {which}.", at=at, which=run.which), trend, drive)
 
 
 def _about_drive(run: SpinRun) -> str:
-    """Return whether the top is locked to a drive whose frequency is given, as a sentence behind others."""
+    """Return whether the top is locked to a drive whose frequency is given, as a sentence."""
     off = run.drive_offset
     if off is None or off.value is None or not off.u:
         return ""
-    away = f"while it is held, the spin less the drive's frequency is {with_uncertainty(off)}"
-    if abs(off.value) > NOT_LOCKED * off.u:
-        return f" The top is not locked to the drive: {away}."
-    beware = " (if it is the spin: the drive's coil has a field of this frequency, too)" if run.line else ""
-    return f" The top is locked to the drive: {away}{beware}."
+    locked = abs(off.value) <= NOT_LOCKED * off.u
+    return Text(
+        "The top {follows} the drive: while it is held, the spin less the drive's frequency is {off:n}{beware}.",
+        follows="is locked to" if locked else "is not locked to",
+        off=with_uncertainty(off),
+        beware=" (if it is the spin: the drive's coil has a field of this frequency, too)"
+        if run.line and locked
+        else "",
+    )

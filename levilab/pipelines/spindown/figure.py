@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.spindown.report import is_best, laws_of, tilt_part
-from levilab.pipelines.spindown.words import STRAIGHT_LINES, SYMBOLS, finding
+from levilab.pipelines.spindown.words import STRAIGHT_LINES, SYMBOLS, finding, law_names, short_law
 from levilab.present.drawing import (
     SMALL,
     band,
@@ -33,6 +33,7 @@ from levilab.present.looks import GREY, LOOKS, MARKERS
 from levilab.present.numbers import short_name
 from levilab.present.style import STYLE, WIDE
 from levilab.present.units import unit as unit_row
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -101,19 +102,21 @@ def short_figure(analysis: SpinDownAnalysis) -> Figure:
 
 def _finding(analysis: SpinDownAnalysis) -> str:
     """Return the verdict in one sentence."""
-    together = f" of {len(analysis.runs)} runs" if len(analysis.runs) > 1 else ""
-    return f"Spin-down{together}: {finding(analysis.combined)}"
+    n, said = len(analysis.runs), finding(analysis.combined)
+    return Text("Spin-down of {n} runs: {said}", n=n, said=said) if n > 1 else Text("Spin-down: {said}", said=said)
 
 
 def _unit(analysis: SpinDownAnalysis) -> _Unit:
     known = [run.u for run in analysis.runs if run.u is not None]
     if len(known) == len(analysis.runs):
         usual = float(np.median(np.concatenate(known)))
-        return _Unit(known, usual, "u", f"u of a reading ({digits(usual)} Hz)")
+        return _Unit(known, usual, "u", Text("u of a reading ({hz:n} Hz)", hz=digits(usual)))
     residuals = [run.fit(analysis.combined.best).residuals for run in analysis.runs]
     floor = 1e-12 * float(analysis.runs[0].frequency[0])  # readings that a law describes exactly
     scatter = max(float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))), floor)
-    words = f"the scatter about the {analysis.combined.best} law ({digits(scatter)} Hz)"
+    words = Text(
+        "the scatter about the {law} law ({hz:n} Hz)", law=law_names([analysis.combined.best]), hz=digits(scatter)
+    )
     return _Unit([np.full(len(one), scatter) for one in residuals], scatter, "scatter", words)
 
 
@@ -127,8 +130,8 @@ def _draw_spin(axes: Axes, analysis: SpinDownAnalysis) -> None:
     for k, run in enumerate(analysis.runs):
         t = np.linspace(run.time[0], run.time[-1], 200)
         width = 1.4 if several == 1 else 0.9 if several <= len(MARKERS) else 0.4
-        kind = "best law: " if is_best(analysis, best) else ""
-        label = f"{kind}{best}, {in_mathtext(LAWS[best].equation)}" if k == 0 else None
+        said = "best law: {law}, {equation}" if is_best(analysis, best) else "{law}, {equation}"
+        label = Text(said, law=short_law(best), equation=in_mathtext(LAWS[best].equation)) if k == 0 else None
         axes.plot(t, run.fit(best).spin_frequency(t), linewidth=width, zorder=2.5, label=label, **LOOKS[best].as_line)
         name = _run_label(analysis, k)
         _draw_readings(axes, analysis, k, run.frequency, span=span, label=name, gid=f"readings-{k}")
@@ -153,10 +156,10 @@ def _set_range(axes: Axes, analysis: SpinDownAnalysis) -> float:
 def _run_label(analysis: SpinDownAnalysis, k: int) -> str | None:
     """Return a name for each of a few runs, a number for many."""
     if len(analysis.runs) == 1:
-        return "readings" + (" ± u" if analysis.runs[0].u is not None else "")
+        return "readings ± u" if analysis.runs[0].u is not None else "readings"
     if len(analysis.runs) <= len(MARKERS):
         return _legend_text(short_name(analysis.sources[k].name))
-    return f"readings of {len(analysis.runs)} runs" if k == 0 else None
+    return Text("readings of {n} runs", n=len(analysis.runs)) if k == 0 else None
 
 
 def _legend_text(name: str) -> str:
@@ -184,7 +187,7 @@ def _draw_outliers(axes: Axes, analysis: SpinDownAnalysis, k: int) -> None:
         axes.plot(t[shown], y, marker=marker, markersize=6, label="left out" if first else None, **style)
         first = False
         for i in range(min(len(shown), _MOST_NAMED) if share else 0):
-            text = f"{nu[shown[i]]:.4g} Hz"
+            text = Text("{hz:.4g} Hz", hz=nu[shown[i]])
             axes.annotate(
                 text, (t[shown[i]], y[i]), (7, -1.5), textcoords="offset points", color=look.of_text, fontsize=SMALL
             )
@@ -201,7 +204,9 @@ def _draw_weights(axes: Axes, analysis: SpinDownAnalysis) -> None:
         look = LOOKS[name]
         axes.barh(-place, weight or 0.0, height=0.3, color=look.colour, linewidth=0)
         number = "" if weight is None else f"  {weight:.2f}" if weight >= 0.005 else "  <\u20090.01"
-        said = ", ".join(filter(None, (f"{name}{number}", _note(analysis, name, short=True))))
+        note = _note(analysis, name, short=True)
+        how = "{law}{number:n}, {note}" if note else "{law}{number:n}"
+        said = Text(how, law=short_law(name), number=number, note=note)
         axes.text(0.03, 0.22 - place, said, fontsize=SMALL, va="bottom", color="black")
     known = analysis.combined.fit(analysis.combined.best).statistics.weight is not None
     about = "weight of the law" if known else "too few readings to weigh"
@@ -249,7 +254,7 @@ def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
     times = f"$10^{{{power}}}$ ".replace("-", "−") if power else ""
     groups = [_legend_text(source.group) for source in analysis.sources if source.group]
     axes.set(xlabel=f"{groups[0]} … {groups[-1]}" if groups else "run", ylabel=f"{SYMBOLS[name]}  [{times}{unit}]")
-    axes.set_title(f"{SYMBOLS[name]}, {best.name}: mean, ±s", pad=3, fontsize=8)
+    axes.set_title(Text("{symbol}, {law}: mean, ±s", symbol=SYMBOLS[name], law=short_law(best.name)), pad=3, fontsize=8)
 
 
 def _power_of_ten(values: Array) -> int:
@@ -285,13 +290,14 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
     ends = []
     for name, difference in curves.items():
         axes.plot(t, difference, linewidth=1.3, zorder=2.6, **LOOKS[name].as_line)
-        where = "" if np.abs(difference).max() <= most else f", to {_with_sign(difference)} Hz"
+        where = "" if np.abs(difference).max() <= most else Text(", to {hz:n} Hz", hz=_with_sign(difference))
         shaded = ", 2 u shaded" if name == best and u is not None else ""
         said = _note(analysis, name) or "not excluded"
-        ends.append((float(difference[-1]), name, f"{name}: {said}{shaded}{where}"))
+        text = Text("{law}: {said}{shaded}{where}", law=short_law(name), said=said, shaded=shaded, where=where)
+        ends.append((float(difference[-1]), name, text))
     _name_laws(axes, [end for end in ends if math.isfinite(end[0])])
-    of = "" if several == 1 else f"; curves of {'the longest run' if several > 1 else 'the run'}"
-    axes.set_title(f"Readings and laws less the {best} law{of}", pad=3)
+    of = "; curves of the longest run" if several > 1 else ""
+    axes.set_title(Text("Readings and laws less the {law} law{of}", law=law_names([best]), of=of), pad=3)
 
 
 def _with_sign(difference: Array) -> str:
@@ -315,8 +321,8 @@ def _name_laws(axes: Axes, ends: list[tuple[float, str, str]]) -> None:
 
 def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit: _Unit) -> None:
     """Draw the residuals of each law in units of a reading's u: noise within the bands if the law holds."""
-    text = f"Residuals, reading − law, in units of {unit.words}; shaded ±1, ±2"
-    text += "; black: means" if _many(analysis) else ""
+    means = "; black: means" if _many(analysis) else ""
+    text = Text("Residuals, reading − law, in units of {unit}; shaded ±1, ±2{means}", unit=unit.words, means=means)
     write(figure, 0.08, top - 0.42, text, fontsize=9)
     tilt = _tilt_in_words(analysis)
     if tilt:
@@ -347,7 +353,7 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
         axes.set(ylim=(-most, most), xlabel="time  [s]")
         axes.tick_params(labelsize=SMALL)
         axes.locator_params(nbins=4)
-        axes.set_title(name, loc="left", color=LOOKS[name].of_text, fontsize=8, fontweight="bold", pad=3)
+        axes.set_title(short_law(name), loc="left", color=LOOKS[name].of_text, fontsize=8, fontweight="bold", pad=3)
         if own:
             axes.set_title(
                 "own scale" if width > 1 else "own",
@@ -359,7 +365,7 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
             )
             axes.set_facecolor("#F4F4F4")
         if place == 0:
-            axes.set_ylabel(f"residual / {unit.symbol}")
+            axes.set_ylabel(Text("residual / {unit}", unit=unit.symbol))
 
 
 def _draw_tilt(axes: Axes, analysis: SpinDownAnalysis, k: int, name: str, limit: float) -> None:
@@ -377,7 +383,8 @@ def _tilt_in_words(analysis: SpinDownAnalysis) -> str:
     """Return an explanation of the dotted curves; empty where no run shows a tilt."""
     fits = [run.fit(analysis.combined.best) for run in analysis.runs]
     most = [float(np.abs(tilt_part(fit, run.time)).max()) for fit, run in zip(fits, analysis.runs, strict=True)]
-    return f"dotted: what the tilt adds to the count, up to {digits(max(most))} Hz, not to scale" if max(most) else ""
+    said = "dotted: what the tilt adds to the count, up to {hz:n} Hz, not to scale"
+    return Text(said, hz=digits(max(most))) if max(most) else ""
 
 
 # --- straight lines ------------------------------------------------------------------------------------
@@ -398,7 +405,7 @@ def _draw_straight_lines(figure: Figure, top: float, analysis: SpinDownAnalysis)
         _draw_straight(above, strip, analysis, straight.transform, law)
         above.set_ylabel(straight.axis, fontsize=8)
         above.set_title(
-            f"straight if {law} holds" if width > 1.5 else law,
+            Text("straight if {law} holds", law=short_law(law)) if width > 1.5 else short_law(law),
             color=LOOKS[law].of_text,
             fontsize=8,
             fontweight="bold",

@@ -152,6 +152,11 @@ def law_names(laws: Iterable[str]) -> str:
     return enumeration([_PERSONS.get(law, law) for law in laws] or ["the laws"])
 
 
+def short_law(law: str) -> str:
+    """Return the name of a drag law where room is short."""
+    return Text("{name:s}", name=_PERSONS[law]) if law in _PERSONS else law.capitalize()
+
+
 def verdict_of_run(run: SpinDown) -> str:
     """Return what one run says about the laws."""
     constants = {fit.name: {name: fit.parameters[name] for name in fit.law.constants} for fit in run.fits}
@@ -174,19 +179,16 @@ def finding(found: Combined) -> str:
     """Return the verdict of all runs in a few words, for the head of a figure."""
     said, best = found.verdict, found.best
     if not said.describes:
-        return f"no drag law describes these readings; the {law_names([best])} law comes nearest"
+        return Text("no drag law describes these readings; the {law} law comes nearest", law=law_names([best]))
     if said.decided:
-        excluded = f"; {law_names(said.excluded)} {_are(said.excluded)} excluded" if said.excluded else ""
-        return f"the {law_names([best])} law describes the readings{excluded}"
+        how = "; {laws} is excluded" if len(said.excluded) == 1 else "; {laws} are excluded"
+        excluded = Text(how, laws=law_names(said.excluded)) if said.excluded else ""
+        return Text("the {law} law describes the readings{excluded}", law=law_names([best]), excluded=excluded)
     simple = _simple(said)
     if len(simple) == 1:
-        alike = law_names(said.indistinguishable)
-        return f"{alike} cannot be distinguished; {law_names([best])} has the fewest constants"
-    return f"the readings cannot distinguish {law_names(simple)}"
-
-
-def _are(laws: Sequence[str]) -> str:
-    return "is" if len(laws) == 1 else "are"
+        how = "{laws} cannot be distinguished; {law} has the fewest constants"
+        return Text(how, laws=law_names(said.indistinguishable), law=law_names([best]))
+    return Text("the readings cannot distinguish {laws}", laws=law_names(simple))
 
 
 def _simple(said: Verdict) -> list[str]:
@@ -346,7 +348,9 @@ def remark(of: Remark) -> str:
     """Return a remark as a sentence, without its full stop."""
     text = _REMARKS[of.kind]
     said = text(of) if callable(text) else text
-    return warning(of, f"{of.law}: {said}" if of.law and of.kind in _OF_A_LAW else said)
+    return warning(
+        of, Text("{law}: {said}", law=short_law(of.law), said=said) if of.law and of.kind in _OF_A_LAW else said
+    )
 
 
 _OF_A_LAW = frozenset({
@@ -360,11 +364,17 @@ _MOST_TIMES = 1000
 def _outlier(of: Remark) -> str:
     time, frequency, off, times, stated, kept, falling = of.values
     many = f"more than {_MOST_TIMES}" if times >= _MOST_TIMES else digits(times)
-    return (
-        f"the reading of {frequency:.6g} Hz at {round(time, 3):.12g} s lies {digits(off)} Hz from the {of.law} law, "
-        f"{many} times {'its uncertainty' if stated else 'the rms residual of the others'}, and was "
-        f"{'kept as asked' if kept else 'left out'}"
-        f"{'; it stands at the end: the top may already have been falling' if falling else ''}"
+    return Text(
+        "the reading of {hz:.6g} Hz at {time:.12g} s lies {off:n} Hz from the {law} law, {many:n} times {unit}, and "
+        "was {kept}{falling}",
+        hz=frequency,
+        time=round(time, 3),
+        off=digits(off),
+        law=law_names([of.law or ""]),
+        many=many,
+        unit="its uncertainty" if stated else "the rms residual of the others",
+        kept="kept as asked" if kept else "left out",
+        falling="; it stands at the end: the top may already have been falling" if falling else "",
     )
 
 
@@ -403,21 +413,23 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str]] = MappingProxyType({
         "the readings have no uncertainties of their own: their scatter about each law stands for them, so a law that "
         "does not fit shows only beside a better one"
     ),
-    "understated": lambda of: (
-        f"even the best law, {of.law}, misses the readings by {digits(of.values[0])} times their stated uncertainties, "
-        "more than chance explains: all uncertainties are enlarged; check the readings' uncertainties"
+    "understated": lambda of: Text(
+        "even the best law, {law}, misses the readings by {times:n} times their stated uncertainties, more than chance "
+        "explains: all uncertainties are enlarged; check the readings' uncertainties",
+        law=law_names([of.law or ""]), times=digits(of.values[0]),
     ),
-    "overstated": lambda of: (
-        f"the readings scatter only {digits(of.values[0])} times as much about the best law as their stated "
-        "uncertainties say: are these too large?"
+    "overstated": lambda of: Text(
+        "the readings scatter only {times:n} times as much about the best law as their stated uncertainties say: are "
+        "these too large?", times=digits(of.values[0]),
     ),
     "few readings": lambda of: (
         f"{of.values[0]:.0f} readings are too few to compare {of.name} by AICc: record more readings"
     ),
-    "correlated": lambda of: (
-        f"neighbouring residuals resemble each other: their correlation is {of.values[0]:.2f} ± {of.values[1]:.2f}, so "
-        f"{of.values[2]:.0f} readings are worth as much as "
-        f"{digits(of.values[2] * (1 - of.values[0]) / (1 + of.values[0]))} independent ones; it is in all uncertainties"
+    "correlated": lambda of: Text(
+        "neighbouring residuals resemble each other: their correlation is {r:.2f} ± {u:.2f}, so {n:.0f} readings are "
+        "worth as much as {worth:n} independent ones; it is in all uncertainties",
+        r=of.values[0], u=of.values[1], n=of.values[2],
+        worth=digits(of.values[2] * (1 - of.values[0]) / (1 + of.values[0])),
     ),
     "changed": lambda of: (
         f"no law describes run {of.values[0]:.0f} of {of.values[1]:.0f}: that noise makes a change as large in any of "

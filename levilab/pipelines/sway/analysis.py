@@ -18,6 +18,7 @@ from levilab.pipelines.row import Quantity, columns_of, entry, statistic
 from levilab.pipelines.sway.device import known_of
 from levilab.pipelines.sway.readings import SwayReadings
 from levilab.present.numbers import with_uncertainty
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -84,6 +85,11 @@ class SwayRun:
 class SwayAnalysis(EachAlone[SwayReadings, SwayRun, SwayOptions]):
     """Tracks, each by itself: another mass or another height has another split."""
 
+    @property
+    def text(self) -> str:
+        """What the data say, of a single track as a text for each language."""
+        return _in_words(self.runs[0].geometry) if len(self.runs) == 1 else super().text
+
 
 def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRun:
     """Find the swings of one input, and what they say.  Raises DataError, which names the file."""
@@ -112,22 +118,26 @@ def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRu
 
 def _in_words(found: Geometry) -> str:
     excluded = found.against_null > _ENOUGH
-    null = (
-        f"That swings do not split is excluded: the split is {digits(found.against_null)} standard uncertainties."
+    null = Text(
+        "That swings do not split is excluded: the split is {pull:n} standard uncertainties."
         if excluded
-        else f"That swings do not split is not excluded: the split is {digits(found.against_null)} standard "
-        "uncertainties."
+        else "That swings do not split is not excluded: the split is {pull:n} standard uncertainties.",
+        pull=digits(found.against_null),
     )
     off = abs((found.ratio.value or 0.0) - 1) / (found.ratio.u or np.inf)
     agrees = "agrees with" if off < _ENOUGH else "disagrees with"
     if (found.ratio.u or np.inf) * _ENOUGH > 1:
         agrees = "is too uncertain for a comparison with"
-    predicted = replace(found.predicted, u=found.predicted.u or 0.0)
-    return (
-        f"The slow swings are split by geometric magnetism of {with_uncertainty(found.measured)} at a spin of "
-        f"{found.spin:g} Hz, which {agrees} the {with_uncertainty(predicted)} that follow from the field: ratio "
-        f"{with_uncertainty(found.ratio)}. {null}"
+    said = Text(
+        "The slow swings are split by geometric magnetism of {split:n} at a spin of {spin:g} Hz, which {agrees} the "
+        "{predicted:n} that follow from the field: ratio {ratio:n}.",
+        split=with_uncertainty(found.measured),
+        spin=found.spin,
+        agrees=agrees,
+        predicted=with_uncertainty(replace(found.predicted, u=found.predicted.u or 0.0)),
+        ratio=with_uncertainty(found.ratio),
     )
+    return Sentences(said, null)
 
 
 def _doubts(swings: Sequence[Swings], found: Geometry, *, view: bool | None) -> Iterable[str]:

@@ -125,6 +125,7 @@ def test_no_text_is_of_a_sentence_that_is_said_no_more(code: str) -> None:
         | {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
     )
     said |= {re.sub(r"(_frequency)?_(hz|v|t|m|s)$", "", text).replace("_", " ") for text in said}  # heads of columns
+    said |= {text.capitalize() for text in said}  # as figures have them
     said |= {text for module in PAGE.glob("*.js") for text in re.findall(_LITERAL, module.read_text("utf-8"))}
     assert sorted(text for text in language_of(code).texts if text not in said) == []
 
