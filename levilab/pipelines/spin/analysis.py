@@ -440,7 +440,8 @@ def in_a_sentence(run: SpinRun) -> str:
         for kind, start, end in series.phases[:6]
     )
     way = Text(
-        "The spin goes from {first:.3f} Hz at {begin:.1f} s to {last:.3f} Hz at {end:.1f} s ({n} {of}{phases}).",
+        "The spin goes from {first:.3f} Hz at {begin:.1f} s to {last:.3f} Hz at {end:.1f} s ({n} {of}{phases}); "
+        "{at}, {which}.",
         first=series.frequency[0],
         begin=series.time[0],
         last=series.frequency[-1],
@@ -448,13 +449,15 @@ def in_a_sentence(run: SpinRun) -> str:
         n=len(series),
         of=f"{series.of}s",
         phases=Text("; {phases}", phases=phases) if phases else "",
+        at=at,
+        which=run.which,
     )
     trend = (
         Text("Its slope through all {of} is {slope:n}.", of=f"{series.of}s", slope=with_uncertainty(run.trend))
         if run.trend
         else ""
     )
-    return Sentences(way, Text("It is {at}, {which}.", at=at, which=run.which), trend, drive)
+    return Sentences(way, trend, drive)
 
 
 def _about_drive(run: SpinRun) -> str:
