@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cached_property
 from typing import Any
 
@@ -49,6 +50,8 @@ class Later(typer.core.TyperCommand):
         except Exception as error:
             if hasattr(error, "option_name") and hasattr(error, "possibilities"):  # typer keeps the class to itself
                 _explain_unknown(error, info_name or "", self.command)
+            elif hasattr(error, "message"):
+                error.message += _explain_blank(args)
             raise
 
 
@@ -87,6 +90,18 @@ class NamedLast(typer.core.TyperGroup):
         from pathlib import Path
 
         return bool(get_close_matches(word, self.commands)) and not Path(word).exists()
+
+
+def _explain_blank(args: list[str]) -> str:
+    """Return the advice for a value with a blank before its unit; empty where there is none.
+
+    >>> _explain_blank(["driven", "--duration", "5", "min"])
+    '; write --duration 5min, without a blank'
+    """
+    for option, value, unit in zip(args, args[1:], args[2:], strict=False):
+        if option.startswith("--") and re.fullmatch(r"[\d.,]+", value) and re.fullmatch(r"[^\W\d_]{1,4}", unit):
+            return f"; write {option} {value}{unit}, without a blank"
+    return ""
 
 
 def _with_present_name(word: str) -> str:

@@ -142,7 +142,8 @@ COMMANDS = {
             """Open data files: which columns hold what, in which units; correct that, keep it, analyze and report.
 
             Shows the files in the browser, where a click corrects them, or in the terminal with the option for each
-            answer. What is understood is analyzed, as by levilab analyze; -o writes the report.""",
+            answer. What is understood is analyzed, and nothing is written without --keep and -o: -o is the report, and
+            levilab analyze writes result and figure beside the file.""",
             r'levilab open my.csv --columns "t=1,f=3 \[rpm]" --keep -o my.html',
         ),
         "analyze": Row(

@@ -232,9 +232,12 @@ class ShareBar:
                 print(printable(text), file=sys.stderr, flush=True)  # noqa: T201 - this is where it is shown
 
     def _time_left(self, share: float, now: float) -> str:
-        """Return how long the rest takes if it goes on as it did since the first share; empty where that is unknown."""
+        """Return how long the rest takes if it goes on as it did since the first share; empty where that is unknown.
+
+        What begins slowly would take hours by its first per cent.
+        """
         since, passed = share - self._first, now - self._begin
-        if since <= 0 or share >= 1 or passed < 1:
+        if since <= 0 or share >= 1 or passed < 1 or (since < 0.01 and passed < 30):
             return ""
         return f"about {time_in_words(passed * (1 - share) / since)} left"
 

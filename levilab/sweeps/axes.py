@@ -119,12 +119,20 @@ def _scale(rest: Sequence[str], text: str) -> Scale:
     return "log"
 
 
+#: Ends that differ so much have a slip in a unit.
+_SLIP = 100.0
+
+
 def _check_span(key: str, span: tuple[float, float, int], scale: Scale, text: str) -> None:
     first, last, count = span
     ending = ":log" if scale == "log" else ""
     if first == last or count == 1:
         raise UsageError("sweep", f"one value is no axis: set it by `settings` = {key}={first:g}", value=text)
     if first > last:
+        if first > _SLIP * abs(last):
+            raise UsageError(
+                "sweep", f"FROM is {first:g} and TO {last:g}, in SI: is the unit of one wrong?", value=text
+            )
         turned = f"{key}={last:g}:{first:g}:{count}{ending}"
         raise UsageError("sweep", f"FROM is above TO: take {turned}, the map is the same", value=text)
     if count < 2:

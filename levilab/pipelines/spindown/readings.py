@@ -126,8 +126,15 @@ def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings
         raise
     else:
         return record_readings(record, options)
+    return spin_readings(_read_spin_table(path, options))
+
+
+def _read_spin_table(path: "Path", options: "InputOptions") -> Table:
     table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=QUANTITIES[:2], guess=options.guess)
-    return spin_readings(table)
+    if options.channel is not None:
+        note = f"{path.name}: is a table of readings and has no channels: `columns` chooses its columns"
+        table = replace(table, warnings=(note, *table.warnings))
+    return table
 
 
 def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") -> SpinReadings:
