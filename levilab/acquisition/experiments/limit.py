@@ -45,6 +45,8 @@ if TYPE_CHECKING:
 _MOST_FALLS = 3
 #: Fewest counts that a line to the moment of a loss is drawn through.
 _FEWEST = 3
+#: A count below the drive by more standard deviations of the counts is that of a top that slips (2 % of all others).
+_NO_SLIP = 2.0
 #: Number of counts that compare the tape of a creeping top with the drive, and their distance below the limit [Hz]:
 #: nearer to it the top may already fall behind.
 _COMPARED, _BELOW_HZ = 20, 5.0
@@ -275,7 +277,7 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
                     raise DidNotFollow(
                         "{lost}, as the creep began", "float it again, or drive harder", lost=lost
                     ) from lost
-                limit = _limit_of_loss(settings, (held, drive), counts[-1][1])
+                limit = _limit_of_loss(settings, (held, drive), counts)
                 keep({"time_s": session.now()} | limit)
                 if lost.spin is not None:
                     counts.append((session.now(), lost.spin, drive))
@@ -344,15 +346,20 @@ def _end_of(session: Session[LimitSettings], lost: NotHeld) -> tuple[RunEvent, s
     return (RunEvent.LOCK_LOST, "the drive lost the top") if is_up else (RunEvent.TOP_LOST, "the top fell")
 
 
-def _limit_of_loss(settings: LimitSettings, between: tuple[float, float], seen: float) -> Row:
+def _limit_of_loss(
+    settings: LimitSettings, between: tuple[float, float], counts: list[tuple[float, float, float]]
+) -> Row:
     """Return the reading of a top that no longer follows, without its time.
 
     between: the drive's frequencies at the last count at which it did, and at the first one at which it did not [Hz];
-    seen: that last count [Hz].
+    counts: end [s], spin and drive [Hz] of each step, up to that last count.
     """
-    held, drive = between
-    # a top that slips is taken for held until it is far behind; but it only slows, so its limit is above the counts
-    low = min(held, seen)
+    (held, drive), seen = between, counts[-1][1]
+    # a top that slips is taken for held until it is far behind; but it only slows, so its limit is above the counts.
+    # They scatter by their noise and by the swing about the drive: by less than that below the drive is no slip.
+    beside = np.array([spin - step for _, spin, step in counts])
+    scatter = 1.4826 * float(np.median(np.abs(beside - np.median(beside))))  # a standard deviation, by the median
+    low = min(held, seen + _NO_SLIP * scatter)
     return {
         "spin_frequency_hz": (low + drive) / 2,
         "spin_frequency_u_hz": (drive - low) / 12**0.5,

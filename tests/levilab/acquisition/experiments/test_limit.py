@@ -12,7 +12,7 @@ from instruments.errors import NoAnswer
 from instruments.virtual.generator.channel import Output, Triggered
 from levilab.acquisition.counting import FreeTop
 from levilab.acquisition.driving import held_spin
-from levilab.acquisition.experiments.limit import LimitSettings
+from levilab.acquisition.experiments.limit import LimitSettings, _limit_of_loss
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NotHeld
@@ -102,6 +102,26 @@ def test_a_top_that_slips_before_it_is_missed_has_its_limit_within_u(tmp_path):
     assert "lock lost" in kinds(run)
     assert abs(limit - 36) < 2 * u  # an even distribution ends at 1.7 u
     assert u < 0.5
+
+
+@pytest.mark.parametrize(("slips_hz", "most_u_hz"), [(0.0, 0.025), (0.9, 0.35)])
+def test_counts_that_scatter_move_no_upper_limit(slips_hz, most_u_hz):
+    """A count over half a second scatters by 0.08 Hz, where a step of the drive is 0.05 Hz."""
+    random, off, u = np.random.default_rng(5), [], []
+    for _ in range(1000):
+        held = 36.0
+        edge = held + random.uniform(-slips_hz, 0.05)  # one that slips is lost up to so much earlier
+        steps = held - 0.05 * np.arange(100)[::-1]
+        counts = steps + 0.08 * random.standard_normal(100)
+        counts[-1] -= slips_hz
+        limit = _limit_of_loss(
+            LimitSettings(), (held, held + 0.05), [(0.0, *one) for one in zip(counts, steps, strict=True)]
+        )
+        off.append(limit["spin_frequency_hz"] - edge)
+        u.append(limit["spin_frequency_u_hz"])
+    # four standard errors; of a top that slips, what its count is taken to be higher than it is, halved, too
+    assert abs(np.mean(off)) < 4 * np.std(off) / 1000**0.5 + 0.5 * 2 * 0.08 * (slips_hz > 0)
+    assert np.mean(u) < most_u_hz
 
 
 def test_a_top_that_is_lost_as_the_creep_begins_has_no_limit(tmp_path, monkeypatch):
