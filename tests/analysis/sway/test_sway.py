@@ -78,7 +78,7 @@ def test_the_vertical_swing_is_that_of_the_lines_beside(fresh):
 def test_the_vertical_swing_has_its_uncertainty(fresh, beside, rising):
     times = np.arange(2400) / 120
     pulls, u = [], []
-    for _ in range(12):
+    for _ in range(8):
         rise = fresh.normal(1.198, 0.03)  # that of the usual field
         places = swing(times, (-0.5945, 0.7400)) + 1e-4 * (fresh.normal(size=2400) + 1j * fresh.normal(size=2400))
         for frequency in (0.74 - rise, rise - 0.5945, 0.74 + rise, -0.5945 - rise):
@@ -88,11 +88,11 @@ def test_the_vertical_swing_has_its_uncertainty(fresh, beside, rising):
         pulls.append((found.value - rise) / found.u)
         u.append(found.u)
     if rising:  # bound of Cramér and Rao of a sine of 50 µm in noise of 200 µm, whose amplitude is known to 12 %
-        assert np.mean(u) == pytest.approx(np.sqrt(6 / 2400) * (2e-4 / 5e-5) / (np.pi * 20), rel=4 * 0.12 / np.sqrt(12))
+        assert np.mean(u) == pytest.approx(np.sqrt(6 / 2400) * (2e-4 / 5e-5) / (np.pi * 20), rel=4 * 0.12 / np.sqrt(8))
     elif not beside:  # nothing shows it
         assert np.mean(u) == pytest.approx(0.03, rel=0.1)
-    assert abs(np.mean(pulls)) < 4 / np.sqrt(12)  # 4 standard errors
-    assert np.std(pulls) == pytest.approx(1, abs=4 / np.sqrt(24))
+    assert abs(np.mean(pulls)) < 4 / np.sqrt(8)  # 4 standard errors
+    assert 0.2 < np.std(pulls) < 2  # 4 of a standard deviation from 8
 
 
 def test_heights_that_are_all_alike_say_nothing():
