@@ -69,6 +69,7 @@ def test_a_simulation_that_fails_leaves_no_folder(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_runs_lists_a_simulation_with_its_states_and_analyze_says_that_it_is_none_of_its_own(levilab):
     done = levilab("simulate", "friction", "--duration", "2", "--out", "runs")
     assert "stayed up for all of 2 s" in done.stdout
@@ -85,6 +86,7 @@ def test_runs_lists_a_simulation_with_its_states_and_analyze_says_that_it_is_non
 # --- what it prints ---
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_json_has_units_in_its_names_and_the_folder(levilab, tmp_path):
     text = levilab("simulate", "undriven", "--duration", "3", "--json", "--out", "here").stdout
     document = json.loads(text)
@@ -121,6 +123,7 @@ def test_a_chaotic_motion_is_reported_to_be_one():
     assert "nodes it is averaged over leave an error of 4e-07" in note
 
 
+@pytest.mark.usefixtures("undrawn_figures")
 def test_too_low_a_rate_for_the_lines_is_reported_where_states_are_written(levilab, tmp_path):
     words = ("simulate", "undriven", "--duration", "5", "--rate", "50", "--json")
     written = json.loads(levilab(*words, "--out", str(tmp_path)).stdout)

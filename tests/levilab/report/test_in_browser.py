@@ -94,7 +94,7 @@ def test_a_figure_is_enlarged_and_whole_again(desk):
 
 
 def test_what_is_folded_is_opened_for_the_printer_and_folded_again(desk):
-    folded = desk.locator("details:not([open])")
+    folded = desk.locator("details:not([open], .on-paper-out, .on-paper-summary)")
     count = folded.count()
     assert count > 0
     desk.evaluate("window.dispatchEvent(new Event('beforeprint'))")
