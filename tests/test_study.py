@@ -24,8 +24,6 @@ CHOSEN = {
 
 def page_module():
     spec = importlib.util.spec_from_file_location("study_page", STUDY / "page.py")
-    assert spec
-    assert spec.loader
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -28,7 +28,6 @@ def test_an_error_that_all_limits_share_stays_in_the_mean_of_a_run_and_of_runs()
 
 def test_the_published_limits_have_the_published_statistics():
     found = summarize(Sample(THESIS))
-    assert found.scatter
     assert found.scatter.value == pytest.approx(0.25, abs=0.005)
     assert (found.mean.value, found.mean.u) == pytest.approx((21.86, 0.08), abs=0.005)
     assert found.outliers == ()
@@ -47,8 +46,6 @@ def test_the_uncertainty_of_a_loss_on_the_way_up_is_its_scatter():
         times = np.arange(random.uniform(0, 0.5), lost, 0.5)
         counts = np.interp(times, fine, spins) + 0.06 * random.standard_normal(times.size)
         found = spin_at_loss(times, counts, (float(times[-1]), float(times[-1]) + 0.5))
-        assert found.value is not None
-        assert found.u is not None
         pulls.append((found.value - np.interp(lost, fine, spins)) / found.u)
     assert abs(np.mean(pulls)) < 0.15  # 3 standard errors of 400
     assert np.std(pulls) == pytest.approx(1, abs=0.12)
@@ -64,8 +61,6 @@ def test_the_uncertainty_of_a_fall_is_its_scatter():
         times = np.arange(random.uniform(0, 2), falls, 2.0)
         spins = (start**-0.5 + c * times / 2) ** -2 / (2 * math.pi) + 0.06 * random.standard_normal(times.size)
         found = spin_at_fall(times, spins, 0.06, (float(times[-1]), float(times[-1]) + 2.0))
-        assert found.value is not None
-        assert found.u is not None
         pulls.append((found.value - fall_hz) / found.u)
     assert np.mean(pulls) == pytest.approx(0, abs=0.15)  # 3 standard errors of the mean of 400
     assert np.std(pulls) == pytest.approx(1, abs=0.12)  # 3 of a standard deviation
@@ -156,14 +151,12 @@ def test_limits_that_go_down_top_by_top_drift():
     limits = 22.0 - 0.1 * np.arange(8) + np.array([0.01, -0.02, 0.02, 0.0, -0.01, 0.01, -0.02, 0.01])
     found = summarize(Sample(limits))
     assert found.drifts
-    assert found.trend
     assert found.trend.value == pytest.approx(-0.1, abs=0.01)
 
 
 @pytest.mark.parametrize("first", [0.1, 21.3, 60.0, 21.86])
 def test_an_even_series_has_a_trend_without_rounding_noise(first):
     found = summarize(Sample(first + 0.1 * np.arange(10)))
-    assert found.trend
     assert found.trend.value == pytest.approx(0.1, rel=1e-12)
     assert (found.trend.u, found.trend_p, found.outliers) == (0.0, 0.0, ())
 
@@ -171,21 +164,16 @@ def test_an_even_series_has_a_trend_without_rounding_noise(first):
 @pytest.mark.parametrize("limit", [0.1, 21.86, 67.1])
 def test_equal_limits_have_no_scatter_however_their_mean_is_rounded(limit):
     found = summarize(Sample(np.full(10, limit)))
-    assert found.scatter
     assert (found.mean.u, found.scatter.value, found.trend, found.outliers) == (0.0, 0.0, None, ())
     several = combine([Sample(np.full(10, limit)), Sample(np.full(7, limit))])
-    assert several.scatter
-    assert several.between
     assert (several.mean.u, several.scatter.value, several.between.value) == (0.0, 0.0, 0.0)
     apart = combine([Sample(np.full(10, limit)), Sample(np.full(7, limit + 0.1))])
-    assert apart.between
     assert apart.between.value == pytest.approx(0.1 / math.sqrt(2))
 
 
 def test_a_scatter_just_above_rounding_counts():
     random = np.random.default_rng(1)
     found = summarize(Sample(21.86 * (1 + 1e-12 * random.standard_normal(10))))
-    assert found.scatter
     assert found.scatter.value == pytest.approx(21.86e-12, rel=0.6)  # ten tell a scatter to a quarter
 
 

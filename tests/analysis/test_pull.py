@@ -81,7 +81,6 @@ def kept(subject):
 def in_motion(entry):
     """Return the top of a creep in full motion: the scene `spindown`, which leans in step with its moment."""
     found = stability_of(preset("spindown"))
-    assert found.floating is not None
     resonance = wobble_resonance(found.field, found.top, found.floating.height)
     return Driven(PER_TESLA * float(entry["field_t"]), DRAG, float(entry["creep_hz_per_s"]), resonance)
 

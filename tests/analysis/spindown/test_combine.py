@@ -129,7 +129,6 @@ def test_the_common_exponent_is_that_of_one_fit_to_all_readings(u):
     fitted = runs(u)
     _, exponent, expected_u = joint_chi_square(fitted)
     joint = joint_exponent(fitted)
-    assert joint is not None
     assert joint.value == pytest.approx(exponent, abs=0.3 * expected_u)  # the noise of each run is estimated from it
     assert joint.curvature**-0.5 == pytest.approx(expected_u, rel=0.25)
     stats = combine(fitted).fit("power").statistics

@@ -197,5 +197,4 @@ def test_a_drive_that_was_left_on_goes_off_even_if_the_counter_is_not_there(tmp_
     with pytest.raises(InstrumentError, match="counter"):
         acquire(mock(tmp_path), Silent())
     answer = left[0].instruments[VIRTUAL["generator"].address].execute("OUTP1?")
-    assert answer is not None
     assert answer.data == b"0\n"

@@ -118,7 +118,6 @@ def test_a_clock_that_is_measured_again_replaces_its_lines_alone(tmp_path):
     lines = [line for line in path.read_text(encoding="utf-8").splitlines() if "clock_" not in line]
     assert lines == [line for line in BENCH.splitlines() if "clock_" not in line]
     config = read_bench(path, BenchConfig)
-    assert config.oscilloscope is not None
     assert (config.oscilloscope.clock_error, config.oscilloscope.clock_u) == (4.7e-5, 1.1e-6)
 
 

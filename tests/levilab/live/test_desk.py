@@ -14,13 +14,13 @@ class Talking:
 
     said: list[PracticeEvent]
 
-    def events(self) -> list[PracticeEvent]:
+    def events(self):
         return self.said
 
 
-def test_what_is_said_of_a_run_is_marked_since_it_stands_among_its_events() -> None:
+def test_what_is_said_of_a_run_is_marked_since_it_stands_among_its_events():
     kinds = ("message", "recording", "message", "refused", "recorded", "message")
-    desk = Desk(Talking([PracticeEvent(kind, "x", folder="runs/one") for kind in kinds]))  # type: ignore[arg-type]
+    desk = Desk(Talking([PracticeEvent(kind, "x", folder="runs/one") for kind in kinds]))
     desk.step()
     assert desk.about["runs"] == ["one"]
     assert [one["of_run"] for one in desk.events_after(0)] == [False, False, True, False, False, False]

@@ -1,20 +1,12 @@
 """Who may look, and who may give commands."""
 
-from __future__ import annotations
-
 import json
-from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from levilab.live.doors import Doors
-from levilab.live.practice.commands import EventKind, PracticeEvent
+from levilab.live.practice.commands import PracticeEvent
 from support.live_pages import PATIENCE_S, GrowingRun, address, request, serving
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from levilab.live.server import Hall
 
 HERE = b"127.0.0.1:8765"
 
@@ -32,43 +24,43 @@ HERE = b"127.0.0.1:8765"
         (HERE, b"null", True, False),
     ],
 )
-def test_only_pages_of_this_server_come_in(host: bytes, origin: bytes | None, socket: bool, inside: bool) -> None:
+def test_only_pages_of_this_server_come_in(host, origin, socket, inside):
     headers = [(b"Host", host), *([(b"Origin", origin)] if origin else [])]
     assert Doors(8765).lets_in(headers, is_socket=socket) is inside
 
 
 @pytest.mark.parametrize("hosts", [[], [b"evil.example", HERE], [HERE, HERE]])
-def test_a_request_without_one_host_stays_outside(hosts: list[bytes]) -> None:
+def test_a_request_without_one_host_stays_outside(hosts):
     assert not Doors(8765).lets_in([(b"host", host) for host in hosts], is_socket=False)
 
 
 class Bench:
     """Stands for the bench for practice: keeps the commands."""
 
-    def __init__(self) -> None:
-        self.commands: list[Any] = []
-        self.answers: list[PracticeEvent] = []
+    def __init__(self):
+        self.commands = []
+        self.answers = []
 
     address = None
 
-    def command(self, command: Any) -> int:
+    def command(self, command):
         self.commands.append(command)
-        kind: EventKind = "refused" if command.do == "stop the run" else "done"
+        kind = "refused" if command.do == "stop the run" else "done"
         self.answers.append(PracticeEvent(kind, "no run", len(self.commands)))
         return len(self.commands)
 
-    def events(self) -> list[PracticeEvent]:
+    def events(self):
         answers, self.answers = self.answers, []
         return answers
 
 
 @pytest.fixture(scope="module")
-def bench() -> Bench:
+def bench():
     return Bench()
 
 
 @pytest.fixture(scope="module")
-def hall(tmp_path_factory: pytest.TempPathFactory, bench: Bench) -> Iterator[Hall]:
+def hall(tmp_path_factory, bench):
     from levilab.live.desk import Desk
 
     root = tmp_path_factory.mktemp("runs")
@@ -77,11 +69,11 @@ def hall(tmp_path_factory: pytest.TempPathFactory, bench: Bench) -> Iterator[Hal
     (root / "one" / "secret.txt").write_text("secret", encoding="utf-8")
     (root.parent / "run.json").write_text("{}", encoding="utf-8")
     (root / "one" / "linked.png").symlink_to(root / "one" / "secret.txt")
-    with serving(root, desk=Desk(bench)) as hall:  # type: ignore[arg-type]
+    with serving(root, desk=Desk(bench)) as hall:
         yield hall
 
 
-def test_another_name_for_this_machine_is_turned_away(hall: Hall) -> None:
+def test_another_name_for_this_machine_is_turned_away(hall):
     assert request(address(hall), "/runs", headers={"Host": "evil.example"})[0] == 421
 
 
@@ -91,12 +83,12 @@ def test_another_name_for_this_machine_is_turned_away(hall: Hall) -> None:
      "/page/..%2fserver.py", "/page/none.js", "/run/two/report.html", "/run/one/linked.png",
      f"/run/{5000 * 'a'}/report.html"],
 )  # fmt: skip
-def test_nothing_but_figures_and_the_report_is_served(hall: Hall, path: str) -> None:
+def test_nothing_but_figures_and_the_report_is_served(hall, path):
     status, text = request(address(hall), path)
     assert (status, "secret" in text) == (404, False)
 
 
-def test_a_report_is_a_page_of_no_origin(hall: Hall) -> None:
+def test_a_report_is_a_page_of_no_origin(hall):
     import urllib.request
 
     with urllib.request.urlopen(address(hall) + "run/one/report.html") as answer:
@@ -105,7 +97,7 @@ def test_a_report_is_a_page_of_no_origin(hall: Hall) -> None:
     assert "allow-same-origin" not in policy
 
 
-def test_a_command_needs_the_token(hall: Hall, bench: Bench) -> None:
+def test_a_command_needs_the_token(hall, bench):
     wanted = b'{"do": "pause", "on": true}'
     for wrong in ({}, {"X-Levilab-Token": "guess"}):
         assert request(address(hall), "/do", wanted, headers=wrong)[0] == 403
@@ -120,7 +112,7 @@ def test_a_command_needs_the_token(hall: Hall, bench: Bench) -> None:
     [{}, [], "x", {"do": "explode"}, {"do": "pause", "on": "yes"}, {"do": "analyze", "run": ".."},
      {"do": "tune the drive", "frequency_hz": "30"}, {"do": "stop the run"}],
 )  # fmt: skip
-def test_what_is_no_command_is_refused_in_words(hall: Hall, wanted: object) -> None:
+def test_what_is_no_command_is_refused_in_words(hall, wanted):
     right = {"X-Levilab-Token": hall.doors.token}
     status, text = request(address(hall), "/do", json.dumps(wanted).encode(), headers=right)
     assert status in {400, 404, 409}
@@ -128,9 +120,7 @@ def test_what_is_no_command_is_refused_in_words(hall: Hall, wanted: object) -> N
 
 
 @pytest.mark.parametrize(("question", "code"), [(b"{}", 1003), (5000 * "x", 1009)])
-def test_a_question_that_is_no_text_or_too_long_closes_the_socket(
-    hall: Hall, question: bytes | str, code: int, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_question_that_is_no_text_or_too_long_closes_the_socket(hall, question, code, caplog):
     from websockets.exceptions import ConnectionClosed
     from websockets.sync.client import connect
 
@@ -138,12 +128,11 @@ def test_a_question_that_is_no_text_or_too_long_closes_the_socket(
         socket.send(question)
         with pytest.raises(ConnectionClosed) as closed:
             socket.recv(timeout=PATIENCE_S)
-    assert closed.value.rcvd is not None
     assert closed.value.rcvd.code == code
     assert not [record for record in caplog.records if record.name.startswith("uvicorn")]
 
 
-def test_a_request_that_is_no_http_prints_nothing(hall: Hall, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_request_that_is_no_http_prints_nothing(hall, caplog):
     import socket
 
     with socket.create_connection(("127.0.0.1", hall.doors.port), timeout=PATIENCE_S) as raw:

@@ -1,11 +1,8 @@
 """A run folder read as it grows: torn lines, replaced files, and a memory that does not grow with it."""
 
-from __future__ import annotations
-
 import os
 import sys
 import tracemalloc
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -17,11 +14,8 @@ from levilab.live.follow import MOST_EVENTS, Followed
 from levilab.live.tail import Tail
 from support.live_pages import GrowingRun, spin_down
 
-if TYPE_CHECKING:
-    from pathlib import Path
 
-
-def look(followed: Followed) -> Followed:
+def look(followed):
     followed.look()
     while followed.behind:
         followed.look()
@@ -29,7 +23,7 @@ def look(followed: Followed) -> Followed:
 
 
 @given(st.lists(st.integers(1, 40), min_size=1, max_size=30), st.integers(2, 16))
-def test_an_envelope_holds_the_lowest_the_highest_and_the_mean_of_all(blocks: list[int], half: int) -> None:
+def test_an_envelope_holds_the_lowest_the_highest_and_the_mean_of_all(blocks, half):
     rng = np.random.default_rng(sum(blocks))
     rows = rng.normal(size=(sum(blocks), 2))
     rows[rng.random(rows.shape) < 0.1] = np.nan
@@ -48,7 +42,7 @@ def test_an_envelope_holds_the_lowest_the_highest_and_the_mean_of_all(blocks: li
     assert envelope.count == len(rows)
 
 
-def test_a_million_readings_take_no_more_memory_than_ten_thousand(tmp_path: Path) -> None:
+def test_a_million_readings_take_no_more_memory_than_ten_thousand(tmp_path):
     run = GrowingRun(tmp_path)
     run.add("".join(f"{0.04 * k:.2f},{30 + k % 7:.4f},0.03\n" for k in range(100_000)))
     followed = look(Followed(run.folder))
@@ -67,7 +61,7 @@ def test_a_million_readings_take_no_more_memory_than_ten_thousand(tmp_path: Path
     assert envelope.groups().high[1].max() == 36
 
 
-def test_a_torn_last_line_waits_for_its_end(tmp_path: Path) -> None:
+def test_a_torn_last_line_waits_for_its_end(tmp_path):
     run = GrowingRun(tmp_path)
     followed = Followed(run.folder)
     run.add("0.5,39.8")
@@ -76,7 +70,7 @@ def test_a_torn_last_line_waits_for_its_end(tmp_path: Path) -> None:
     assert look(followed).readings.latest().mean.T.tolist() == [[0.5, 39.87, 0.03]]
 
 
-def test_missing_values_and_damaged_lines_do_no_harm(tmp_path: Path) -> None:
+def test_missing_values_and_damaged_lines_do_no_harm(tmp_path):
     run = GrowingRun(tmp_path)
     run.add("0.5,,0.03\n\0\0\n1.5,9.91e37,0.03\nx,y,z\n2.5,37.0,0.03,9\n3.5,36.5,0.03\n")
     found = look(Followed(run.folder)).readings.latest().mean
@@ -84,7 +78,7 @@ def test_missing_values_and_damaged_lines_do_no_harm(tmp_path: Path) -> None:
     assert np.isnan(found[1, :2]).all()
 
 
-def test_a_file_that_is_replaced_is_read_anew(tmp_path: Path) -> None:
+def test_a_file_that_is_replaced_is_read_anew(tmp_path):
     run = GrowingRun(tmp_path)
     run.readings(spin_down(5))
     followed = look(Followed(run.folder))
@@ -97,7 +91,7 @@ def test_a_file_that_is_replaced_is_read_anew(tmp_path: Path) -> None:
     assert followed.version > version
 
 
-def test_events_are_kept_up_to_a_number_and_damaged_ones_named(tmp_path: Path) -> None:
+def test_events_are_kept_up_to_a_number_and_damaged_ones_named(tmp_path):
     run = GrowingRun(tmp_path)
     for k in range(MOST_EVENTS + 50):
         run.event(f"event {k}", time_s=float(k))
@@ -112,14 +106,14 @@ def test_events_are_kept_up_to_a_number_and_damaged_ones_named(tmp_path: Path) -
     assert len(texts[-1]["text"]) == 600
 
 
-def test_a_run_whose_process_is_gone_is_interrupted(tmp_path: Path) -> None:
+def test_a_run_whose_process_is_gone_is_interrupted(tmp_path):
     run = GrowingRun(tmp_path)
     with run.running():
         assert look(Followed(run.folder)).status == "running"
     assert look(Followed(run.folder)).status == "interrupted"
 
 
-def test_a_record_that_cannot_be_read_is_said_and_waited_for(tmp_path: Path) -> None:
+def test_a_record_that_cannot_be_read_is_said_and_waited_for(tmp_path):
     run = GrowingRun(tmp_path)
     (run.folder / "run.json").write_text("{", encoding="utf-8")
     followed = look(Followed(run.folder))
@@ -129,12 +123,12 @@ def test_a_record_that_cannot_be_read_is_said_and_waited_for(tmp_path: Path) -> 
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no pipes in folders")
-def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(tmp_path: Path) -> None:
+def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "readings.csv")
     assert Tail(tmp_path / "readings.csv").lines() == []
 
 
-def test_columns_of_a_picture_hold_the_extremes() -> None:
+def test_columns_of_a_picture_hold_the_extremes():
     x = np.arange(10_000.0)
     y = np.sin(x)
     middle, low, high = by_columns(x, y, y, 100)

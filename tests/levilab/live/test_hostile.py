@@ -3,8 +3,6 @@
 Each of them goes on until the page has what it asked for, so a page that they hold up would wait for ever.
 """
 
-from __future__ import annotations
-
 import contextlib
 import socket
 import struct
@@ -12,17 +10,11 @@ import sys
 import threading
 from collections import deque
 from itertools import repeat
-from typing import TYPE_CHECKING
 
 import pytest
 from websockets.sync.client import connect
 
 from support.live_pages import PATIENCE_S, GrowingRun, address, request, serving, spin_down, wait_for
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
-
-    from levilab.live.server import Hall
 
 UPGRADE = (
     "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
@@ -34,7 +26,7 @@ AT_ONCE = struct.pack("hh" if sys.platform == "win32" else "ii", 1, 0)
 REQUEST = b"GET /runs HTTP/1.1\r\nHost: a\r\n\r\n"
 
 #: The first line, the rest of the head, and what is sent then, over and over; no answer is read.
-ENDLESS: dict[str, tuple[str, str, Iterable[bytes]]] = {
+ENDLESS = {
     "nothing": ("GET /", "", ()),
     "byte by byte": ("GET /", "X-Slow: ", repeat(b"x")),
     "huge length": ("POST /do", f"Content-Length: {1 << 40}\r\n\r\n", repeat(bytes(1 << 16))),
@@ -45,14 +37,14 @@ ENDLESS: dict[str, tuple[str, str, Iterable[bytes]]] = {
 
 
 @pytest.fixture(scope="module")
-def hall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
+def hall(tmp_path_factory):
     root = tmp_path_factory.mktemp("runs")
     GrowingRun(root, "one").readings(spin_down(19))
     with serving(root) as hall:
         yield hall
 
 
-def be_hostile(port: int, what: str, begun: deque[socket.socket], over: threading.Event) -> None:
+def be_hostile(port, what, begun, over):
     """Connect and send without end, or leave at once and come again."""
     first, head, pieces = ENDLESS["requests" if what == "leaving" else what]
     while not over.is_set():
@@ -68,8 +60,8 @@ def be_hostile(port: int, what: str, begun: deque[socket.socket], over: threadin
 
 
 @pytest.mark.parametrize("what", [*ENDLESS, "leaving"])
-def test_a_page_gets_its_frames_beside_hostile_programs(hall: Hall, what: str) -> None:
-    begun: deque[socket.socket] = deque()
+def test_a_page_gets_its_frames_beside_hostile_programs(hall, what):
+    begun = deque()
     over = threading.Event()
     threads = [threading.Thread(target=be_hostile, args=(hall.doors.port, what, begun, over)) for _ in range(3)]
     for thread in threads:

@@ -1,9 +1,5 @@
 """The running fit: its forecast, and the u that the analysis gives."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 import pytest
 
@@ -18,13 +14,10 @@ from levilab.live.watch import Watch
 from levilab.present.numbers import with_uncertainty
 from support.live_pages import GrowingRun
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
 C32, START_HZ, RESONANCE_HZ, TILT_RAD = 2.3e-4, 34.0, 21.4, 0.025
 
 
-def test_the_forecast_is_of_the_law_and_does_not_run_into_the_resonance() -> None:
+def test_the_forecast_is_of_the_law_and_does_not_run_into_the_resonance():
     time = np.arange(0.5, 116.0, 2.0)
     q = LAWS["disc"].dimensionless([START_HZ, C32], START_HZ, time[-1])
     spin = START_HZ * count_of(LAWS["disc"], time / time[-1], np.array([*q, TILT_RAD**2, RESONANCE_HZ / START_HZ, 0.0]))
@@ -51,7 +44,7 @@ def test_the_forecast_is_of_the_law_and_does_not_run_into_the_resonance() -> Non
 
 
 @pytest.mark.parametrize("levels_off", [(), (2,), (1, 2, 3)])
-def test_tops_that_level_off_count_as_in_the_analysis(tmp_path: Path, levels_off: tuple[int, ...]) -> None:
+def test_tops_that_level_off_count_as_in_the_analysis(tmp_path, levels_off):
     columns = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz", "spin_seen_hz")
     run = GrowingRun(
         tmp_path,
@@ -68,18 +61,16 @@ def test_tops_that_level_off_count_as_in_the_analysis(tmp_path: Path, levels_off
     watch = Watch(run.folder)
     watch.step()
     task = watch.fit_task()
-    assert task is not None
     shown = task[1]()
-    assert shown is not None
     mean = analyze(run.folder, kind="limit").values["mean"]
     assert shown.lines[0] == with_uncertainty(Estimate(mean.value, mean.u, "Hz"))
-    notes: dict[int, list[str]] = {0: [], 1: ["without 1 of 3 tops that only got no faster"]}
+    notes = {0: [], 1: ["without 1 of 3 tops that only got no faster"]}
     assert list(shown.lines[1:]) == notes.get(len(levels_off), ["the drive pulls no further: no limits of the top"])
 
 
 @pytest.mark.parametrize("which", ["lower", "upper"])
 @pytest.mark.parametrize("count", [1, 2, 5])
-def test_the_mean_of_limits_has_the_u_of_the_analysis(tmp_path: Path, which: str, count: int) -> None:
+def test_the_mean_of_limits_has_the_u_of_the_analysis(tmp_path, which, count):
     settings = {"limit": {"which": which}}
     run = GrowingRun(tmp_path, "20261122T100000Z-limit-0000", experiment="limit", configuration=settings)
     run.readings([(10.0 * k, 23.23 + 0.009 * k, 0.036 * (1 + k % 2)) for k in range(count)])
@@ -87,5 +78,4 @@ def test_the_mean_of_limits_has_the_u_of_the_analysis(tmp_path: Path, which: str
     rows = np.loadtxt(run.folder / "readings.csv", delimiter=",", skiprows=1, ndmin=2).T
     shown = fit_so_far("limit", tuple(columns), Groups(1, rows, rows, rows), settings["limit"])
     result = analyze(run.folder, kind="limit")
-    assert shown is not None
     assert shown.lines == (with_uncertainty(Estimate(result.values["mean"].value, result.values["mean"].u, "Hz")),)

@@ -1,11 +1,8 @@
 """Guests from the network look on, and can do nothing else."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import socket
-from typing import TYPE_CHECKING
 from urllib.parse import urlsplit
 from urllib.request import urlopen
 
@@ -19,19 +16,11 @@ from levilab.live.share import NoNetwork, address_in_network, code_of, who_may_l
 from support.browser import PHONE
 from support.live_pages import PATIENCE_S, GrowingRun, address, address_for_guests, request, serving, spin_down, until
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from playwright.sync_api import Page
-
-    from levilab.live.server import Hall
-
 COMMANDS = [{"do": "pause", "on": True}, {"do": "analyze", "run": "one"}, {"do": "switch the drive", "on": True}]
 
 
 @pytest.fixture(scope="module")
-def hall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
+def hall(tmp_path_factory):
     root = tmp_path_factory.mktemp("runs")
     run = GrowingRun(root, "one")
     run.readings(spin_down(19))
@@ -41,12 +30,12 @@ def hall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
         yield hall
 
 
-def inside(hall: Hall, path: str) -> str:
+def inside(hall, path):
     return urlsplit(address_for_guests(hall)).path + path
 
 
 @pytest.mark.parametrize("path", ["", "runs", "parts", "page/live.js"])
-def test_a_guest_sees_what_the_view_shows(hall: Hall, path: str) -> None:
+def test_a_guest_sees_what_the_view_shows(hall, path):
     there = address_for_guests(hall)
     assert request(there, inside(hall, path))[0] == 200
     for wrong in ("", "guess/", f"{hall.doors.token}/"):
@@ -54,8 +43,8 @@ def test_a_guest_sees_what_the_view_shows(hall: Hall, path: str) -> None:
     assert request(there, inside(hall, path), headers={"Host": "evil.example"})[0] == 421
 
 
-def test_guests_who_ask_without_pause_share_a_list(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
-    listed: list[Path] = []
+def test_guests_who_ask_without_pause_share_a_list(hall, monkeypatch):
+    listed = []
     monkeypatch.setattr("levilab.live.server.choices", lambda root: listed.append(root) or [])
     monkeypatch.setattr("levilab.live.server.LISTED_EVERY_S", 3600.0)
     for _ in range(3):
@@ -69,7 +58,7 @@ def test_guests_who_ask_without_pause_share_a_list(hall: Hall, monkeypatch: pyte
      "page/..%2fserver.py", "page/..%2f..%2f..%2fpyproject.toml", "..%2fdo", "%2e%2e/do"],
 )  # fmt: skip
 @pytest.mark.parametrize("method", ["GET", "POST", "PUT", "DELETE"])
-def test_nothing_else_is_there_for_a_guest(hall: Hall, path: str, method: str) -> None:
+def test_nothing_else_is_there_for_a_guest(hall, path, method):
     for token in (hall.doors.token, urlsplit(address_for_guests(hall)).path.strip("/")):
         there, headers, body = address_for_guests(hall), {"X-Levilab-Token": token}, json.dumps(COMMANDS[0]).encode()
         status, text = request(there, inside(hall, path), body, method=method, headers=headers)
@@ -77,18 +66,18 @@ def test_nothing_else_is_there_for_a_guest(hall: Hall, path: str, method: str) -
         assert "secret" not in text
 
 
-def test_a_guest_without_the_token_gets_no_frames(hall: Hall) -> None:
+def test_a_guest_without_the_token_gets_no_frames(hall):
     there = address_for_guests(hall).replace("http", "ws")
     for wrong in (there.rsplit("/", 2)[0] + "/frames", there + "do"):
         with pytest.raises(InvalidStatus) as refused, connect(wrong):
             pass
         assert refused.value.response.status_code == 403
-    with pytest.raises(InvalidStatus), connect(there + "frames", origin="http://evil.example"):  # type: ignore[arg-type]
+    with pytest.raises(InvalidStatus), connect(there + "frames", origin="http://evil.example"):
         pass
 
 
-def test_what_a_guest_says_commands_nothing(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
-    commands: list[object] = []
+def test_what_a_guest_says_commands_nothing(hall, monkeypatch):
+    commands = []
     monkeypatch.setattr(Desk, "carry_out", lambda _, wanted: commands.append(wanted))
     monkeypatch.setattr(type(hall.analyses), "begin", lambda _, wanted: commands.append(wanted))
     with connect(address_for_guests(hall).replace("http", "ws") + "frames?run=one") as guest:
@@ -98,7 +87,7 @@ def test_what_a_guest_says_commands_nothing(hall: Hall, monkeypatch: pytest.Monk
     assert commands == []
 
 
-def test_a_guest_is_not_told_where_the_runs_lie(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_guest_is_not_told_where_the_runs_lie(hall, monkeypatch):
     said = [{"n": 1, "kind": "message", "text": f"writes {hall.root / 'one'}"}]
     monkeypatch.setattr(Desk, "events_after", lambda *_: said)
     with connect(address_for_guests(hall).replace("http", "ws") + "frames?run=one") as guest:
@@ -108,7 +97,7 @@ def test_a_guest_is_not_told_where_the_runs_lie(hall: Hall, monkeypatch: pytest.
     assert b"writes one" in frame
 
 
-def test_more_guests_than_are_let_in_wait(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_guests_than_are_let_in_wait(hall, monkeypatch):
     monkeypatch.setattr("levilab.live.server.MOST_GUESTS", 1)
     there = address_for_guests(hall).replace("http", "ws") + "frames?run=one"
     with connect(there) as first, connect(there) as second:
@@ -116,13 +105,10 @@ def test_more_guests_than_are_let_in_wait(hall: Hall, monkeypatch: pytest.Monkey
         assert first.recv(timeout=PATIENCE_S)
         with pytest.raises(ConnectionClosed) as closed:
             second.recv(timeout=PATIENCE_S)
-    assert closed.value.rcvd is not None
     assert closed.value.rcvd.code == 1013
 
 
-def test_a_stranger_in_the_network_does_not_close_the_page_at_the_bench(
-    hall: Hall, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_stranger_in_the_network_does_not_close_the_page_at_the_bench(hall, monkeypatch):
     monkeypatch.setattr("levilab.live.serve._MOST_OF_GUESTS", 3)
     there = urlsplit(address_for_guests(hall))
     with contextlib.ExitStack() as at_end:
@@ -136,7 +122,7 @@ def test_a_stranger_in_the_network_does_not_close_the_page_at_the_bench(
             assert answer.status == 200
 
 
-def test_a_connection_without_a_request_is_closed(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_connection_without_a_request_is_closed(hall, monkeypatch):
     monkeypatch.setattr("levilab.live.serve._FIRST_REQUEST_S", 0.05)
     there = urlsplit(address_for_guests(hall))
     with socket.create_connection((there.hostname, there.port), timeout=PATIENCE_S) as slow:
@@ -144,7 +130,7 @@ def test_a_connection_without_a_request_is_closed(hall: Hall, monkeypatch: pytes
         assert slow.recv(1) == b""
 
 
-def test_a_phone_sees_the_practice_bench_without_its_controls(hall: Hall, watched: Callable[..., Page]) -> None:
+def test_a_phone_sees_the_practice_bench_without_its_controls(hall, watched):
     page = watched(viewport=PHONE, color_scheme="dark")
     page.goto(address_for_guests(hall))
     until(page, "levilab.data.bench && Number(document.getElementById('spin-value').textContent) > 20")
@@ -154,11 +140,10 @@ def test_a_phone_sees_the_practice_bench_without_its_controls(hall: Hall, watche
         page.keyboard.press(key)
     assert page.evaluate("document.getElementById('practice').hidden")
     assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
-    assert hall.desk
     assert hall.desk.bench.may_record is False
 
 
-def test_the_code_is_a_square_with_its_three_marks() -> None:
+def test_the_code_is_a_square_with_its_three_marks():
     lines = code_of("http://192.168.1.7:8765/token-of-12/")
     rows = [[c not in light for c in line] for line in lines for light in ("█▀", "█▄")]  # two modules a character
     edge = [[True] * 7, *[[True, False, *[k in (2, 3, 4)] * 3, False, True] for k in range(1, 6)], [True] * 7]
@@ -167,8 +152,8 @@ def test_the_code_is_a_square_with_its_three_marks() -> None:
         assert [row[left : left + 7] for row in rows[top : top + 7]] == edge
 
 
-def test_without_a_network_nothing_is_shared(monkeypatch: pytest.MonkeyPatch) -> None:
-    def unreachable(*_: object) -> None:
+def test_without_a_network_nothing_is_shared(monkeypatch):
+    def unreachable(*_):
         raise OSError(101, "Network is unreachable")
 
     monkeypatch.setattr(socket.socket, "connect", unreachable)
@@ -176,17 +161,17 @@ def test_without_a_network_nothing_is_shared(monkeypatch: pytest.MonkeyPatch) ->
         address_in_network()
 
 
-def test_a_public_address_is_said_to_be_one() -> None:
+def test_a_public_address_is_said_to_be_one():
     assert "the address is public" in who_may_look("http://8.8.8.8:8765/token/")
 
 
-def test_nothing_is_shared_unless_it_is_asked_for(tmp_path: Path) -> None:
+def test_nothing_is_shared_unless_it_is_asked_for(tmp_path):
     from levilab.interruption import End
     from levilab.live.serve import LiveOptions, serve_live
 
     end, said = End(), []
 
-    def announce(own: str, shared: str) -> None:
+    def announce(own, shared):
         said.append((own, shared))
         assert end.wake
         end.wake()

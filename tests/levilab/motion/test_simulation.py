@@ -38,7 +38,6 @@ def summary(scene, duration, rate=100.0):
 def test_a_run_folder_holds_the_states_in_full_precision_the_scene_and_a_figure(tmp_path):
     scene = preset("undriven").changed({"start.spin_hz": 31.0})
     done = run_simulation(SimulationRequest(scene, 2.0, out=tmp_path), lambda _: None)
-    assert done.folder is not None
     header, *lines = (done.folder / "states.csv").read_text(encoding="utf-8").splitlines()
     assert header == HEADER == ",".join(column[0] for column in COLUMNS)
     table = np.array([[float(cell) for cell in line.split(",")] for line in lines])

@@ -1,7 +1,5 @@
 """The statistics, curve and intervals of a fitted model, beside lmfit's of the same readings and weights."""
 
-from __future__ import annotations
-
 import pickle
 
 import lmfit
@@ -12,16 +10,16 @@ import levilab
 from support.paths import SAMPLE_DATA
 
 
-def _disc(t, start_frequency, c32):  # type: ignore[no-untyped-def]
+def _disc(t, start_frequency, c32):
     return start_frequency / (1 + 0.5 * c32 * np.sqrt(2 * np.pi * start_frequency) * t) ** 2
 
 
 @pytest.fixture(scope="module")
-def result():  # type: ignore[no-untyped-def]
+def result():
     return levilab.analyze(SAMPLE_DATA / "spin-down-1")
 
 
-def test_a_law_that_fits_has_the_numbers_of_lmfit(result) -> None:  # type: ignore[no-untyped-def]
+def test_a_law_that_fits_has_the_numbers_of_lmfit(result):
     """The noise's correlation is averaged over here, which moves the parameters by a part of their u."""
     t, f, u = (result.data[name].to_numpy() for name in ("time_s", "spin_frequency_hz", "spin_frequency_u_hz"))
     theirs = lmfit.Model(_disc).fit(f, t=t, start_frequency=40.0, c32=2.4e-4, weights=1 / u)
@@ -43,7 +41,7 @@ def test_a_law_that_fits_has_the_numbers_of_lmfit(result) -> None:  # type: igno
     assert (ends[4][1] - ends[2][1]) / 2 == pytest.approx(np.sqrt(scale) * half, rel=0.1)
 
 
-def test_information_criteria_have_their_closed_forms(result) -> None:  # type: ignore[no-untyped-def]
+def test_information_criteria_have_their_closed_forms(result):
     """K counts the noise besides: AICc − AIC = 2K(K+1)/(n−K−1) and BIC − AIC = K(ln n − 2)."""
     for fit in result.models.values():
         k = fit.nvarys + 1
@@ -51,7 +49,7 @@ def test_information_criteria_have_their_closed_forms(result) -> None:  # type: 
         assert fit.bic - fit.aic == pytest.approx(k * (np.log(20) - 2))
 
 
-def test_u_of_a_curve_is_that_of_its_parameters() -> None:
+def test_u_of_a_curve_is_that_of_its_parameters():
     """By differences of the curve, parameter by parameter, in the place of the slopes' formulas."""
     line = levilab.analyze(SAMPLE_DATA / "precession-sweep").fit
     x = np.array([20.0, 32.0, 45.0])
@@ -64,7 +62,7 @@ def test_u_of_a_curve_is_that_of_its_parameters() -> None:
     fit, z = scan.fit, np.array([0.04, 0.07, 0.1])
     from analysis.field.ring import Ring, on_axis
 
-    def field(p):  # type: ignore[no-untyped-def]
+    def field(p):
         return on_axis(Ring(p[0], p[1], p[2], p[4], p[5]), z)[0] + p[3]
 
     ring = scan.found.runs[0].scan.ring
@@ -76,7 +74,7 @@ def test_u_of_a_curve_is_that_of_its_parameters() -> None:
     assert fit.eval_uncertainty(z) / fit._half_width(1) == pytest.approx(by_differences, rel=1e-4)
 
 
-def test_several_runs_have_statistics_together_and_a_curve_each() -> None:
+def test_several_runs_have_statistics_together_and_a_curve_each():
     both = levilab.analyze([SAMPLE_DATA / "spin-down-1", SAMPLE_DATA / "spin-down-2"])
     assert (both.ndata, both.nvarys) == (40, 4)  # start and constant of each
     assert both.fit.freedom == 1  # u is from the scatter of two
@@ -88,7 +86,7 @@ def test_several_runs_have_statistics_together_and_a_curve_each() -> None:
     assert both.models_by_input["spin-down-2"]["disc"].eval([0.0])[0] == pytest.approx(40.07, abs=0.02)
 
 
-def test_a_fit_pickles(result) -> None:  # type: ignore[no-untyped-def]
+def test_a_fit_pickles(result):
     again = pickle.loads(pickle.dumps(result.fit))
     assert again == result.fit
     assert again.best_fit == pytest.approx(result.best_fit)

@@ -1,7 +1,5 @@
 """Cells in a real JupyterLab, in a browser: what people see of runs, results, motions and errors."""
 
-from __future__ import annotations
-
 import json
 import os
 import re
@@ -11,19 +9,12 @@ import threading
 from collections import deque
 from contextlib import contextmanager
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from support.browser import PATIENCE_MS
 from support.paths import SAMPLE_DATA
 from support.waiting import HANG_GUARD_S
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from playwright.sync_api import Browser, Page
 
 #: What each cell holds.
 CELLS = (
@@ -37,7 +28,7 @@ CELLS = (
 )
 
 
-def _notebook() -> dict[str, Any]:
+def _notebook():
     cells = [
         {
             "id": f"cell-{k}",
@@ -57,13 +48,13 @@ def _notebook() -> dict[str, Any]:
 
 
 @contextmanager
-def _server(folder: Path) -> Iterator[str]:
+def _server(folder):
     """Run JupyterLab with settings of its own; gives its address."""
     own = {f"JUPYTER_{name}_DIR": str(folder / name) for name in ("CONFIG", "DATA", "RUNTIME")}
     environment = os.environ | own | {"IPYTHONDIR": str(folder / "ipython"), "JUPYTER_PREFER_ENV_PATH": "1"}
     words = [sys.executable, "-m", "jupyterlab", "--no-browser", "--allow-root", "--port=0", "--ServerApp.token="]
     words += ["--ServerApp.ip=127.0.0.1", f"--ServerApp.root_dir={folder}", "--LabApp.news_url="]
-    pipes: dict[str, Any] = {"stderr": subprocess.PIPE, "text": True, "encoding": "utf-8"}
+    pipes = {"stderr": subprocess.PIPE, "text": True, "encoding": "utf-8"}
     with subprocess.Popen(words, env=environment, cwd=folder, **pipes) as server:
         assert server.stderr
         rest = threading.Thread(target=deque, args=(server.stderr, 0))  # it must not wait for us to read
@@ -79,7 +70,7 @@ def _server(folder: Path) -> Iterator[str]:
 
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("jupyterlab") is None, reason="JupyterLab is not installed: make setup")
-def test_cells_in_jupyterlab_show_results_and_fold(browser: Browser, tmp_path: Path) -> None:
+def test_cells_in_jupyterlab_show_results_and_fold(browser, tmp_path):
     (tmp_path / "cells.ipynb").write_text(json.dumps(_notebook()), encoding="utf-8")
     with _server(tmp_path) as address:
         page = browser.new_page(viewport={"width": 1000, "height": 4000})
@@ -94,7 +85,7 @@ def test_cells_in_jupyterlab_show_results_and_fold(browser: Browser, tmp_path: P
         page.close()
 
 
-def _check(page: Page) -> None:
+def _check(page):
     run, result, figure, motion, animation, wrong, missing = (
         page.locator(".jp-Cell-outputArea").nth(k) for k in range(len(CELLS))
     )

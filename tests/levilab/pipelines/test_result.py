@@ -164,5 +164,4 @@ def test_keys_of_a_newer_version_are_passed_over(tmp_path):
 def test_a_result_read_and_written_again_is_the_same_text(tmp_path):
     file = write_result(tmp_path)
     result = read_result(file, SPINDOWN.model)
-    assert result
     assert result.as_dict() == json.loads(file.read_text(encoding="utf-8"))

@@ -57,7 +57,6 @@ def test_a_reading_answers_to_the_pointer_with_value_uncertainty_and_residual(de
     mark = desk.locator('[id="spindown-readings-0"] use').nth(2)
     mark.scroll_into_view_if_needed()
     box = mark.bounding_box()
-    assert box is not None
     desk.mouse.move(box["x"] + box["width"] / 2 + 4, box["y"] + box["height"] / 2)
     tip = desk.get_by_role("tooltip")
     assert tip.is_visible()
@@ -76,7 +75,6 @@ def test_a_reading_answers_to_the_keyboard_too(desk):
     desk.keyboard.press("End")
     assert tip.inner_text().startswith("t = 190 s\n")
     label = marks.last.get_attribute("aria-label")
-    assert label is not None
     assert label.startswith("t = 190 s, ν = ")
     desk.keyboard.press("Escape")
     assert not tip.is_visible()
@@ -140,7 +138,6 @@ def test_on_a_telephone_a_figure_is_as_wide_as_it_can_be_read_and_moved_sideways
 
 def _right_edge(page):
     box = page.locator("main").bounding_box()
-    assert box is not None
     return box["x"] + box["width"]
 
 

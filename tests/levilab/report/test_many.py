@@ -51,6 +51,5 @@ def test_of_many_runs_a_legend_does_not_name_each(tmp_path):
         (tmp_path / f"{k}.csv").write_text(limits.replace(",69.26", f",69.{k}6"), encoding="utf-8")
     found = ANALYSES["limit"].analyze([tmp_path], ANALYSES["limit"].options_from({}))
     legend = limit_figure(found).axes[0].get_legend()
-    assert legend is not None
     assert [text.get_text() for text in legend.get_texts() if "runs" in text.get_text()] == ["9 runs: a top ± u"]
     assert len(legend.get_texts()) < len(found.sources)

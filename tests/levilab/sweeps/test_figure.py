@@ -172,5 +172,4 @@ def test_an_error_of_zero_is_drawn_as_the_smallest_and_the_colour_bar_fits():
     cells = figure.axes[0].collections[-1]
     assert not np.ma.getmaskarray(cells.norm(cells.get_array())).any()
     bounds = figure.axes[-1].get_tightbbox()
-    assert bounds is not None
     assert bounds.x1 < figure.bbox.x1

@@ -148,7 +148,6 @@ def test_the_highest_spin_on_a_ramp_is_where_pull_equals_drag_and_ramp():
     made = Plan(scene, (), ("highest_spin_hz",), 1000.0, 1e-4, step_share=1.0)
     found = observe(made, values)["highest_spin_hz"]
     stability, top = stability_of(scene), scene.top
-    assert stability.floating is not None
     resonance = wobble_resonance(stability.field, stability.top, stability.floating.height)
     across = top.moment_tilt[0] * abs(top.moment_a_m2) / (2 * top.inertia_axial_kg_m2)
     expected = [

@@ -1,22 +1,16 @@
 """The bench for practice in a process of its own, whose parent dies."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 import time
 from multiprocessing import Pipe
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from levilab.live.practice.bench import BenchGone, PracticeBench
 from levilab.live.practice.commands import Pause, PracticeEvent, RecordRun
 from levilab.runs.run import Run
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 #: Long enough for a machine that is busy [s]; a test that passes waits less.
 PATIENCE_S = 120.0
@@ -43,7 +37,7 @@ while True:
 """
 
 
-def test_where_the_parent_dies_the_run_is_kept_and_the_process_ends(tmp_path: Path) -> None:
+def test_where_the_parent_dies_the_run_is_kept_and_the_process_ends(tmp_path):
     parent = subprocess.run(
         [sys.executable, "-c", PARENT, str(tmp_path)], capture_output=True, text=True, timeout=PATIENCE_S, check=False
     )
@@ -56,7 +50,7 @@ def test_where_the_parent_dies_the_run_is_kept_and_the_process_ends(tmp_path: Pa
     assert run.events()[-1]["text"] == "interrupted by the end of the program, outputs are off"
 
 
-def test_a_bench_that_is_not_there_says_so(tmp_path: Path) -> None:
+def test_a_bench_that_is_not_there_says_so(tmp_path):
     bench = PracticeBench(tmp_path)
     assert bench.events() == []
     with pytest.raises(BenchGone, match="start it again"):
@@ -67,20 +61,20 @@ def test_a_bench_that_is_not_there_says_so(tmp_path: Path) -> None:
 class Busy:
     """A process that does not end by itself, as one that compiles."""
 
-    def __init__(self) -> None:
-        self.did: list[str] = []
+    def __init__(self):
+        self.did = []
 
-    def join(self, timeout: float) -> None:
+    def join(self, timeout):
         self.did.append(f"join {timeout:g} s")
 
-    def is_alive(self) -> bool:
+    def is_alive(self):
         return "kill" not in self.did
 
-    def __getattr__(self, name: str) -> Callable[[], None]:
+    def __getattr__(self, name):
         return lambda: self.did.append(name)
 
 
-def test_without_a_run_the_end_waits_a_second_and_with_one_for_its_reading(tmp_path: Path) -> None:
+def test_without_a_run_the_end_waits_a_second_and_with_one_for_its_reading(tmp_path):
     for answers, may_record in (
         ([], True),
         ([PracticeEvent("done", number=1), PracticeEvent("recording")], True),
@@ -90,7 +84,7 @@ def test_without_a_run_the_end_waits_a_second_and_with_one_for_its_reading(tmp_p
     ):
         bench, process = PracticeBench(tmp_path), Busy()
         near_end, far_end = Pipe()
-        bench._pipe, bench._process = near_end, process  # type: ignore[assignment]
+        bench._pipe, bench._process = near_end, process
         assert not bench.may_record
         bench.command(RecordRun(experiment="field"))
         for answer in answers:
@@ -102,13 +96,11 @@ def test_without_a_run_the_end_waits_a_second_and_with_one_for_its_reading(tmp_p
         far_end.close()
 
 
-def test_ctrl_c_while_a_bench_ends_that_records_nothing_kills_it_at_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_ctrl_c_while_a_bench_ends_that_records_nothing_kills_it_at_once(tmp_path, monkeypatch):
     bench, process = PracticeBench(tmp_path), Busy()
-    bench._process = process  # type: ignore[assignment]
+    bench._process = process
 
-    def be_interrupted(_: float) -> None:
+    def be_interrupted(_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(process, "join", be_interrupted)
