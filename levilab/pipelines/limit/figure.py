@@ -17,6 +17,8 @@ from levilab.present.style import STYLE, TALLEST, WIDE, label_of_run
 from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
@@ -107,8 +109,7 @@ def _draw_limits(axes: Axes, height: float, analysis: LimitAnalysis, group: Limi
         if abs(one.expected - mean) <= _NEAR * reach:
             low, high = min(low, one.expected - 0.3 * reach), max(high, one.expected + 0.3 * reach)
     axes.set_ylim(low, high)
-    for one in group.theory:
-        _draw_theory(axes, one.name, one.expected)
+    _draw_theory(axes, {one.name: one.expected for one in group.theory})
     _shade_beyond_window(axes, group)
     axes.set_xlim(0.4, len(every) + 0.6)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True, min_n_ticks=1))
@@ -148,24 +149,23 @@ def _draw_run(axes: Axes, analysis: LimitAnalysis, group: Limits, k: int, start:
     return start + len(limit)
 
 
-def _draw_theory(axes: Axes, name: str, expected: float) -> None:
-    """Draw a line where it is within the panel, else its name at the edge beyond which it lies."""
-    colour, dashes = _THEORY[name]
+def _draw_theory(axes: Axes, theory: Mapping[str, float]) -> None:
+    """Draw lines where they are within the panel, else their names at the edge beyond which they lie."""
     low, high = axes.get_ylim()
-    text = f"{name}, {expected:.2f} Hz"
-    if low <= expected <= high:
-        axes.axhline(expected, color=colour, linestyle=dashes, label=text)
-        return
-    above = expected > high
-    axes.annotate(
-        f"{'↑' if above else '↓'} {text}",
-        (0.99, 0.98 if above else 0.02),
-        xycoords="axes fraction",
-        ha="right",
-        va="top" if above else "bottom",
-        fontsize=SMALL,
-        color=colour,
-    )
+    named = {1: 0, -1: 0}  # at each edge
+    for name, expected in theory.items():
+        (colour, dashes), text = _THEORY[name], f"{name}, {expected:.2f} Hz"
+        if low <= expected <= high:
+            axes.axhline(expected, color=colour, linestyle=dashes, label=text)
+            continue
+        side = 1 if expected > high else -1
+        axes.annotate(
+            f"{'↑' if side > 0 else '↓'} {text}",
+            (1, (1 + side) / 2), (-4, -side * (3 + 1.3 * SMALL * named[side])),
+            xycoords="axes fraction", textcoords="offset points",
+            ha="right", va="top" if side > 0 else "bottom", fontsize=SMALL, color=colour,
+        )  # fmt: skip
+        named[side] += 1
 
 
 def _shade_beyond_window(axes: Axes, group: Limits) -> None:
