@@ -27,6 +27,9 @@ _TITLES = (
     ("limit", "", "lower limit"),
     ("spin", "triggered", "spin-down, triggered drive"),
     ("spin", "", "spin-down"),
+    ("hold", "", "held spin"),
+    ("field", "", "field of the base"),
+    ("trace", "", "records of the light"),
 )
 
 
