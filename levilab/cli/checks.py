@@ -9,22 +9,15 @@ import typer
 from levilab.cli import exit_codes
 from levilab.cli.options import Json, among, argument, existing_paths, flag, option, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
+from levilab.crosscheck.names import ROWS
 from levilab.errors import UsageError
-
-#: Names of the rooms' catalogues, which take too long to import for a help or a refusal.
-SUBJECTS = (
-    "spin", "spindown", "sound", "phone", "motion", "precession", "field", "sway", "video", "hold", "limit", "tune",
-)  # fmt: skip
-CHAPTERS = (
-    "stability", "limits", "paths", "driven", "drive", "spindown", "statistics", "dipole", "errata", "beyond", "simon",
-    "gans",
-)  # fmt: skip
+from levilab.reproduce.chapters import CHAPTERS
 
 
 def crosscheck(
     subjects: Annotated[
         list[str] | None,
-        argument("[SUBJECT]…", f"Of {', '.join(SUBJECTS)}.", show_default="all", callback=among(SUBJECTS, "subject")),
+        argument("[SUBJECT]…", f"Of {', '.join(ROWS)}.", show_default="all", callback=among(ROWS, "subject")),
     ] = None,
     like: Annotated[
         list[Path] | None,

@@ -8,9 +8,7 @@ from levilab.cli.options import argument, existing_path, flag, option, place, wr
 from levilab.cli.output import interruptible, message, result
 from levilab.errors import UsageError
 from levilab.pipelines.options import OF_REPORT, read_options
-
-#: Endings of the formats, whose room takes too long to import for a refusal.
-ENDINGS = (".nc", ".h5", ".csv", ".zip")
+from levilab.report.export.endings import ENDINGS
 
 
 def _named_path(path: Path | None) -> Path | None:

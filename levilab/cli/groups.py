@@ -7,9 +7,7 @@ from levilab.cli.analyze import takes_options
 from levilab.cli.options import HEADING, Language, Paths, among, argument, flag, option, place, writable
 from levilab.cli.output import interruptible, message, result
 from levilab.pipelines.options import OF_REPORT, read_options
-
-#: Experiments with a worksheet; their room takes too long to import for a help or a refusal.
-SHEETS = ("spin", "limit", "field", "precession")
+from levilab.report.worksheets.sheets import SHEETS
 
 
 @takes_options(OF_REPORT, HEADING)

@@ -12,7 +12,7 @@ import typer
 from levilab.errors import UsageError, list_known
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable, Collection
 
 
 def number(unit: str = "", *, low: float = -math.inf, high: float = math.inf) -> Callable[[Any], float]:
@@ -90,7 +90,7 @@ def existing_path(path: Path | None) -> Path | None:
     return path
 
 
-def among(known: Sequence[str], what: str) -> Callable[[Any], Any]:
+def among(known: Collection[str], what: str) -> Callable[[Any], Any]:
     """Return the check of names, in a list or with commas: UsageError before their room is imported, which takes long.
 
     Args:

@@ -1,28 +1,24 @@
-"""The subjects of a cross-check: a row each."""
+"""The subjects of a cross-check."""
 
 from __future__ import annotations
 
+from importlib import import_module
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
-from levilab.crosscheck.subjects import field, hold, limit, motion, phone, precession, spin, spindown, sway, tune, video
+from levilab.crosscheck.names import ROWS
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from levilab.crosscheck.subject import Subject
+
+
+def _subject(row: str) -> Subject:
+    module, _, name = row.partition(".")
+    subject: Subject = getattr(import_module(f"levilab.crosscheck.subjects.{module}"), name)
+    return subject
+
 
 #: Name → subject.
-SUBJECTS = MappingProxyType(
-    {
-        subject.name: subject
-        for subject in (
-            spin.SUBJECT,
-            spindown.SUBJECT,
-            spindown.SOUND,
-            phone.SUBJECT,
-            motion.SUBJECT,
-            precession.SUBJECT,
-            field.SUBJECT,
-            sway.SUBJECT,
-            video.SUBJECT,
-            hold.SUBJECT,
-            limit.SUBJECT,
-            tune.SUBJECT,
-        )
-    }
-)
+SUBJECTS: Mapping[str, Subject] = MappingProxyType({name: _subject(row) for name, row in ROWS.items()})

@@ -18,7 +18,7 @@ from levilab.present.document.blocks import (
     Warnings,
 )
 from levilab.report.page import FORMATS, UnknownFormat
-from levilab.reproduce.run import CHAPTERS
+from levilab.reproduce.chapters import CHAPTERS
 from levilab.reproduce.table import HEADS, findings_table, in_words, overview
 from levilab.software import software_versions
 
@@ -27,8 +27,9 @@ if TYPE_CHECKING:
 
     from levilab.present.document.blocks import Block
     from levilab.report.page import Format
+    from levilab.reproduce.chapters import Chapter
     from levilab.reproduce.check import Found
-    from levilab.reproduce.run import Chapter, Reproduction
+    from levilab.reproduce.run import Reproduction
 
 HOW_TO_READ = (
     "A published number has the precision of its print: it agrees if ours lies within half a unit of its last digit, "

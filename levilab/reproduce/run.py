@@ -6,63 +6,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import UsageError, list_known
-from levilab.reproduce import (
-    beyond,
-    dipole,
-    drive,
-    driven,
-    errata,
-    gans,
-    limits,
-    paths,
-    simon,
-    spindown,
-    statistics,
-    windows,
-)
+from levilab.reproduce.chapters import CHAPTERS
 from levilab.reproduce.check import Verdict, as_document, counts
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
+    from levilab.reproduce.chapters import Chapter
     from levilab.reproduce.check import Finding, Found
 
 SCHEMA = "levilab-reproduction/1"
-
-
-@dataclass(frozen=True)
-class Chapter:
-    """A chapter.
-
-    Attributes:
-        name: by which it is chosen.
-        title: its heading.
-        make: computes it.
-    """
-
-    name: str
-    title: str
-    make: Callable[[], Found]
-
-
-CHAPTERS: dict[str, Chapter] = {
-    chapter.name: chapter
-    for chapter in (
-        Chapter("stability", "Where a top can float", windows.make),
-        Chapter("limits", "Limits of the spin", limits.make),
-        Chapter("paths", "Paths, the fall, and a tilted moment", paths.make),
-        Chapter("driven", "The driven top", driven.make),
-        Chapter("drive", "Why it stopped at 61 Hz", drive.make),
-        Chapter("spindown", "Four spin-downs", spindown.make),
-        Chapter("statistics", "Ten measured limits", statistics.make),
-        Chapter("dipole", "The dipole approximation", dipole.make),
-        Chapter("errata", "Errata", errata.make),
-        Chapter("beyond", "What the thesis could not do", beyond.make),
-        Chapter("simon", "Simon, Heflinger & Ridgway 1997", simon.make),
-        Chapter("gans", "Gans, Jones & Washizu 1998", gans.make),
-    )
-}
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from levilab.errors import LevilabError, UsageError
 from levilab.files import CannotWrite, check_writable, replace_atomically, writing
 from levilab.present.numbers import list_in_words
 from levilab.report.export.contents import attributes_of, variables_of
+from levilab.report.export.endings import ENDINGS
 from levilab.runs.package import field, package, resource
 from levilab.software import how_to_install
 
@@ -181,6 +182,6 @@ def _as_csv(table: Table) -> bytes:
     return frame.to_csv(index=False, lineterminator="\n").encode(errors="replace")
 
 
-FORMATS: Mapping[str, Format] = MappingProxyType({
-    ".nc": Format(_netcdf), ".h5": Format(_hdf5, _check_hdf5), ".csv": Format(_csv), ".zip": Format(_zip),
-})  # fmt: skip
+FORMATS: Mapping[str, Format] = MappingProxyType(
+    dict(zip(ENDINGS, (Format(_netcdf), Format(_hdf5, _check_hdf5), Format(_csv), Format(_zip)), strict=True))
+)

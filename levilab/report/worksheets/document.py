@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from analysis.numbers import how_many
@@ -31,55 +30,17 @@ from levilab.present.tables import table
 from levilab.report.groups.beside import class_of
 from levilab.report.groups.document import truth_text
 from levilab.report.page import FORMATS
+from levilab.report.worksheets.sheets import SHEETS, TOPS
 from levilab.texts.text import ENGLISH, in_language, language_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from levilab.report.groups.beside import Class
+    from levilab.report.worksheets.sheets import Sheet
 
 
 _TEXTS = Path(__file__).parent / "texts.toml"
-
-
-@dataclass(frozen=True)
-class Sheet:
-    """An experiment's worksheet.
-
-    Attributes:
-        experiment, analysis: their names.
-        settings: of the experiment, as one types them: a class has an hour.
-        asked: quantities of the key beside those that a class compares.
-        clicks: what is said of the bench in the browser, in the texts of all worksheets.
-    """
-
-    experiment: str
-    analysis: str
-    settings: tuple[str, ...] = ()
-    asked: tuple[str, ...] = ()
-    clicks: str = "with_clicks"
-
-    def commands(self, group: str, seed: int, spoken: str = "") -> tuple[str, ...]:
-        """Return what a group types.  spoken: the option of the language, after a blank."""
-        chosen = "".join(f" --set {one}" for one in self.settings)
-        return (
-            f'levilab acquire {self.experiment} --mock --group "{group}" --seed {seed}{spoken} --out class{chosen}',
-            f"levilab analyze {self.analysis} class",
-            "levilab report class -o report.html",
-        )
-
-
-#: Number of tops of the worksheet on limits.
-TOPS = 10
-SHEETS = MappingProxyType({
-    sheet.experiment: sheet
-    for sheet in (
-        Sheet("spin", "spindown"),
-        Sheet("limit", "limit", (f"limit.repetitions={TOPS}",), ("scatter",), clicks="without_clicks"),
-        Sheet("field", "field", asked=("mass_to_set", "lightest_mass", "heaviest_mass")),
-        Sheet("precession", "precession"),
-    )
-})  # fmt: skip
 
 
 @dataclass(frozen=True)

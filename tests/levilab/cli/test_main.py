@@ -18,7 +18,7 @@ from levilab.cli.options import SCENES
 from levilab.cli.sweep import sweep
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import KINDS
-from levilab.reproduce.run import CHAPTERS
+from levilab.reproduce.chapters import CHAPTERS
 from levilab.simulator.scene import presets
 from levilab.sweeps.observables import NAMES
 from support.acquisitions import QUICKLY
@@ -331,16 +331,6 @@ def test_nothing_heavy_is_imported_where_it_is_not_used(tmp_path, commands, allo
     assert len(heavy) == len(commands)
     for words, seen in zip(commands, heavy, strict=True):
         assert seen <= allowed, words
-
-
-def test_names_that_are_checked_before_imports_are_those_of_the_rooms():
-    from levilab.cli import checks, export, groups
-    from levilab.crosscheck.catalogue import SUBJECTS
-    from levilab.report.export.write import FORMATS
-    from levilab.report.worksheets.document import SHEETS
-
-    assert (tuple(SUBJECTS), tuple(CHAPTERS)) == (checks.SUBJECTS, checks.CHAPTERS)
-    assert (tuple(FORMATS), tuple(SHEETS)) == (export.ENDINGS, groups.SHEETS)
 
 
 def test_help_lists_the_scenes_that_come_with_levilab():

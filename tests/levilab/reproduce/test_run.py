@@ -7,6 +7,7 @@ import pytest
 from levilab.errors import UsageError
 from levilab.report.html.page import page_of
 from levilab.reproduce import run
+from levilab.reproduce.chapters import Chapter
 from levilab.reproduce.check import Found, Verdict, statement
 from levilab.reproduce.report import document_of
 from levilab.reproduce.table import numbers
@@ -16,7 +17,7 @@ from support.paths import ROOT
 
 def chapter(name, *, holds):
     found = Found((statement("<b>one</b>", "there", "it is", "we see", holds=holds),), (), "Said.", "made up")
-    return run.Chapter(name, f"The {name}", lambda: found)
+    return Chapter(name, f"The {name}", lambda: found)
 
 
 def test_chapters_come_in_their_order_and_a_wrong_name_is_refused(tmp_path):

@@ -18,7 +18,8 @@ from levilab.live.server import PAGE
 from levilab.live.views import VIEWS
 from levilab.live.words import change_texts
 from levilab.pipelines.look import QUANTITIES
-from levilab.report.worksheets.document import TOPS, read_language
+from levilab.report.worksheets.document import read_language
+from levilab.report.worksheets.sheets import TOPS
 from levilab.texts.text import Text, in_language, language_of, languages, speak, text_from
 from support.sources import sources
 

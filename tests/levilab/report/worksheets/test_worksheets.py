@@ -10,7 +10,8 @@ import pytest
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.report.groups.beside import class_of
-from levilab.report.worksheets.document import SHEETS, TOPS, measure, read_language, write_worksheets
+from levilab.report.worksheets.document import measure, read_language, write_worksheets
+from levilab.report.worksheets.sheets import SHEETS, TOPS
 from levilab.texts.text import languages
 from levilab.world.spin_world import random_scene
 from support.pages import Page
