@@ -323,7 +323,7 @@ def test_after_a_run_the_last_minutes_show_what_a_person_does(starting: Hall, pa
     page.select_option("#drawn", "all")  # the run is still there
     until(page, f"!({is_of_minutes}) && document.body.dataset.state === 'finished'")
     page.set_viewport_size({"width": 1366, "height": 650})  # a laptop: the plot is as high as its two parts need
-    assert page.evaluate("document.getElementById('plot').clientHeight") >= 200
+    assert page.evaluate("document.getElementById('plot').clientHeight") >= 190
     assert page.evaluate("document.documentElement.scrollHeight") == 650
     page.route("**/do?*", lambda route: route.fulfill(json={"number": 1}))
     page.click("#back")
