@@ -167,6 +167,17 @@ def checks() -> str:
     )
 
 
+def priors() -> str:
+    """Return what the trials of the cross-check draw, in Markdown."""
+    from levilab.crosscheck.priors import PRIORS
+
+    return "| subject | number | drawn from | reason |\n|---|---|---|---|\n" + "".join(
+        f"| {f'`{subject}`' if k == 0 else ''} | {row.name} | {row.text} | {row.reason} |\n"
+        for subject, rows in PRIORS.items()
+        for k, row in enumerate(rows.values())
+    )
+
+
 def _beyond(spread: Any, limit: float) -> str:
     pulls = spread["pulls"]
     return f"{100 * sum(abs(pull) > limit for pull in pulls) / len(pulls):.0f}"
@@ -174,7 +185,7 @@ def _beyond(spread: Any, limit: float) -> str:
 
 #: Page → mark in it → what takes its place.
 MADE = {
-    "crosscheck": {"<!-- all results -->": checks},
+    "crosscheck": {"<!-- all results -->": checks, "<!-- all priors -->": priors},
     "reference/commands": {"<!-- all commands -->": overview},
     **{page: {"<!-- commands -->": partial(reference, page)} for page in PAGES},
     "data": {"<!-- all columns -->": columns, "<!-- all laws -->": laws},

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.priors import PRIORS, drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.formats.device import Device
 from levilab.pipelines.catalogue import ANALYSES
@@ -21,8 +22,10 @@ if TYPE_CHECKING:
 
     from analysis.uncertainty import Estimate
 
-#: The true moment [A m²], and how well it is stated, relative; how well a mass [kg] and a height [m] are measured.
-MOMENT, MOMENT_U, MASS_U, HEIGHT_U = 0.714, 0.01, 1e-5, 2e-4
+#: The true moment [A m²].
+MOMENT = 0.714
+#: How well it is stated, relative; how well a mass [kg] and a height [m] are measured.
+MOMENT_U, MASS_U, HEIGHT_U = (prior.b for prior in PRIORS["field"].values())
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:
@@ -31,7 +34,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     The truths of heights, masses, and spins are the simulator's, whose field is another formula.
     """
     run = acquire_mock("field", seed, folder, lambda request: request)
-    base, by = random_base(seed), np.random.default_rng((seed, 4)).standard_normal(3)
+    base, draw = random_base(seed), drawing("field", np.random.default_rng((seed, 4)))
     scene = Scene().changed(
         {
             "base.field": "exact",
@@ -47,10 +50,10 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     floating = stability_of(scene.changed({"top.mass_kg": mass})).floating
     if floating is None:
         raise TrialFailed("no top floats above the base that was drawn")
-    stated = {"moment_a_m2": MOMENT * (1 + MOMENT_U * float(by[0])), "moment_u_a_m2": MOMENT * MOMENT_U}
-    weighed = {"mass_kg": mass + MASS_U * float(by[1]), "mass_u_kg": MASS_U}
+    stated = {"moment_a_m2": MOMENT * draw("moment as stated"), "moment_u_a_m2": MOMENT * MOMENT_U}
+    weighed = {"mass_kg": mass + draw("mass as weighed"), "mass_u_kg": MASS_U}
     found = _values(run.folder, _options(stated))
-    height = floating.height + HEIGHT_U * float(by[2])
+    height = floating.height + draw("height as measured")
     by_height = _values(run.folder, _options(weighed, height_m=height, height_u_m=HEIGHT_U))
     return [
         pull_of("strength", found["strength"], base.strength_t_m),

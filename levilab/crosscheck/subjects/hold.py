@@ -10,6 +10,7 @@ import numpy as np
 
 from levilab.acquisition.table import settings_of
 from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, pull_of
 from levilab.crosscheck.subjects.spindown import draw_scene, in_world
 from levilab.pipelines.catalogue import ANALYSES
@@ -20,14 +21,14 @@ if TYPE_CHECKING:
 
     from levilab.acquisition.loop import AcquisitionRequest
 
-#: Range of the held spins [Hz], and the time for which each is held [s].
-_SPINS_HZ, _HELD_S = (28.0, 48.0), 100.0
+#: The time for which a spin is held [s].
+_HELD_S = 100.0
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:
     """Try one held spin; the truth is the drag of the world's law at the mean of the readings."""
     scene = replace(draw_scene(seed), fall_hz=21.4)
-    spin = float(np.random.default_rng((seed, 25)).uniform(*_SPINS_HZ))
+    spin = drawing("hold", np.random.default_rng((seed, 25)))("spin")
 
     def change(request: AcquisitionRequest) -> AcquisitionRequest:
         settings = settings_of(request.config, "hold")

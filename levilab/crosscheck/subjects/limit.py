@@ -11,6 +11,7 @@ import numpy as np
 from analysis.locked import Cause
 from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.crosscheck.subjects.spindown import draw_scene, in_world
 from levilab.pipelines.catalogue import ANALYSES
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
     from levilab.pipelines.limit.analysis import Limits
     from levilab.world.spin_world import SpinScene
 
-#: Number of tops of a run, their scatter [Hz], and ranges of the means of their limits [Hz].
-TOPS, _SCATTER_HZ, _LOWER_HZ, _UPPER_HZ = 10, 0.25, (21.4, 22.4), (33.0, 38.0)
+#: Number of tops of a run.
+TOPS = 10
 #: Quantity → settings of its runs.
 _WAYS: MappingProxyType[str, dict[str, Any]] = MappingProxyType({
     "lower mean": {"which": "lower", "drive_frequency_hz": 24.0, "ramp_hz_per_s": 0.3},
@@ -39,9 +40,9 @@ def trial(seed: int, folder: Path) -> list[Pull]:
 
     Raises TrialFailed where a cause is not the true one: in this world a lock is lost by nothing but drag.
     """
-    random = np.random.default_rng((seed, 26))
-    lower, upper = random.uniform(*_LOWER_HZ), random.uniform(*_UPPER_HZ)
-    falls, edges = (tuple((mean + _SCATTER_HZ * random.standard_normal(TOPS)).tolist()) for mean in (lower, upper))
+    draw = drawing("limit", np.random.default_rng((seed, 26)))
+    lower, upper = draw("lower mean"), draw("upper mean")
+    falls, edges = (tuple(mean + draw("top") for _ in range(TOPS)) for mean in (lower, upper))
     scene = replace(draw_scene(seed), fall_hz=falls[0], later_falls_hz=falls[1:], edges_hz=edges)
     pulls = []
     for name, settings in _WAYS.items():

@@ -12,6 +12,7 @@ from analysis.spindown.tilt import RELEASE_U
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.crosscheck.subjects.spindown import spindown_of
 from levilab.simulator.kernels.motion import R
@@ -37,17 +38,16 @@ _LEAST_HZ = 1e-6
 
 
 def draw_scene(seed: int) -> Scene:
-    """Return a top of this seed: mass, tilt of the moment, drag and first spin."""
-    random = np.random.default_rng((seed, 3))
-    tilt = float(random.uniform(0.022, 0.034))
-    coefficient = USUAL * float(random.uniform(0.85, 1.15))
+    """Return the top of this seed."""
+    draw = drawing("motion", np.random.default_rng((seed, 3)))
+    tilt, coefficient = draw("moment across the axis"), USUAL * draw("drag")
     return preset("spindown").changed(
         {
-            "top.mass_kg": float(random.uniform(0.02420, 0.02440)),
+            "top.mass_kg": draw("top.mass_kg"),
             "top.moment_tilt": [tilt, 0.97],
             "drag.law": "disc",
             "drag.coefficient": coefficient,
-            "start.spin_hz": float(random.uniform(29.0, 31.0)),
+            "start.spin_hz": draw("start.spin_hz"),
         }
     )
 

@@ -11,6 +11,7 @@ import numpy as np
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.runs.waveforms import run_waveforms
@@ -42,20 +43,21 @@ class _Watched(SpinWorld):
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:
-    """Try one record: the seed draws spin, drag, tape, noise, jitter of the pulses and the record's length."""
+    """Try one record."""
     random = np.random.default_rng((seed, 5))
+    draw = drawing("spin", random)
     law = sorted(LAWS)[int(random.integers(len(LAWS)))]
     scene = SpinScene(
-        start_hz=float(random.uniform(24.0, 45.0)),
+        start_hz=draw("spin"),
         drag=law,
-        constants=tuple(constant * float(random.uniform(0.7, 1.3)) for constant in LAWS[law].usual),
+        constants=tuple(constant * draw("drag") for constant in LAWS[law].usual),
         fall_hz=20.0,
-        tape=Tape(width=float(random.uniform(0.02, 0.05)), noise=float(10 ** random.uniform(-2.5, -1.0))),
-        jitter=float(10 ** random.uniform(-5, -2)),
+        tape=Tape(width=draw("width of the tape"), noise=draw("noise of the light")),
+        jitter=draw("scatter of the pulses"),
         seed=seed,
     )
     world = _Watched(scene)
-    duration = float(random.uniform(1.0, 4.0))
+    duration = draw("length")
     run = acquire_mock("trace", seed, folder, lambda request: _in_world(request, world, duration))
     (record,) = run_waveforms(run)
     start = world.looks.get(record.count)

@@ -11,6 +11,7 @@ import numpy as np
 
 from instruments.clock import VirtualClock
 from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.simulator.laws import LAWS
@@ -33,15 +34,16 @@ RATE = 10.0
 
 
 def draw_scene(seed: int) -> SpinScene:
-    """Draw drag, fall and scatter of the pulses."""
+    """Draw a top."""
     random = np.random.default_rng((seed, 2))
+    draw = drawing("spindown", random)
     law = sorted(LAWS)[int(random.integers(len(LAWS)))]
     return SpinScene(
-        start_hz=float(random.uniform(28.0, 33.0)),
+        start_hz=draw("start"),
         drag=law,
-        constants=tuple(c * float(random.uniform(0.8, 1.2)) for c in LAWS[law].usual),
-        fall_hz=float(random.uniform(21.4, 22.4)),
-        jitter=SpinScene.jitter * float(random.uniform(0.5, 2.0)),
+        constants=tuple(c * draw("drag") for c in LAWS[law].usual),
+        fall_hz=draw("fall"),
+        jitter=SpinScene.jitter * draw("scatter of the pulses"),
         seed=seed,
     )
 

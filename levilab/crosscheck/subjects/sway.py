@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from levilab.crosscheck.priors import PRIORS, drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.formats.device import read_device
 from levilab.pipelines.catalogue import ANALYSES
@@ -16,28 +17,30 @@ from levilab.simulator.single import simulate
 if TYPE_CHECKING:
     from pathlib import Path
 
-#: Frames per second, error of a coordinate [m], and length of the film [s].
-RATE, NOISE_M, DURATION_S = 120.0, 1e-4, 110.0
-#: Standard uncertainties of the mass by scales [kg], and of the radii of the base by a calliper [m].
-_WEIGHED_U_KG, _CALLIPER_U_M = 1e-5, 1e-4
+#: Frames per second, and length of the film [s].
+RATE, DURATION_S = 120.0, 110.0
+#: Error of a coordinate [m]; standard uncertainties of the mass [kg] and of the radii of the base [m].
+NOISE_M, _WEIGHED_U_KG, _CALLIPER_U_M = (
+    PRIORS["sway"][name].b for name in ("noise", "mass as weighed", "radius as measured")
+)
 
 
 def draw_scene(seed: int) -> Scene:
     """Draw mass, place, velocity, tilt and drag of a top at 40 Hz, and what pushes it."""
-    by = np.random.default_rng((seed, 23))
-    resting = preset("undriven").changed({"top.mass_kg": float(by.uniform(0.02500, 0.02540)), "drag.law": "disc"})
+    draw = drawing("sway", np.random.default_rng((seed, 23)))
+    resting = preset("undriven").changed({"top.mass_kg": draw("top.mass_kg"), "drag.law": "disc"})
     floating = stability_of(resting).floating
     if floating is None:
         raise TrialFailed("the top that was drawn floats nowhere")
-    away, azimuth = float(by.uniform(2e-4, 1e-3)), float(by.uniform(0, 2 * np.pi))
-    height = floating.height + float(by.uniform(-5e-4, 5e-4))
+    away, azimuth = draw("push"), draw("azimuth")
+    height = floating.height + draw("height")
     return resting.changed(
         {
             "start.place": "given",
             "start.spin_hz": 40.0,
             "start.position_m": [away * np.cos(azimuth), away * np.sin(azimuth), height],
-            "start.velocity_m_s": by.uniform(-3e-3, 3e-3, 3).tolist(),
-            "start.tilt_rad": float(by.uniform(0.003, 0.02)),
+            "start.velocity_m_s": [draw("velocity") for _ in range(3)],
+            "start.tilt_rad": draw("start.tilt_rad"),
         }
     )
 

@@ -5,13 +5,13 @@ The window of masses is the simulator's, at the temperature of the magnets; a ha
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.tuning import LAPSE, TEMPERATURE_U, Outcome
+from analysis.tuning import LAPSE, Outcome
+from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.pipelines.tune.advice import advise
 from levilab.pipelines.tune.owner import Owner, read_owner, washers_text, write_owner
@@ -21,17 +21,12 @@ from levilab.simulator.scene import Scene, preset
 if TYPE_CHECKING:
     from pathlib import Path
 
-#: The owner's washers [kg], and how many are needed about, of their sum.
+#: The owner's washers [kg].
 WASHERS_KG = (6e-5,) * 6 + (2e-4,) * 4
-NEEDED = (0.2, 0.8)
 #: Temperatures of the days [°C], and the most trials of one; that for which the mass to set is compared.
 DAYS_C, MOST, COMPARED_C = (19.0, 23.0, 17.0), 6, 21.0
 #: The magnets of the scene have the strengths that it says at this temperature [°C].
 _REFERENCE_C = 20.0
-#: Makers' coefficients of base and top [1/K], with their scatter; and that of the base's strength, relative.
-_PER_K, _PER_K_S, _STRENGTH_S = -0.002, 0.0007, 0.01
-#: Share of the simulator's window that a hand floats: median and standard deviation of the logarithm.
-_SHARE, _SHARE_LOG_S = 0.4, 0.7
 
 
 @dataclass(frozen=True)
@@ -59,24 +54,25 @@ class World:
 
 def draw_world(by: np.random.Generator) -> World:
     """Draw a base, a top and a hand."""
-    scene = preset("undriven")
-    base, top = by.normal(_PER_K, _PER_K_S, 2).tolist()
+    scene, draw = preset("undriven"), drawing("tune", by)
+    base, top = draw("temperature coefficient"), draw("temperature coefficient")
     changes = {
-        "base.strength_t_m": scene.base.strength_t_m * float(by.normal(1, _STRENGTH_S)),
+        "base.strength_t_m": scene.base.strength_t_m * draw("strength"),
         "base.temperature_coefficient_per_k": base,
         "top.temperature_coefficient_per_k": top,
     }
-    share = min(_SHARE * math.exp(_SHARE_LOG_S * by.standard_normal()), 1.0)
-    return World(scene.changed(changes), share, float(by.uniform()))
+    share = min(draw("share of the window"), 1.0)
+    return World(scene.changed(changes), share, draw("place in the window"))
 
 
 def keep_diary(world: World, by: np.random.Generator) -> Owner:
     """Let an owner follow the advice until the top floats, day after day; return what he keeps."""
+    draw = drawing("tune", by)
     light, heavy = world.window(_REFERENCE_C)
-    bare = (light + heavy) / 2 - float(by.uniform(*NEEDED)) * sum(WASHERS_KG)
+    bare = (light + heavy) / 2 - draw("washers needed") * sum(WASHERS_KG)
     owner = Owner(round(bare, 5), WASHERS_KG)
     for shown in DAYS_C:
-        light, heavy = world.window(shown + float(by.normal(0, TEMPERATURE_U)))
+        light, heavy = world.window(shown + draw("thermometer"))
         for _ in range(MOST):
             washers = advise(owner, shown).best.washers_kg
             mass = (owner.top or 0.0) + sum(washers)

@@ -8,6 +8,7 @@ import numpy as np
 
 from analysis.uncertainty import Estimate
 from levilab.animation.camera import RIM, Camera, film, flight_of, phone_times
+from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.crosscheck.subjects.sway import draw_scene
 from levilab.pipelines.catalogue import ANALYSES
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from levilab.animation.camera import Array, Flight
     from levilab.pipelines.video.analysis import Video
 
-#: Least and greatest length of a film [s].
-SECONDS = (0.8, 4.0)
 #: Height of the dot on the stem above the rim, and of the rim above the base [m].
 STEM_M, RIM_M = 0.02, 0.07
 #: Where the precession is [Hz].
@@ -31,26 +30,28 @@ _HALF_S = 0.5
 
 def draw_camera(by: np.random.Generator) -> Camera:
     """Draw a camera: how near and sharp, how long it exposes, how it reads its rows."""
+    draw = drawing("video", by)
     return Camera(
         width=192,
         height=192,
-        scale=float(by.uniform(4.6e-4, 5.4e-4)),
-        exposure=float(by.uniform(3e-4, 1.5e-3)),
-        line_time=float(by.uniform(5e-6, 25e-6)),
-        blur=float(by.uniform(1.0, 3.0)),
-        noise=float(by.uniform(1.0, 4.0)),
-        away=tuple(by.uniform(-4, 4, 2).tolist()),
+        scale=draw("scale"),
+        exposure=draw("exposure"),
+        line_time=draw("line_time"),
+        blur=draw("blur"),
+        noise=draw("noise"),
+        away=(draw("away"), draw("away")),
         stem=STEM_M,
-        distance=float(by.uniform(0.25, 0.6)),
+        distance=draw("distance"),
     )
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:
     """Try one film of a drawn top; of its pictures one, since neighbours share their errors."""
     by = np.random.default_rng((seed, 25))
-    scene = draw_scene(seed).changed({"start.spin_hz": float(by.uniform(26, 42))})
+    draw = drawing("video", by)
+    scene = draw_scene(seed).changed({"start.spin_hz": draw("start.spin_hz")})
     camera = draw_camera(by)
-    seconds = float(by.uniform(*SECONDS))
+    seconds = draw("length")
     flight = flight_of(scene, seconds)
     path = film(folder / "top.mp4", camera, flight, phone_times(seconds), seed=seed)
     analysis = ANALYSES["video"]

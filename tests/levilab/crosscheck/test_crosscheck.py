@@ -7,11 +7,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from analysis.uncertainty import Estimate
 from levilab.crosscheck.catalogue import SUBJECTS
 from levilab.crosscheck.figure import crosscheck_figure
 from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.priors import PRIORS
 from levilab.crosscheck.study import study_world
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.crosscheck.subjects.motion import nutation
@@ -128,7 +130,7 @@ def test_a_trial_of_limits_finds_their_means_and_each_cause(tmp_path, monkeypatc
 
 def test_a_trial_films_a_top_and_finds_spin_and_place(tmp_path, monkeypatch):
     pytest.importorskip("av")
-    monkeypatch.setattr("levilab.crosscheck.subjects.video.SECONDS", (0.8, 0.9))
+    monkeypatch.setitem(PRIORS["video"], "length", replace(PRIORS["video"]["length"], b=0.9))
     pulls = SUBJECTS["video"].trial(1, tmp_path)
     assert [pull.quantity for pull in pulls] == ["spin", "spin of a second", "place", "place", "precession"]
     # a slip in a sign or a unit would be thousands of u away, another picture's place tens
@@ -176,3 +178,22 @@ def test_the_command_prints_writes_and_judges(levilab, tmp_path, monkeypatch):
     assert json.loads(failed.stdout)["checks"][0]["spreads"][0]["mean"] > 1.5
     refused = levilab("crosscheck", "nonsense", check=2)
     assert refused.stderr.startswith("levilab: subject nonsense: known are spin, spindown,")
+
+
+DISTRIBUTIONS = {
+    "even": lambda a, b: stats.uniform(a, b - a),
+    "even in the logarithm": stats.loguniform,
+    "normal": stats.norm,
+    "log-normal": lambda a, b: stats.lognorm(b, scale=a),
+}
+
+
+def test_a_prior_is_drawn_as_its_row_says():
+    by = np.random.default_rng(1)
+    rows = [row for of_subject in PRIORS.values() for row in of_subject.values()]
+    chances = [
+        stats.kstest([row.draw(by) for _ in range(400)], DISTRIBUTIONS[row.law](row.a, row.b).cdf).pvalue
+        for row in rows
+    ]
+    assert min(chances) > 1e-4  # the least of forty: by chance in one of 250 seeds, and not in this one
+    assert all(row.reason and row.unit in row.text for row in rows)
