@@ -3,6 +3,9 @@
     python benchmarks/mutants [--number 200] [--seed 11] [--only WORD ...] [--again STATE ...] [--map]
 
 The mutations with a name stand in named.toml, as many again as `--number` says are drawn at random over all packages.
+With --laboratories N the mistakes are those of planted.toml and some at random in the rooms of acquisition; N simulated
+laboratories are carried out with each as well.
+
 First, once, the tests are run under coverage.py to learn which lines each reaches (half an hour; `--map` does nothing
 else).  All takes place in a copy of the tree, .mutants/tree, and can be interrupted: what is known is kept in
 .mutants/, and tried anew when a file that the mutation lies in, or a test that killed it, has changed.
@@ -21,6 +24,7 @@ import time
 from typing import Any
 
 import kept
+import laboratory
 import places
 import reach
 import trial
@@ -44,6 +48,7 @@ def main() -> int:
     parser.add_argument("--tests", nargs="*", help="by these tests, new ones perhaps, not by those of the map")
     parser.add_argument("--known", action="store_true", help="do with the map as far as it is known")
     parser.add_argument("--map", action="store_true", help="learn which tests reach which lines, and end")
+    parser.add_argument("--laboratories", type=int, help="carried out with each mistake in acquisition, too")
     asked = parser.parse_args()
     with contextlib.suppress(AttributeError):
         os.nice(10)
@@ -52,9 +57,12 @@ def main() -> int:
     trial.load_libraries()
     if not asked.known:
         print("which tests reach which lines:", flush=True)
-        reach.measure(asked.only)
+        reach.measure(asked.only or (list(laboratory.TESTS) if asked.laboratories else []))
     if asked.map:
         return 0
+    if asked.laboratories:
+        reached = reach.load()
+        return laboratory.measure(asked.number, asked.seed, asked.laboratories, lambda one: attempt(one, reached))
     known = json.loads(OUTCOMES.read_text(encoding="utf-8")) if OUTCOMES.exists() else {}
     rows, reached = [], reach.load()
     for name, mutation in places.named():

@@ -87,10 +87,14 @@ def write(rows: Sequence[Row], seed: int) -> None:
         ],
     }
     RESULTS.write_text(json.dumps(results, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
-    if PAGE.exists():
-        before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
-        _, after = rest.split(END)
-        PAGE.write_text(before + BEGIN + _tables(rows) + END + after, encoding="utf-8")
+    put(BEGIN, _tables(rows), END)
+
+
+def put(begin: str, text: str, end: str) -> None:
+    """Put a text between two lines of the page."""
+    before, rest = PAGE.read_text(encoding="utf-8").split(begin)
+    _, after = rest.split(end)
+    PAGE.write_text(before + begin + text + end + after, encoding="utf-8")
 
 
 def _tables(rows: Sequence[Row]) -> str:

@@ -15,7 +15,7 @@ import trial
 from reach import functions
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Collection, Iterator
 
 HERE = Path(__file__).parent
 
@@ -95,9 +95,9 @@ def mutated(file: str, edits: tuple[Edit, ...]) -> bytes:
 # --- with a name ---
 
 
-def named() -> Iterator[tuple[str, Mutation | None]]:
-    """Yield the mutations of named.toml: name and mutation, or None where the code is gone."""
-    with (HERE / "named.toml").open("rb") as table:
+def named(file: str = "named.toml") -> Iterator[tuple[str, Mutation | None]]:
+    """Yield the mutations of a file: name and mutation, or None where the code is gone."""
+    with (HERE / file).open("rb") as table:
         rows = tomllib.load(table)["mutation"]
     for row in rows:
         try:
@@ -111,7 +111,8 @@ def named() -> Iterator[tuple[str, Mutation | None]]:
         change = repr([row["old"], row["new"], row.get("also")])
         key = f"named: {row['name']}: {hashlib.sha256(change.encode()).hexdigest()[:8]}"
         place = function_at(edits[0].file, line)
-        mutation = Mutation(key, room_of(edits[0].file), text, edits, place, line, tuple(row["tests"]))
+        tests = tuple(row["tests"]) if "tests" in row else None
+        mutation = Mutation(key, room_of(edits[0].file), text, edits, place, line, tests)
         yield row["name"], mutation
 
 
@@ -350,9 +351,9 @@ def _shown(source: bytes, edit: Edit) -> str:
     return " → ".join(f"`{' '.join(line.decode().split())}`" for line in (old, new))
 
 
-def chosen(seed: int, number: int) -> list[Mutation]:
-    """So many at random, each room with its share by lines of code, and never two on one line."""
-    rooms = generated(seed)
+def chosen(seed: int, number: int, only: Collection[str] = ()) -> list[Mutation]:
+    """So many at random, each room with its share by lines of code, and never two on one line; only: these rooms."""
+    rooms = {room: found for room, found in generated(seed).items() if not only or room in only}
     lines = {
         room: sum(
             (trial.TREE / file).read_bytes().count(b"\n")

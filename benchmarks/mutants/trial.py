@@ -1,4 +1,4 @@
-"""Run chosen tests in a copy of the tree, in a process that has the heavy libraries already.
+"""Run chosen tests, or laboratories, in a copy of the tree, in a process that has the heavy libraries already.
 
 Importing numpy, scipy, numba, pandas and matplotlib takes some two seconds, most tests take less: so this process
 imports them once and forks for each trial.  Where a system cannot fork (Windows), a trial is a new process.
@@ -119,10 +119,10 @@ def _environment() -> dict[str, str]:
 
 
 def _obey(order: dict[str, Any]) -> None:
-    """Run the tests of an order in TREE and write the outcome.
+    """Carry out an order in TREE and write the outcome.
 
-    The order has the files to collect (`files`), the tests to keep of them in the order in which they run (`tests`;
-    None for all), and whether to note the lines that each test reaches (`reach`).
+    The order has the number of `laboratories`; or the files of tests to collect (`files`), the tests to keep of them in
+    the order in which they run (`tests`; None for all), and whether to note the lines that each reaches (`reach`).
     """
     os.chdir(TREE)
     os.environ.update(_environment())
@@ -130,13 +130,24 @@ def _obey(order: dict[str, Any]) -> None:
     with open(WORK / "trial.log", "w", encoding="utf-8") as log:  # noqa: PTH123
         os.dup2(log.fileno(), 1)
         os.dup2(log.fileno(), 2)
-    if order["tests"] is not None or not order["reach"]:
+    if not order.get("reach"):
         sys.dont_write_bytecode = True
         with contextlib.suppress(ImportError):
             import resource
 
             limit = int(order["seconds"] + time.process_time()) + 1
             resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
+    if "laboratories" in order:
+        from laboratory import carry_out
+
+        result = carry_out(order)
+    else:
+        result = _run_tests(order)
+    with open(order["answer"], "w", encoding="utf-8") as out:  # noqa: PTH123
+        json.dump(result, out)
+
+
+def _run_tests(order: dict[str, Any]) -> dict[str, Any]:
     import pytest
 
     plugin = _Chosen(order["tests"])
@@ -166,8 +177,7 @@ def _obey(order: dict[str, Any]) -> None:
             for name in data.measured_files()
             if name.endswith(".py")  # templates are compiled to code, too
         }
-    with open(order["answer"], "w", encoding="utf-8") as out:  # noqa: PTH123
-        json.dump(result, out)
+    return result
 
 
 class _Chosen:

@@ -121,12 +121,14 @@ class LaboratoryPerson:
 
     Attributes:
         slip: set by an event, for the next task: "mistypes", "types a height", "misses" the height or is "late".
+        height_m: where the person believes the probe to be; None: in its chamber, or 3 mm off without knowing it.
         world: with the probe and the top.
     """
 
     def __init__(self, fate: Fate, clock: LaboratoryClock, random: Random) -> None:
         self._fate, self._clock, self._random = fate, clock, random
         self.slip = ""
+        self.height_m: float | None = None
         self.world: World | None = None
 
     def __call__(self, task: Task) -> str:
@@ -146,8 +148,10 @@ class LaboratoryPerson:
                 if slip == "types a height":
                     height = round(height + self._random.uniform(-2e-3, 2e-3), 4)
                     answer = f"{1e3 * height:.1f}".replace(".", self._random.choice(".,"))
+                self.height_m = None if slip == "misses" else height
                 world.place_probe(height + (3e-3 if slip == "misses" else 0.0))
             case ShieldProbe():
+                self.height_m = None
                 world.place_probe(None)
         return answer
 

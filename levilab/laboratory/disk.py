@@ -8,6 +8,7 @@ written to it, a folder a name or not.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 import shutil
@@ -22,6 +23,7 @@ from levilab.computer import Computer
 
 if TYPE_CHECKING:
     import io
+    from collections.abc import Iterator
     from random import Random
 
     from levilab.laboratory.fate import Fate
@@ -128,6 +130,7 @@ class SimulatedComputer(Computer):
         random: decides what a loss of power takes.
         room: bytes that still go onto the disk.
         fault: the error of the next write, sync or rename; 0: none.
+        unread: number of files that are opened to be read until one cannot be; 0: all can.
         offset_s: by how much its clock is off [s].
         passed_s: time that has passed in the laboratory [s].
         names, kept: path → file or folder as processes see them, and as they are after a loss of power.
@@ -138,6 +141,7 @@ class SimulatedComputer(Computer):
     random: Random
     room: float = float("inf")
     fault: int = 0
+    unread: int = 0
     offset_s: float = 0.0
     passed_s: float = 0.0
     names: dict[Path, Node] = field(default_factory=dict)
@@ -233,6 +237,24 @@ class SimulatedComputer(Computer):
         """See `Computer`."""
         return process == self.process
 
+    @contextlib.contextmanager
+    def may_fail_to_read(self) -> Iterator[None]:
+        """Let `unread` count the files that are opened to be read, by whatever function."""
+        sound = Path.open
+
+        def open_(path: Path, mode: str = "r", *more: Any, **named: Any) -> Any:
+            if self.unread and mode in {"r", "rb", "rt"}:
+                self.unread -= 1
+                if not self.unread:
+                    raise OSError(errno.EIO, os.strerror(errno.EIO), str(path))
+            return sound(path, mode, *more, **named)
+
+        Path.open = open_  # type: ignore[method-assign, assignment]
+        try:
+            yield
+        finally:
+            Path.open = sound  # type: ignore[method-assign]
+
     # --- what happens to it ---
 
     def forget(self, folder: Path) -> None:
@@ -245,7 +267,7 @@ class SimulatedComputer(Computer):
     def end_process(self, *, power: bool) -> None:
         """Let a process be gone; without power, what was not on the disk is lost, too."""
         self.held.clear()
-        self.fault = 0
+        self.fault = self.unread = 0
         if power:
             self._lose_power()
 

@@ -28,6 +28,8 @@ _OUT_S = (0.5, 3.0, 15.0, 100.0)
 _SET_S = (-3600.0, -90.0, -2.0, 2.0, 90.0, 3600.0)
 #: Errors of a disk.
 _ERRORS = (errno.EIO, errno.EDQUOT, errno.EROFS, errno.EACCES)
+#: A file that cannot be read is one of so many that are opened next.
+_READS = 3
 #: Room that is left on a full disk, at most [bytes].
 _ROOM = 3000
 
@@ -73,10 +75,15 @@ def _fail_link(place: Place, value: float) -> None:
     place.bench.faults.append(LinkFault(_choose(_LINK, value), times=1 + int(100 * value) % 3))
 
 
+def out_s(value: float) -> float:
+    """Return how long a cable or a plug of this value is out [s]."""
+    return _choose(_OUT_S, value * 7 % 1)
+
+
 def _pull(place: Place, value: float, *, plug: bool) -> None:
     bench = place.bench
     pull = bench.pull_plug if plug else bench.pull_cable
-    pull(bench.device(value), _choose(_OUT_S, value * 7 % 1))
+    pull(bench.device(value), out_s(value))
 
 
 def _interrupt_twice(*_: object) -> None:
@@ -103,6 +110,10 @@ def _fail_disk(place: Place, value: float) -> None:
     place.computer.fault = _choose(_ERRORS, value)
 
 
+def _fail_to_read(place: Place, value: float) -> None:
+    place.computer.unread = 1 + int(value * _READS)
+
+
 def _fill_disk(place: Place, value: float) -> None:
     place.computer.room = int(value * _ROOM)
 
@@ -116,19 +127,14 @@ EVENTS: dict[str, What] = {
     "disk error": What(
         "the disk answers {}", _fail_disk, lambda v: errno.errorcode[_choose(_ERRORS, v)], of_bench=False
     ),
+    "unreadable": What("a file cannot be read", _fail_to_read, of_bench=False),
     "slow disk": What("the disk takes {:.0f} s", lambda place, v: place.clock.let_pass(30 * v), lambda v: 30 * v),
     "folder": What("the person removes the run's folder", lambda place, _: place.remove_folder(), of_bench=False),
     "clock": What("the computer's clock is set by {:+.0f} s", _set_clock, lambda v: _choose(_SET_S, v)),
     "lid": What("the lid is closed for {:.0f} s", lambda place, v: place.clock.let_pass(2000 * v), lambda v: 2000 * v),
     "link": What("the next answer of an instrument: {}", _fail_link, lambda v: _choose(_LINK, v)),
-    "cable": What(
-        "a cable is out for {:g} s", lambda place, v: _pull(place, v, plug=False), lambda v: _choose(_OUT_S, v * 7 % 1)
-    ),
-    "plug": What(
-        "an instrument has no power for {:g} s",
-        lambda place, v: _pull(place, v, plug=True),
-        lambda v: _choose(_OUT_S, v * 7 % 1),
-    ),
+    "cable": What("a cable is out for {:g} s", lambda place, v: _pull(place, v, plug=False), out_s),
+    "plug": What("an instrument has no power for {:g} s", lambda place, v: _pull(place, v, plug=True), out_s),
     "top taken": What("the person takes the top out of the air", _take_top),
     "mistypes": What("the person mistypes", _slip("mistypes"), kind="task"),
     "types a height": What("the person types another height", _slip("types a height"), kind="task"),

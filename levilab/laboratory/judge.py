@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import math
 import re
 from dataclasses import dataclass, field
@@ -11,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from levilab.errors import LevilabError
+from levilab.laboratory.events import out_s
 from levilab.runs.run import Run
 from levilab.simulator.laws import LAWS
 from levilab.world.spin_world import SpinWorld
@@ -34,21 +36,26 @@ _U = {"spin_frequency_hz": "spin_frequency_u_hz", "flux_density_t": "flux_densit
 #: Readings from which on a scatter of them is known well enough for 5 u to be far off: Student's law with 8 degrees of
 #: freedom has one value in 1000 beyond, in laboratories whose counter states no u.
 _FEW = 10
+#: Two numbers that should be the same differ by less.
+_ROUNDED = 1e-9
+#: An instrument that is out for less is reached again; levilab tries for half a minute [s].
+_BRIEF_S = 20.0
 #: What no message may hold: Python's own words.
 _PYTHON = re.compile(r"Traceback|<[a-z_.]+ object at|\bNone\b|\bNaN\b|Error\(|\{\}|errno")
 
 
 @dataclass(frozen=True)
 class Compared:
-    """A reading beside the truth.
+    """A value of a reading beside the truth.
 
     Attributes:
         row: the reading.
-        truth: [Hz].
-        u: of the reading [Hz].
+        value, truth: in the unit of the value.
+        u: of the value; 0: the two are the same.
     """
 
     row: Row
+    value: float
     truth: float
     u: float
 
@@ -69,6 +76,8 @@ class Life:
         first: index of the first of the rows that this process has read.
         left: the status of its run, as others read it then; empty where there is none.
         output_on: whether the drive was on when it had ended.
+        driven: readings of a top that should coast, shown while the drive was on.
+        spinning: falls that were shown while the top still spun.
         truth: what the world says of the rows that it has read.
     """
 
@@ -85,6 +94,8 @@ class Life:
     first: int = 0
     left: str = ""
     output_on: bool = False
+    driven: int = 0
+    spinning: int = 0
     truth: list[Compared] = field(default_factory=list)
 
 
@@ -101,8 +112,8 @@ class Finding:
     text: str
 
 
-def compare(session: Session[Any], world: World, plan: Plan, first: int) -> list[Compared]:
-    """Return the spins that a process has read beside those of the world; none for other experiments."""
+def compare_spins(session: Session[Any], world: World, plan: Plan, first: int) -> list[Compared]:
+    """Return the spins of a coasting top that a process has read beside those of the world."""
     if plan.experiment != "spin" or session.zero is None or not isinstance(world, SpinWorld):
         return []
     rows = session.rows[first:]
@@ -113,8 +124,32 @@ def compare(session: Session[Any], world: World, plan: Plan, first: int) -> list
         spin, _ = world.motion(np.linspace(at - gate / 2, at + gate / 2, 9))
         truth = float(np.mean(spin)) / (2 * math.pi)
         u = math.hypot(row.get("spin_frequency_u_hz", 0.0), math.sqrt(2) * plan.scene.jitter / gate)
-        found.append(Compared(row, truth, u))
+        found.append(Compared(row, row["spin_frequency_hz"], truth, u))
     return found
+
+
+def compare_at_once(row: Row, plan: Plan, world: World, height_m: float | None, now: float) -> list[Compared]:
+    """Return what a reading says beside what is so at the moment in which it is shown.
+
+    Args:
+        row: the reading.
+        plan: of the laboratory.
+        world: with the probe, which stands where it was read, and the tops.
+        height_m: where the person believes the probe to be.
+        now: the time on the bench [s].
+    """
+    if plan.experiment == "field" and height_m is not None:
+        field = Compared(row, row["flux_density_t"], world.flux_density(now), row["flux_density_u_t"])
+        return [Compared(row, row["height_m"], height_m, 0.0), field]
+    return []
+
+
+def is_false_fall(text: str, plan: Plan, world: World, now: float) -> bool:
+    """Return whether a text says that the top fell, and it still spins at this time on the bench [s]."""
+    if plan.experiment != "spin" or "the top fell" not in text or not isinstance(world, SpinWorld):
+        return False
+    spin, _ = world.motion(np.array([now]))
+    return bool(spin[0] > 0)
 
 
 def drives(bench: LaboratoryBench) -> bool:
@@ -131,6 +166,8 @@ def lives(plan: Plan, processes: Sequence[Life], folders: Sequence[Path]) -> Ite
     for life in processes:
         yield from _ended_well(life)
         yield from _outputs(life)
+        yield from _falls(life)
+        yield from _gave_up(plan, life)
         yield from _readings_are_true(life)
     yield from _files_are_whole(plan, processes, folders)
 
@@ -159,13 +196,30 @@ def _outputs(life: Life) -> Iterator[Finding]:
     said = any("MAY STILL BE ON" in text for text in (life.text, *life.messages))
     if life.output_on and life.ended != "killed" and not said:
         yield Finding("output", f"process {life.number + 1} {life.ended}, and the drive is on: {life.text}")
+    if life.driven:
+        text = f"{life.driven} readings of a top that coasts, and the drive is on"
+        yield Finding("output", f"process {life.number + 1}: {text}")
+
+
+def _falls(life: Life) -> Iterator[Finding]:
+    if life.spinning:
+        yield Finding("false fall", f"process {life.number + 1} says that the top fell, and it still spins")
+
+
+def _gave_up(plan: Plan, life: Life) -> Iterator[Finding]:
+    """Yield a process that ended in the middle of its run because an instrument was out once, for a moment."""
+    of_life = [event for event in plan.events if event.life == life.number]
+    brief = len(of_life) == 1 and of_life[0].what in {"cable", "plug"} and out_s(of_life[0].value) < _BRIEF_S
+    by_hand = plan.experiment == "field" or "spin.drive_waveform=NONE" in plan.settings
+    if brief and by_hand and life.shown and life.ended == "failed":
+        yield Finding("gave up", f"process {life.number + 1}: {life.text}")
 
 
 def _readings_are_true(life: Life) -> Iterator[Finding]:
     for one in life.truth:
-        off = (one.row["spin_frequency_hz"] - one.truth) / one.u
-        if abs(off) > _MOST_U_OF_READING:
-            text = f"{one.row} is {off:+.1f} u from the truth, {one.truth:.4f} Hz"
+        if abs(one.value - one.truth) > _MOST_U_OF_READING * one.u + _ROUNDED:
+            off = f"{(one.value - one.truth) / one.u:+.1f} u from" if one.u else "not"
+            text = f"{one.value:.6g} in {one.row} is {off} the truth, {one.truth:.6g}"
             yield Finding("wrong reading", f"process {life.number + 1}: {text}")
 
 
@@ -184,7 +238,7 @@ def _files_are_whole(plan: Plan, processes: Sequence[Life], folders: Sequence[Pa
         if any(not after > before for before, after in pairwise(times)):
             yield Finding("doubled", f"{run.folder}: times {times}")
         if plan.experiment == "spin" and not any(event.what in _LATE for event in plan.events):
-            yield from _nothing_skipped(run, times)
+            yield from _at_intervals(run, times)
 
 
 def _nothing_lost(life: Life, rows: Sequence[list[Row]], events: Collection[str]) -> Iterator[Finding]:
@@ -198,13 +252,15 @@ def _nothing_lost(life: Life, rows: Sequence[list[Row]], events: Collection[str]
             yield Finding("lost", f"process {life.number + 1} has shown the event {text!r}, which is in no run")
 
 
-def _nothing_skipped(run: Run, times: list[float]) -> Iterator[Finding]:
-    """Yield gaps between readings that no event explains."""
+def _at_intervals(run: Run, times: list[float]) -> Iterator[Finding]:
+    """Yield gaps between readings that no event explains, and readings that catch up with others."""
     interval = run.record.configuration["spin"]["interval_s"]
     said = [event["time_s"] for event in run.events() if event["time_s"] is not None]
     for before, after in pairwise(times):
         if after - before > 1.5 * interval and not any(before <= time <= after for time in said):
             yield Finding("skipped", f"{run.folder}: no reading between {before:g} s and {after:g} s, and no event")
+        if after - before < 0.5 * interval:
+            yield Finding("crowded", f"{run.folder}: readings at {before:g} s and {after:g} s, {interval:g} s apart")
 
 
 def _follow(shown: list[Row], stored: list[Row]) -> bool:
@@ -254,6 +310,13 @@ def same_rows(first: list[Row], second: list[Row]) -> Iterator[Finding]:
 
 
 # --- the analyses ---
+
+
+def report(page: str) -> Iterator[Finding]:
+    """Yield the words of Python in a report as HTML, outside of its figure."""
+    words = html.unescape(re.sub(r"<(script|style|svg)\b.*?</\1>|<[^>]*>", " ", page, flags=re.DOTALL))
+    if found := _PYTHON.search(words):
+        yield Finding("report", f"{found.group()!r} in {words[max(found.start() - 60, 0) : found.end() + 60]!r}")
 
 
 def values(plan: Plan, analysis: str, result: Any) -> Iterator[Finding]:

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 #: Processes that a laboratory has at most: the first, and those that resume its run.
 MOST_LIVES = 4
+#: A slip is drawn so many times as often as anything else that goes wrong, where a person has tasks.
+_SLIPS = 3
 #: Share of laboratories in which nothing goes wrong: there every number must be right.
 _CALM = 0.15
 
@@ -140,7 +142,8 @@ def _draw_model(kind: str, random: Random) -> str:
 
 def _draw_events(work: Work, random: Random) -> list[Event]:
     """Draw a few events, more of them in early lives: a run that is not broken off has no other."""
-    names = [name for name, what in EVENTS.items() if what.kind == "step" or work.tasks]
+    slips = [name for name, what in EVENTS.items() if what.kind == "task"]
+    names = [name for name in EVENTS if name not in slips] + slips * (_SLIPS if work.tasks else 0)
     events = []
     for _ in range(1 + int(random.expovariate(0.5))):
         what = random.choice(names)

@@ -29,10 +29,12 @@ from levilab.laboratory.bench import LaboratoryClock, LaboratoryPerson, laborato
 from levilab.laboratory.disk import SimulatedComputer
 from levilab.laboratory.events import EVENTS
 from levilab.laboratory.fate import Fate, Killed
-from levilab.laboratory.judge import Life
+from levilab.laboratory.judge import Finding, Life
 from levilab.laboratory.plan import MOST_LIVES
 from levilab.pipelines.suits import analyze_suiting
 from levilab.present.progress import Display
+from levilab.report.document import document_of
+from levilab.report.html.page import page_of
 from levilab.runs.find import find_runs
 from levilab.runs.listing import list_runs
 from levilab.runs.run import Run
@@ -54,6 +56,10 @@ if TYPE_CHECKING:
 #: Where the runs are, the bench file of a bench that goes on between processes, and the command of each run.
 _RUNS, _BENCH, _COMMAND = Path("runs"), Path("bench.toml"), ["levilab", "acquire"]
 
+#: One laboratory in so many has a report, whose figure takes longer than all the rest; in another one the analyses are
+#: repeated with one of the first files that cannot be read.
+_REPORTED, _ANALYZED_AGAIN, _READ_BY_ANALYSIS = 20, 5, 7
+
 
 class _Screen(Display):
     """Remembers what a person has seen."""
@@ -65,11 +71,17 @@ class _Screen(Display):
         session = self._visit.session
         assert session is not None
         self._life.shown.append(dict(session.rows[-1]))
-        self._visit.fate.step(f"shows {text}")
+        visit = self._visit
+        height, now = visit.person.height_m, visit.clock.now()
+        self._life.truth += judge.compare_at_once(session.rows[-1], visit.plan, visit.world, height, now)
+        self._life.driven += visit.plan.experiment == "spin" and judge.drives(visit.bench)
+        visit.fate.step(f"shows {text}")
 
     def message(self, text: str) -> None:
         session = self._visit.session
         self._life.messages.append(text)
+        visit = self._visit
+        self._life.spinning += judge.is_false_fall(text, visit.plan, visit.world, visit.clock.now())
         if session is not None and session.doing.text == text:
             self._life.events.append(text)
         self._visit.fate.step(f"says {text}")
@@ -132,7 +144,7 @@ class Visit:
         argv = sys.argv
         sys.argv = [*_COMMAND, self.plan.experiment]  # as the record of the run has it
         try:
-            with at_another_computer(self.computer):
+            with at_another_computer(self.computer), self.computer.may_fail_to_read():
                 yield
         finally:
             sys.argv = argv
@@ -158,7 +170,7 @@ class Visit:
         """Note what a process has left behind, and let it be gone."""
         if self.session is not None:
             life.folder, life.zero = self.session.writer.folder, self.session.zero
-            life.truth = judge.compare(self.session, self.world, self.plan, life.first)
+            life.truth += judge.compare_spins(self.session, self.world, self.plan, life.first)
         life.output_on = judge.drives(self.bench)
         self.bench.end_process()
         if self.plan.mock:
@@ -238,28 +250,40 @@ class Visit:
 
     # --- the analyses ---
 
-    def judge(self) -> list[judge.Finding]:
+    def judge(self) -> list[Finding]:
         """Analyze every run that is left, and return all that is wrong."""
         with self._at_the_place():
             folders = sorted(find_runs(_RUNS)) if _RUNS.exists() else []
             found = [*judge.lives(self.plan, self.lives, folders)]
             self.fate.trace += [f"~ {one}" for one in list_runs(_RUNS)] if folders else []
             for folder in folders:
-                try:
-                    for analysis, result in analyze_suiting([folder], {}):
-                        document = analysis.document(result, folder)
-                        text = json.dumps(document, sort_keys=True, allow_nan=False)
-                        analysis.tables(result)
-                        self.fate.trace.append(
-                            f"~ {analysis.name} {result.text} {hashlib.sha256(text.encode()).hexdigest()[:12]}"
-                        )
-                        found += judge.values(self.plan, analysis.name, result)
-                except (LevilabError, AnalysisError, InstrumentError) as error:
-                    self.fate.trace.append(f"~ {error}")
-                    found += judge.message(str(error), "analysis")
-                except Exception as error:  # noqa: BLE001 - it would be a traceback
-                    found.append(judge.Finding("traceback", "".join(traceback.format_exception(error))))
+                found += self._judge_analyses(folder)
+                if self.plan.seed % _ANALYZED_AGAIN == 1:
+                    self.computer.unread = 1 + self.plan.seed % _READ_BY_ANALYSIS
+                    found += self._judge_analyses(folder)
+                    self.computer.unread = 0
         return found
+
+    def _judge_analyses(self, folder: Path) -> Iterator[Finding]:
+        """Analyze a run; yield what is wrong with the results, or with the failure."""
+        try:
+            for analysis, result in analyze_suiting([folder], {}):
+                document = analysis.document(result, folder)
+                text = json.dumps(document, sort_keys=True, allow_nan=False)
+                analysis.tables(result)
+                self.fate.trace.append(
+                    f"~ {analysis.name} {result.text} {hashlib.sha256(text.encode()).hexdigest()[:12]}"
+                )
+                yield from judge.values(self.plan, analysis.name, result)
+                if self.plan.seed % _REPORTED == 0:
+                    page = page_of(document_of([(analysis, result)]))
+                    self.fate.trace.append(f"~ report {hashlib.sha256(page.encode()).hexdigest()[:12]}")
+                    yield from judge.report(page)
+        except (LevilabError, AnalysisError, InstrumentError) as error:
+            self.fate.trace.append(f"~ {error}")
+            yield from judge.message(str(error), "analysis")
+        except Exception as error:  # noqa: BLE001 - it would be a traceback
+            yield Finding("traceback", "".join(traceback.format_exception(error)))
 
 
 @dataclass(frozen=True)
@@ -274,7 +298,7 @@ class Told:
     """
 
     plan: Plan
-    findings: tuple[judge.Finding, ...]
+    findings: tuple[Finding, ...]
     trace: tuple[str, ...]
     story: tuple[str, ...]
 

@@ -204,9 +204,15 @@ class Run:
         return elapsed
 
     def events(self) -> list[dict[str, Any]]:
-        """Return the events so far, each with time_s (or None), kind and text; damaged lines are left out."""
+        """Return the events so far, each with time_s (or None), kind and text; damaged lines are left out.
+
+        Raises DataError where the disk fails.
+        """
         path = self.folder / EVENTS
-        lines = path.read_text(encoding="utf-8", errors="replace").split("\n") if path.is_file() else []
+        try:
+            lines = path.read_text(encoding="utf-8", errors="replace").split("\n") if path.is_file() else []
+        except OSError as error:
+            raise DataError(f"{path}: cannot be read ({error.strerror}): copy the run from another disk") from error
         return [event for line in lines if (event := _event(line))]
 
     def warnings(self) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ from levilab.acquisition.session import ExperimentFailed, NotHeld
 from levilab.bench.config import ConfigError
 from levilab.bench.kinds import COUNTER
 from levilab.bench.person import Task
+from levilab.computer import computer
 from levilab.present.numbers import pulses_too_many
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
@@ -333,7 +334,8 @@ def _count_gates(session: Session[PrecessionSettings], drive: float, what: str, 
     counter = session.bench.counter
     found: list[tuple[float, float, float]] = []
     seed = session.writer.record.seed  # of a virtual run, which is the same each time
-    random = np.random.default_rng(None if seed is None else (seed, round(1e6 * drive), channel))
+    seed = int(computer().token(), 16) if seed is None else seed
+    random = np.random.default_rng((seed, round(1e6 * drive), channel))
 
     def prepare(gate_s: float = settings.gate_s) -> None:
         counter.prepare(gate_s=gate_s, trigger_level_v=level_v, channel=channel)

@@ -91,6 +91,8 @@ def _with_spin_beside(path: Path, readings: SwayReadings) -> SwayReadings:
 
 
 def _with_spin(readings: SwayReadings, table: Table) -> SwayReadings:
+    if not table.column("time_s").size:  # nothing was counted
+        return readings
     spin = np.interp(readings.time, table.column("time_s"), table.column("spin_frequency_hz"))
     return replace(readings, spin=spin, warnings=(*readings.warnings, *table.warnings))
 

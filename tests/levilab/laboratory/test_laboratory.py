@@ -6,6 +6,10 @@ from dataclasses import replace
 
 import pytest
 
+from instruments.drivers.magnetometer.lakeshore import LakeShoreGaussmeter
+from levilab.acquisition import driving
+from levilab.acquisition.experiments import field
+from levilab.acquisition.session import Session
 from levilab.bench.bench import Bench
 from levilab.cli.exit_codes import exit_status
 from levilab.laboratory import explore
@@ -14,6 +18,7 @@ from levilab.laboratory.fate import Event
 from levilab.laboratory.plan import draw
 from levilab.laboratory.shrink import shrink
 from levilab.laboratory.visit import visit
+from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from levilab.workers.ways import this_process
 
@@ -37,6 +42,11 @@ def spin_down(*events):
     return a_plan("spin", "drive_waveform=NONE", "interval_s=5", events=events)
 
 
+def a_scan(*events):
+    """A Hall scan of five heights."""
+    return a_plan("field", "step_m=0.02", "readings=2", events=events)
+
+
 def left_on_before(*events):
     """A process that is killed while it drives, and another one."""
     return a_plan("spin", "drive_frequency_hz=35", events=[Event("kill", 0, 300), *events])
@@ -50,6 +60,7 @@ FAILED_ONCE = {
     "no disk after a kill, and the drive on": left_on_before(Event("disk error", 1, 1)),
     "no generator after a kill, and the drive on": left_on_before(*(Event("link", 1, 1, 0.05) for _ in range(3))),
     "Ctrl-C after a kill, and the drive on": left_on_before(Event("ctrl-c", 1, 1)),
+    "a probe was zeroed outside of its chamber": a_scan(Event("mistypes", 0, 1)),
 }
 
 
@@ -112,6 +123,37 @@ def off_by_a_turn(patch):
     patch.setattr(RunWriter, "reading", reading)
 
 
+def another_height_than_typed(patch):
+    patch.setattr(field, "parse_height", lambda _: 0.05)
+
+
+def in_gauss(patch):
+    once = LakeShoreGaussmeter.flux_density
+    patch.setattr(LakeShoreGaussmeter, "flux_density", lambda driver: 1e4 * once(driver))
+
+
+def catches_up(patch):
+    once = Session.readings_every
+    patch.setattr(Session, "readings_every", lambda session, interval, longest: once(session, interval / 3, longest))
+
+
+def not_set_up_again(patch):
+    once = Session.reconnect
+    patch.setattr(Session, "reconnect", lambda session, kind, error, _: once(session, kind, error, lambda: None))
+
+
+def drives_on(patch):
+    patch.setattr(driving, "drive_off", lambda _: None)
+
+
+def with_none_in_it(patch):
+    patch.setattr("levilab.laboratory.visit.page_of", lambda _: "<p>None</p><svg>NaN</svg>")
+
+
+def raises_what_the_disk_says(patch):
+    patch.setattr(Run, "events", lambda run: [(run.folder / "run.json").read_bytes() for _ in range(9)] and [])
+
+
 @pytest.mark.parametrize(
     ("mistake", "oracle", "plan"),
     [
@@ -120,6 +162,13 @@ def off_by_a_turn(patch):
         (written_twice, "doubled", spin_down()),
         (with_a_defect, "traceback", spin_down()),
         (off_by_a_turn, "wrong reading", spin_down()),
+        (another_height_than_typed, "wrong reading", a_scan(Event("types a height", 0, 3))),
+        (in_gauss, "wrong reading", a_scan()),
+        (catches_up, "crowded", spin_down()),
+        (not_set_up_again, "false fall", spin_down(Event("plug", 0, 150, 0.03))),
+        (drives_on, "output", a_plan("spin", "hold_s=0", "drive_frequency_hz=35")),
+        (with_none_in_it, "report", spin_down()),
+        (raises_what_the_disk_says, "traceback", replace(spin_down(), seed=31)),
         (left_on, "output", a_plan("spin", "drive_frequency_hz=35", events=[Event("ctrl-c", 0, 300)])),
     ],
 )

@@ -92,7 +92,7 @@ def test_a_drift_shows_at_the_height_that_is_read_again(tmp_path, lost, warned):
 
 
 def test_a_height_that_is_typed_is_the_one_that_is_kept(tmp_path):
-    answers = iter(["", "41,5", "high", "4.9 cm", "", "", "", ""])
+    answers = iter(["", "", "", "41,5", "high", "4.9 cm", "", "", "", ""])
     asked = []
 
     def person(task):
@@ -100,12 +100,21 @@ def test_a_height_that_is_typed_is_the_one_that_is_kept(tmp_path):
         return next(answers)
 
     run = acquire(request_of(tmp_path, person=person), Silent())
-    assert asked[1].text.startswith("Height 1 of ")
-    assert "type the height in mm" in asked[1].prompt
+    assert asked[3].text.startswith("Height 1 of ")
+    assert "type the height in mm" in asked[3].prompt
     assert run.readings().column("height_m").tolist() == [0.0415, 0.049, 0.06, 0.07, 0.08]
     texts = [event["text"] for event in run.events()]
     assert "'high' is no height: a number in mm is expected, as 61.5" in texts
     assert "the probe stands at 41.50 mm" in texts
+
+
+def test_a_probe_that_sees_a_field_is_asked_into_its_chamber_again(tmp_path):
+    """On this bench it is left where it was, and all heights are off by what is zeroed there."""
+    asked = []
+    run = acquire(request_of(tmp_path, person=lambda task: asked.append(task.text) or ""), Silent())
+    assert [text.partition(",")[0] for text in asked[1:3]] == ["The probe sees 19.4 mT"] * 2
+    (warning,) = (event["text"] for event in run.events() if event["kind"] == "warning")
+    assert warning.startswith("the probe was zeroed in 19.4 mT")
 
 
 @pytest.mark.parametrize(

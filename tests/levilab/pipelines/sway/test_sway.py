@@ -11,6 +11,8 @@ from levilab.formats.device import Device, read_device
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.many.table import Row, Task, analyze_one
 from levilab.pipelines.suits import analyze_suiting
+from levilab.runs.run import RunRecord
+from levilab.runs.writer import RunWriter
 from support.commands import command
 from support.paths import ROOT
 
@@ -121,6 +123,17 @@ def test_the_spin_of_a_film_stands_beside_its_track(found, tmp_path):
     track = write(tmp_path / "a.tracks.csv", ("time_s", "x_m", "y_m"), metres)
     measured = analyze(track, device=DEVICE).runs[0].geometry.measured
     assert measured.value == pytest.approx(found.runs[0].geometry.measured.value, rel=1e-4)
+
+
+def test_a_run_in_which_nothing_was_counted_has_no_spin(tmp_path):
+    lines = [f"{float(r['t [s]']):.4f},{r['x [mm]']}e-3,{r['y [mm]']}e-3" for r in rows_of(TRACK)[:1200]]
+    columns = [{"name": "time_s", "unit": "s"}, {"name": "spin_frequency_hz", "unit": "Hz"}]
+    record = RunRecord(experiment="sway", status="finished", started_utc="2026-11-20T10:15:00Z", channels=columns)
+    with RunWriter.create(tmp_path, record) as writer:
+        writer.film(["time_s,x_m,y_m", *lines])
+        writer.finish("finished")
+    with pytest.raises(DataError, match="the spin is not known"):
+        analyze(writer.folder, device=DEVICE)
 
 
 def test_the_base_is_the_calliper_s_or_that_of_a_scan():
