@@ -23,7 +23,8 @@ PAGES = [
 
 @pytest.fixture(autouse=True, scope="module")
 def less_work():
-    with with_less_work():
+    """No test looks at a figure here: those of each analysis are drawn by the tests of its room."""
+    with without_drawing(), with_less_work():
         yield
 
 
@@ -46,7 +47,7 @@ def copy_samples(text, place):
 def test_python_in_the_pages_prints_what_it_says(page, code, tmp_path):
     copy_samples(code, tmp_path)
     shown = io.StringIO()
-    with contextlib.chdir(tmp_path), contextlib.redirect_stdout(shown), without_drawing():
+    with contextlib.chdir(tmp_path), contextlib.redirect_stdout(shown):
         exec(compile(code, page, "exec"), {"__name__": "__main__"})
     assert shown.getvalue().splitlines() == re.findall(r"print\(.*\)  # (.*)", code)
 
@@ -86,21 +87,11 @@ def as_pattern(shown):
     return "".join(lines) + r"\Z"
 
 
-#: The page whose figures are drawn, those of every analysis.  No test looks at those of the others.
-DRAWN = "README.md"
-
-
-@pytest.mark.parametrize("page", steps())
-def test_the_commands_of_a_page_work_one_after_another(tmp_path, page):
-    copy_samples(" ".join(steps()[page]), tmp_path)
-    with contextlib.nullcontext() if page == DRAWN else without_drawing():
-        follow(steps()[page], tmp_path)
-
-
-def follow(steps, place):
-    """Carry out the commands of a page, and compare what they write with what it shows."""
+@pytest.mark.parametrize("steps", steps().values(), ids=steps())
+def test_the_commands_of_a_page_work_one_after_another(tmp_path, steps):
+    copy_samples(" ".join(steps), tmp_path)
     for line, outputs in steps.items():
-        ended = command(*shlex.split(line)[1:], cwd=place)
+        ended = command(*shlex.split(line)[1:], cwd=tmp_path)
         assert ended.status == 0, (line, ended.err)
         written = ended.err + ended.out  # progress comes before results
         for shown in outputs:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import starmap
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -92,38 +93,26 @@ def _columns_of_line(start: str, name: str) -> tuple[Observable, Observable]:
     )
 
 
+#: Name, unit, meaning, type of the array, and what it is made from.
+_ROWS: tuple[tuple[str, str, str, str, Need], ...] = (
+    ("survived", "1", "Whether the top is still up at the end.", "bool", "ends"),
+    ("lifetime_s", "s", "Time from the start to the fall; NaN of a top that is still up.", "float64", "ends"),
+    ("fall_spin_hz", "Hz", "Spin at the moment of the fall; NaN of a top that is still up.", "float64", "ends"),
+    ("end_spin_hz", "Hz", "Spin at the end, or at the fall.", "float64", "ends"),
+    ("energy_error", "1",
+     "Change of the energy from start to end, relative; NaN where drag, drive or washers change it.", "float64",
+     "ends"),
+    ("position_error_m", "m", "Estimated error of the place at the end, or at the fall.", "float64", "errors"),
+    ("highest_spin_hz", "Hz", "Highest spin on the way, with its swing about a drive.", "float64", "samples"),
+    ("height_spread_m", "m", "Highest less lowest place; NaN of a top that falls.", "float64", "samples"),
+    ("locked", "1",
+     "Whether the top is up and its body slips by no turn behind the drive in the last half of the time.", "bool",
+     "samples"),
+)  # fmt: skip
 OBSERVABLES: dict[str, Observable] = {
     one.name: one
     for one in (
-        Observable("survived", "1", "Whether the top is still up at the end.", "bool", "ends"),
-        Observable(
-            "lifetime_s", "s", "Time from the start to the fall; NaN of a top that is still up.", "float64", "ends"
-        ),
-        Observable(
-            "fall_spin_hz", "Hz", "Spin at the moment of the fall; NaN of a top that is still up.", "float64", "ends"
-        ),
-        Observable("end_spin_hz", "Hz", "Spin at the end, or at the fall.", "float64", "ends"),
-        Observable(
-            "energy_error",
-            "1",
-            "Change of the energy from start to end, relative; NaN where drag, drive or washers change it.",
-            "float64",
-            "ends",
-        ),
-        Observable(
-            "position_error_m", "m", "Estimated error of the place at the end, or at the fall.", "float64", "errors"
-        ),
-        Observable(
-            "highest_spin_hz", "Hz", "Highest spin on the way, with its swing about a drive.", "float64", "samples"
-        ),
-        Observable("height_spread_m", "m", "Highest less lowest place; NaN of a top that falls.", "float64", "samples"),
-        Observable(
-            "locked",
-            "1",
-            "Whether the top is up and its body slips by no turn behind the drive in the last half of the time.",
-            "bool",
-            "samples",
-        ),
+        *starmap(Observable, _ROWS),
         *(column for start, name in LINES.items() for column in _columns_of_line(start, name)),
     )
 }
