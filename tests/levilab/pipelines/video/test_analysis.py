@@ -86,6 +86,14 @@ def test_a_dot_on_the_stem_shows_the_precession_and_the_size_of_the_rim_the_rise
     assert "no dot is seen on the stem" in without.warnings[0]
 
 
+def test_pictures_of_mjpeg_give_places_with_their_own_uncertainty(folder):
+    path = film(folder / "camera.avi", CAMERA, LEVEL, phone_times(0.6), codec="mjpeg")
+    found = analyze_film(path, VideoOptions(rim_m=2 * RIM))
+    errors, _ = compare(found, LEVEL)
+    assert np.abs(errors).max() < 3e-5  # a sixteenth of a pixel
+    assert np.std(errors / found.u) == pytest.approx(1, abs=0.3)  # one factor serves all quantisers to 20 %
+
+
 @pytest.mark.filterwarnings("ignore::DeprecationWarning")  # of trackpy 0.7 with pandas 3
 def test_opencv_and_trackpy_see_the_top_at_the_same_place(path):
     cv2, trackpy = (pytest.importorskip(name) for name in ("cv2", "trackpy"))
