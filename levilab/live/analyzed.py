@@ -71,18 +71,18 @@ class Analyses:
         files = (place.file(RESULT), place.file(REPORT), *(place.file(name) for name in _figures(place)))
         self._before |= {file: stamp(file) for file in files}
         self._threads = {thread for thread in self._threads if thread.is_alive()}
-        thread = threading.Thread(target=self._carry_out, args=(path, [*options, "--language", language]), daemon=True)
+        thread = threading.Thread(target=self._analyze, args=(path, [*options, "--language", language]), daemon=True)
         thread.start()
         self._threads.add(thread)
 
-    def _carry_out(self, path: Path, options: Sequence[str]) -> None:
+    def _analyze(self, path: Path, options: Sequence[str]) -> None:
         try:
             for words in (
                 ["analyze", str(path), *options],
                 ["report", str(path), *options, "--output", str(beside(path).file(REPORT))],
             ):
                 self.running[path] = words[0]
-                status, err = self._run(words)
+                status, err = self.carry_out(words)
                 if status:
                     self.failed[path] = err.strip()[-600:] or f"levilab {words[0]} failed"
                     return
@@ -96,7 +96,7 @@ class Analyses:
         finally:
             self.running.pop(path, None)
 
-    def _run(self, words: Sequence[str]) -> tuple[int, str]:
+    def carry_out(self, words: Sequence[str]) -> tuple[int, str]:
         """Run a command of this program.  Returns its exit status and its messages about failures."""
         with self._lock:
             if self._is_over:

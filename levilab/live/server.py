@@ -14,6 +14,7 @@ import os
 import time
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
@@ -307,6 +308,19 @@ class Pages:
             about[what] = [unquote_names(in_language(text, language)) for text in about.get(what, ())]
         return self._json(about | {"failed": in_language(about["failed"], language)})
 
+    async def export(self, request: Request) -> Response:
+        """Return an input as NetCDF, as `levilab export` writes it."""
+        path, language = self._input(request), _language(request, self.hall)
+        if path is None or not self.doors.knows(request.headers.get("x-levilab-token")):
+            return self._json({"error": in_language(_ONLY_LOOK, language)}, 403)
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / "run.nc"
+            words = ["export", str(path), "--out", str(file)]
+            status, err = await asyncio.to_thread(self.hall.analyses.carry_out, words)
+            if status:
+                return self._json({"error": err.strip()[-600:]}, 400)
+            return Response(file.read_bytes(), media_type="application/x-netcdf", headers=self.doors.headers())
+
     async def take(self, request: Request) -> Response:
         """Keep a file that is dropped into a page, and open it."""
         if not self.doors.knows(request.headers.get("x-levilab-token")):
@@ -388,6 +402,7 @@ def application(hall: Hall) -> Guard:
         Route("/open", pages.open),
         Route("/file", pages.take, methods=["POST"]),
         Route("/{kind}/{input}/analysis", pages.analysis),
+        Route("/{kind}/{input}/export", pages.export, methods=["POST"]),
         Route("/{kind}/{input}/{name}", pages.result),
     ]
     shared = (Starlette(routes=_views(Pages(hall, hall.guests))), hall.guests) if hall.guests else None

@@ -81,6 +81,16 @@ export async function send(path, body, headers) {
   }
 }
 
+/** Ask the server, with the token, for a file. Returns it as a blob; {error} says what is wrong. */
+export async function load(path, token) {
+  try {
+    const answer = await fetch(`${path}?language=${LANGUAGE}`, {method: "POST", headers: {"X-Levilab-Token": token}});
+    return await (answer.ok ? answer.blob() : answer.json());
+  } catch {
+    return {error: GONE};
+  }
+}
+
 /** Send a command. Returns the answer; {error} says what is wrong with it. */
 export const ask = (wanted, token) =>
   send("do", JSON.stringify(wanted), {"Content-Type": "application/json", "X-Levilab-Token": token});

@@ -1,6 +1,6 @@
 // The live view: asks for frames and shows them. A view only: it may be closed and opened again at any time.
 
-import {command, connect, read, takeToken} from "./connection.js";
+import {command, connect, load, read, takeToken} from "./connection.js";
 import {takeDrops} from "./drop.js";
 import {drawHistory, openHistory} from "./history.js";
 import {drawReadings, drawRecords, saidOf, sheet, tableOf} from "./plot.js";
@@ -268,6 +268,7 @@ function show() {
   put(by("empty"), {hidden: data.count > 0 || minutes});
   put(by("drawn").parentElement, {hidden: !data.count});
   put(by("csv").parentElement, {hidden: !data.readings && !minutes});
+  put(by("netcdf"), {hidden: minutes || !token || !/finished|interrupted/.test(about?.status)});
   write("readings-title", minutes ? phrase("The last minutes") : phrase("Readings"));
   write("empty", {
     none: phrase("No run yet: levilab acquire starts one, here or in another terminal, and it appears."),
@@ -520,6 +521,13 @@ if (matchMedia("(prefers-reduced-motion: reduce)").matches) by("motion").value =
 by("sound").addEventListener("change", () => sound.play(by("sound").checked));
 by("csv").addEventListener("click", () => save(new Blob([isOfMinutes() ? history.table() : tableOf(data.readings)], {type: "text/csv"}), "csv"));
 by("png").addEventListener("click", () => by("plot").toBlob((picture) => save(picture, "png")));
+by("netcdf").addEventListener("click", async () => {
+  put(by("netcdf"), {disabled: true});
+  const answer = await load(`run/${encodeURIComponent(seen.run)}/export`, token);
+  if (answer.error) listEvent({utc: new Date().toISOString()}, answer.error, "warning");
+  else save(answer, "nc");
+  put(by("netcdf"), {disabled: false});
+});
 
 /** Let the browser save what is drawn, by the name of the run. */
 function save(blob, ending) {

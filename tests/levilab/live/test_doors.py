@@ -6,7 +6,7 @@ import pytest
 
 from levilab.live.doors import Doors
 from levilab.live.practice.commands import PracticeEvent
-from support.live_pages import PATIENCE_S, GrowingRun, address, request, serving
+from support.live_pages import PATIENCE_S, GrowingRun, address, request, serving, spin_down
 
 HERE = b"127.0.0.1:8765"
 
@@ -95,6 +95,19 @@ def test_a_report_is_a_page_of_no_origin(hall):
         policy = answer.headers["content-security-policy"]
     assert policy.startswith("sandbox allow-scripts")
     assert "allow-same-origin" not in policy
+
+
+def test_a_run_is_saved_as_netcdf_by_who_may_give_commands(hall):
+    run = GrowingRun(hall.root, "measured")
+    run.readings(spin_down(19))
+    at, right = "/run/measured/export", {"X-Levilab-Token": hall.doors.token}
+    assert request(address(hall), at, b"")[0] == 403
+    status, text = request(address(hall), at, b"", headers=right)
+    assert (status, text[:3], "spin_frequency" in text) == (200, "CDF", True)
+    assert not (run.folder / "run.nc").exists()
+    (run.folder / "readings.csv").write_text("no table", encoding="utf-8")
+    status, text = request(address(hall), at, b"", headers=right)
+    assert (status, json.loads(text)["error"] != "") == (400, True)
 
 
 def test_a_command_needs_the_token(hall, bench):

@@ -118,14 +118,14 @@ def test_an_answer_is_shown_in_one_order_and_nothing_before_it_is_whole(
         if words[0] == "analyze":
             value = Text("C = {value:n}.", value="2.34(1)")
             answer = {"sentences": as_tables(["The disc law fits.", value, "Others do not."])}
-            answer |= {"doubts": ["LOOSE WASHERS"], "warnings": ["LOOSE WASHERS", "one run"]}
+            answer |= {"doubts": ["LOOSE WASHERS"], "notes": ["one run"]}
             file.with_name("steps.csv.result.json").write_text(json.dumps(answer))
             shutil.copy(FIGURE, file.with_name("steps.csv.spindown.png"))
         else:
             file.with_name("steps.csv.report.html").write_text("report")
         return (0, "") if go_on[words[0]].wait(PATIENCE_S) else (1, "")
 
-    monkeypatch.setattr(hall.analyses, "_run", carry_out)
+    monkeypatch.setattr(hall.analyses, "carry_out", carry_out)
     page.goto(f"{address(hall)}open?file={hall.opened.add(file)}#{hall.doors.token}")
     until(page, "window.levilab?.look")
     page.click("#analyze")

@@ -212,7 +212,7 @@ def test_a_student_drives_records_and_analyzes(
     page.select_option("#run", OLDER)  # of another bench, and it is there like one of this
     until(page, f"levilab.data.count === 19 && levilab.data.bench && {can_be_analyzed}")
     with monkeypatch.context() as quick:
-        quick.setattr(served.analyses, "_run", lambda _: (0, ""))
+        quick.setattr(served.analyses, "carry_out", lambda _: (0, ""))
         page.click("#analyze")
         until(page, "document.getElementById('result').open && !document.getElementById('verdict').innerText")
     page.keyboard.press("Escape")
@@ -345,7 +345,7 @@ def test_a_result_that_was_closed_early_is_opened_again(
             (run.folder / "report.html").write_text("<p>", encoding="utf-8")
         return 0, ""
 
-    monkeypatch.setattr(starting.analyses, "_run", answer)
+    monkeypatch.setattr(starting.analyses, "carry_out", answer)
     page.goto(address(starting, token=True))
     until(page, "levilab.frames > 0")
     page.select_option("#run", OLDER)

@@ -151,7 +151,7 @@ def test_a_second_analysis_replaces_the_result_that_is_shown(tmp_path: Path, mon
             (tmp_path / "result.json").write_text(text, encoding="utf-8")
         return 0, ""
 
-    monkeypatch.setattr(analyses, "_run", analyze)
+    monkeypatch.setattr(analyses, "carry_out", analyze)
     for verdict in ("first", "the second"):
         analyses.begin(tmp_path)
         analyses.end()  # which waits for the thread
