@@ -26,6 +26,7 @@ from levilab.formats.titles import (
     unit_factor,
     without_runs_of_blanks,
 )
+from levilab.texts.note import of_file
 
 if TYPE_CHECKING:
     from levilab.formats.kinds import Kind
@@ -393,12 +394,13 @@ def _written_unit(path: Path, name: str, titles: tuple[str, str], units: Sequenc
 
 def _angular(path: Path, label: str) -> str:
     what = f"{shorten(str(path), 200)}: column '{shorten(label)}' is an angular frequency, read in rad/s"
-    return f"{what}; if it counts turns, say so with its column, as f=NAME [Hz]"
+    return of_file("angular", f"{what}; if it counts turns, say so with its column, as f=NAME [Hz]")
 
 
 def _unknown_unit(path: Path, label: str, title: Title) -> str:
     kind = dimension(title.column or "")
-    return (
+    return of_file(
+        "unknown unit",
         f"{shorten(str(path), 200)}: column '{shorten(label)}' is not used: '{shorten(title.unit or '')}' is no unit "
-        f"of {kind} known here ({', '.join(list(UNITS[kind])[:8])} …)"
+        f"of {kind} known here ({', '.join(list(UNITS[kind])[:8])} …)",
     )

@@ -25,6 +25,7 @@ from levilab.formats.dialect import CLOCK, MISSING, UNVALUED, clock_time, is_dat
 from levilab.formats.layout import Layout
 from levilab.formats.texts import Text
 from levilab.formats.titles import dimension, unit_factor
+from levilab.texts.note import Note
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -208,7 +209,7 @@ def _remark_behind(layout: Layout, number: int, line: str) -> Iterator[str]:
     """Yield a note on the words that a person wrote behind the last column."""
     remark = "" if layout.aligned else " ".join(filter(None, layout.dialect.split(line)[layout.width :]))
     if remark:
-        yield f"line {number}: '{shorten(remark)}' behind the last column is left out"
+        yield Note("remark", f"line {number}: '{shorten(remark)}' behind the last column is left out")
 
 
 def _begins_with_words(layout: Layout, line: str) -> bool:
@@ -235,7 +236,8 @@ def _with_order_of_dates(text: Text, layout: Layout, chosen: Sequence[Column], n
     days = [(date(y, b, a).toordinal(), date(y, a, b).toordinal()) for a, b, y in dates]
     by_day, by_month = (max(order) - min(order) for order in zip(*days, strict=True))
     name = "month/day" if by_month < by_day else "day/month"
-    notes.append(f"its dates are taken for {name}/year, in which it lasts less: write 2026-12-31 if they are not")
+    said = f"its dates are taken for {name}/year, in which it lasts less: write 2026-12-31 if they are not"
+    notes.append(Note("dates", said))
     return months_first if by_month < by_day else layout
 
 
@@ -270,7 +272,8 @@ def _doubts_about(time: str) -> Iterator[str]:
     """Yield the doubt about a first time: a stopwatch begins at 0:00 or so, hours and minutes of a clock do not."""
     minutes = re.fullmatch(r"(\d{1,2}):\d\d", time)
     if minutes and int(minutes[1]):
-        yield f"the times, as {time}, are taken for minutes and seconds; of a clock write the seconds, too: {time}:00"
+        text = f"the times, as {time}, are taken for minutes and seconds; of a clock write the seconds, too: {time}:00"
+        yield Note("clock", text)
 
 
 def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: str) -> list[float]:
@@ -335,4 +338,4 @@ def _number_with_unit(path: Path, layout: Layout, column: Column, line: int, tex
 
 
 def _left_out(line: int, text: str, why: str) -> str:
-    return f"line {line}: '{shorten(text.strip())}' {why} and is left out"
+    return Note(why, f"line {line}: '{shorten(text.strip())}' {why} and is left out")

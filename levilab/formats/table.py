@@ -22,6 +22,7 @@ from levilab.formats.rows import Rows, read_rows
 from levilab.formats.texts import Text, must_be_file
 from levilab.formats.titles import CANONICAL, COMPANIONS, QUANTITIES, companion
 from levilab.formats.understanding import Plan, Request, no_column, plan_of
+from levilab.texts.note import of_file, reword
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -223,7 +224,7 @@ def _table(
     gaps: names of columns that may have some, at no cost of a row.
     """
     name = shorten(str(path), 200)
-    notes = [*warnings, *(f"{name}: {note}" for note in rows.notes)]
+    notes = [*warnings, *(reword(note, f"{name}: {note}", names_input=True) for note in rows.notes)]
     numbers = dict(zip(chosen, rows.values, strict=False))
     # The comparison is false for NaN, too.
     present = {column: np.abs(values) < NO_READING for column, values in numbers.items() if column.name not in gaps}
@@ -234,9 +235,9 @@ def _table(
     for column, missing in [(c, read & ~p) for c, p in present.items() if c.name in companions]:
         if missing.any():  # better no uncertainties than readings lost for want of them
             del present[column]
+            rows_of = f"{missing.sum()} of {read.sum()} rows"
             notes.append(
-                f"{name}: column '{shorten(column.label)}' is empty in {missing.sum()} of {read.sum()} rows and "
-                "is not used"
+                of_file("gaps", f"{name}: column '{shorten(column.label)}' is empty in {rows_of} and is not used")
             )
     good = np.logical_and.reduce(list(present.values())) if present else np.ones(rows.lines.size, bool)
     kept = {column: values for column, values in numbers.items() if column in present or column.name in gaps}
@@ -259,7 +260,8 @@ def _missed_warning(name: str, lines: "NDArray[np.int64]", rows: int, *, periods
     """Return the warning about rows left out, with all that counts as missed, a period of 0 with `periods`."""
     kinds = ("empty", *MISSING_WORDS, "inf", *(["a period of 0"] if periods else []))
     places = ", ".join(str(line) for line in lines[:5]) + (", …" if lines.size > 5 else "")
-    return (
+    return of_file(
+        "missed",
         f"{name}: {lines.size} of {rows} rows {'is' if lines.size == 1 else 'are'} left out as missed "
-        f"({', '.join(kinds)} or 9.91E37): line{'s' * (lines.size > 1)} {places}"
+        f"({', '.join(kinds)} or 9.91E37): line{'s' * (lines.size > 1)} {places}",
     )

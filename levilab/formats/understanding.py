@@ -47,6 +47,7 @@ from levilab.formats.titles import (
     read_title,
     unit_factor,
 )
+from levilab.texts.note import of_file
 
 TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: No such top floats far below or above these [Hz], linear theory says 21.65 to 80.6: the unit is in doubt there.
@@ -307,7 +308,9 @@ def _by_values(
     if "Hz" not in possible_spins(median(numbers) if numbers else 0.0):
         return None, ""
     label = layout.header[index]
-    note = f"{shorten(str(path), 200)}: column '{shorten(label)}' has no unit and is taken as the spin in Hz"
+    note = of_file(
+        "no unit", f"{shorten(str(path), 200)}: column '{shorten(label)}' has no unit and is taken as the spin in Hz"
+    )
     return Column(_SPIN, index, label, 1.0, unit="Hz"), note
 
 
@@ -398,7 +401,7 @@ def plan_of(path: Path, request: Request) -> Plan:
     if plans:
         (plan,) = plans
         notes = [str(error) for error in errors if not isinstance(error, NoTable | NoSuchColumn)]
-        return replace(plan, warnings=(*plan.warnings, *(f"not read: {note}" for note in notes)))
+        return replace(plan, warnings=(*plan.warnings, *(of_file("not read", f"not read: {note}") for note in notes)))
     raise next((error for error in errors if not isinstance(error, NoTable)), errors[0])
 
 
@@ -570,4 +573,8 @@ def _titles(
             line=layout.first_line,
         )
     taken = dict(zip(TITLES_WITHOUT_HEADER, filled, strict=False))
-    return numbers, taken, [f"{shorten(str(path), 200)}: no header; the columns are taken as {', '.join(taken)}"]
+    return (
+        numbers,
+        taken,
+        [of_file("no header", f"{shorten(str(path), 200)}: no header; the columns are taken as {', '.join(taken)}")],
+    )

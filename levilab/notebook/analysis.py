@@ -28,11 +28,11 @@ from levilab.notebook.result import AnalysisResult
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.document import refuse_columns_of_runs
 from levilab.pipelines.options import read_options
-from levilab.pipelines.sources import reword
 from levilab.pipelines.suits import suiting
 from levilab.present.numbers import list_in_words
 from levilab.runs.find import find_run
 from levilab.runs.run import Run
+from levilab.texts.note import reword
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -116,7 +116,7 @@ def _of_frames(result: AnalysisResult, folder: Path, called: str, in_words: Call
             copies.append(source.path)
             own = replace(own, name=f"{called} {source.path.stem.removeprefix(FRAME)}".strip())
         sources.append(own)
-    warnings = tuple(map(in_words, result.found.warnings))
+    warnings = tuple(reword(text, in_words(text)) for text in result.found.warnings)
     found = replace(result.found, sources=tuple(sources), warnings=warnings)
     return AnalysisResult(result.analysis, found, tuple(copies))
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 from levilab.pipelines.options import InputOptions
-from levilab.pipelines.sources import Doubt, NotTaken, Readings, Source, reword
+from levilab.pipelines.sources import NotTaken, Readings, Source
+from levilab.texts.note import Note, is_doubt, kind_of, reword
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -101,7 +101,7 @@ class Analyzed(Generic[S, R, T, Opt]):
     @property
     def doubts(self) -> list[str]:
         """Warnings that make the numbers worthless where they are right."""
-        return [text for text in self.all_warnings if isinstance(text, Doubt)]
+        return [*filter(is_doubt, self.all_warnings)]
 
     @property
     def all_warnings(self) -> list[str]:
@@ -114,16 +114,14 @@ class Analyzed(Generic[S, R, T, Opt]):
         of_every = set.intersection(*map(set, of_runs))
         for source, said in zip(self.sources, of_runs, strict=True):
             texts += [text if text in of_every else _with_name(source, text) for text in said]
-        return sorted(dict.fromkeys(texts), key=lambda text: not isinstance(text, Doubt))
+        return sorted(dict.fromkeys(texts), key=lambda text: not is_doubt(text))
 
     @property
     def grouped_warnings(self) -> list[list[str]]:
-        """Every warning once, those together that differ in the names of inputs and in numbers alone."""
-        names = sorted((source.name for source in self.sources), key=len, reverse=True)
-        name = re.compile("|".join([*map(re.escape, names), _RUN.pattern]))
+        """Every warning once, those of one kind together."""
         groups: dict[str, list[str]] = {}
         for text in self.all_warnings:
-            groups.setdefault(_NUMBER.sub("#", name.sub("…", text)), []).append(text)
+            groups.setdefault(kind_of(text), []).append(text)
         return [*groups.values()]
 
 
@@ -157,13 +155,10 @@ class EachAlone(Analyzed[S, D, None, Opt]):
         return run.warnings
 
 
-#: A run's folder with what stands before it and behind it, and a number with its uncertainty.
-_RUN = re.compile(r"\S*\d{8}T\d{6}Z-\S+")
-_NUMBER = re.compile(r"\d[\d.]*(\(\d+\))?([eE][+-]?\d+)?")
-
 A = TypeVar("A", bound=Analyzed[Any, Any, Any, Any])
 
 
 def _with_name(source: Source[Any], text: str) -> str:
-    """Put the name of the input before a text, unless it begins with the name or the path."""
-    return text if source.path.name in text.partition(": ")[0] else reword(text, f"{source.name}: {text}")
+    """Put the name of the input before a note that does not name it."""
+    named = isinstance(text, Note) and text.names_input
+    return text if named else reword(text, f"{source.name}: {text}", names_input=True)

@@ -29,7 +29,8 @@ from levilab.present.clock import local
 from levilab.present.numbers import list_in_words, short_name
 from levilab.runs.find import RECORD, find_runs, no_such_path
 from levilab.runs.run import READINGS, Run
-from levilab.texts.text import Text
+from levilab.texts.note import Note, of_file
+from levilab.texts.note import kind_of as kind_of_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -47,32 +48,19 @@ SKIP = ".levilab-skip"
 SAME = 5e-5
 
 
-class Doubt(Text):
-    """A warning that makes the numbers worthless where it is right, as of a wrong unit or of loose washers."""
+@dataclass(frozen=True)
+class Doubting:
+    """A sentence in a table of remarks that makes the numbers worthless where it is right; see `note_of`."""
 
-    __slots__ = ()
-
-    def __new__(cls, text: str) -> Self:
-        """Make it of a text."""
-        return super().__new__(cls, "{text}", text=text)
-
-    def __reduce__(self) -> Any:
-        """Return how it is made again in another process."""
-        return Doubt, (self.values["text"],)
+    text: str | Callable[..., str]
 
 
-#: Kinds of remarks that are doubts.
-_DOUBTFUL = frozenset({"calculated", "changed", "many miscounts", "spin off", "no strength"})
-
-
-def warning(of: Remark, text: str) -> str:
-    """Return the text of a remark, of some kinds as a doubt."""
-    return Doubt(text) if of.kind in _DOUBTFUL else text
-
-
-def reword(text: str, new: str) -> str:
-    """Return a text in the place of another one, as a doubt if that is one."""
-    return Doubt(new) if isinstance(text, Doubt) else new
+def note_of(of: Remark, table: Mapping[str, str | Callable[..., str] | Doubting], *values: Any, **named: Any) -> Note:
+    """Return a remark as a note, whose sentence stands in a table by its kind, or is made there of values."""
+    row = table[of.kind]
+    said = row.text if isinstance(row, Doubting) else row
+    text = said if isinstance(said, str) else said(*values, **named)
+    return Note(f"{of.kind} {of.law} {of.name}", text, is_doubt=isinstance(row, Doubting))
 
 
 class Readings:
@@ -224,10 +212,13 @@ class SkippedRuns:
 class Skipped:
     """A run or a file that is not taken.
 
-    reason: why, with its path.
+    Attributes:
+        reason: why, with its path.
+        kind: skipped ones of one kind are alike.
     """
 
     reason: str
+    kind: str = ""
 
     def __str__(self) -> str:
         return f"skipped {self.reason}"
@@ -352,7 +343,8 @@ def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Sou
             kept.append(source)
             cells.setdefault((length, cell), []).append(source)
         elif first.data.resolve() != source.data.resolve():
-            warnings.append(f"{source.path}: holds the same readings as {first.path}, counted once")
+            text = f"{source.path}: holds the same readings as {first.path}, counted once"
+            warnings.append(of_file("same readings", text))
     return kept
 
 
@@ -431,7 +423,7 @@ def _at(path: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) ->
     damage = [error for error in errors if not isinstance(error, DoesNotSuit)]
     if not sources:
         raise [*damage, *errors][0]
-    notes = (f"not read: {error}" for error in damage)
+    notes = (of_file("not read", f"not read: {error}") for error in damage)
     yield from (replace(sources[0], warnings=(*sources[0].warnings, *notes)), *sources[1:])
 
 
@@ -444,7 +436,8 @@ def _one(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
         try:
             return _of_run(Run.load(path.parent), needs, options)
         except DataError:  # its record is damaged; that the readings can be saved is what they are text for
-            doubt = f"{path}: its run.json cannot be used, so whether it is SYNTHETIC is not known"
+            text = f"{path}: its run.json cannot be used, so whether it is SYNTHETIC is not known"
+            doubt = of_file("no record", text)
             source = _of_file(path, needs, options)
             return replace(source, warnings=(*source.warnings, doubt))
     return _of_file(path, needs, options)
@@ -454,7 +447,8 @@ def _of_file(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
     """Read a data file.  Options that are given go before those of the correction beside it."""
     kept = {key: value for key, value in read_correction(path).items() if getattr(options, key) in (None, value)}
     readings = needs.read_file(path, replace(options, **kept))
-    note = [f"{path.name}: is read as {place_of_correction(path).name} says: {describe(kept)}"] if kept else []
+    text = f"{path.name}: is read as {place_of_correction(path).name} says: {describe(kept)}"
+    note = [of_file("correction", text)] if kept else []
     return Source(path, path, sha256_of(path), None, readings, path.name, (*readings.warnings, *note), kept)
 
 
@@ -466,8 +460,8 @@ def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
     if not data.exists():  # as after a kill before the first record
         raise DataError(f"{run.folder}: holds no {data.name}, so nothing was recorded; analyze another run")
     readings = needs.read_run(run, options)
-    warnings = (*map(Doubt, run.warnings()), *readings.warnings)
-    return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, warnings)
+    doubts = (Note(kind_of_text(text), text, is_doubt=True) for text in run.warnings())
+    return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, (*doubts, *readings.warnings))
 
 
 def sha256_of(path: Path) -> str:
@@ -501,7 +495,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
             else:
                 others[run.record.experiment] += 1
         except DataError as error:
-            broken.append(Skipped(str(error)))
+            broken.append(Skipped(str(error), type(error).__name__))
     found.sort(key=_begun)
     files = data_files(root)
     remarks += [LeftOut(file, _kind(file)) for file in other_files(root)]
@@ -515,7 +509,8 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
         if not broken:
             raise NothingSuits(text, left_out)
         raise NoneUsable(text, tuple(map(str, broken))) if broken else DoesNotSuit(text)
-    return Found(tuple(found), tuple(map(str, broken)), (*kinds, *remarks))
+    notes = tuple(of_file(f"skipped {one.kind}", str(one)) for one in broken)
+    return Found(tuple(found), notes, (*kinds, *remarks))
 
 
 @contextmanager
@@ -528,7 +523,7 @@ def _skipping(file: Path, broken: list[Skipped], remarks: list[NotTaken]) -> Ite
     except DoesNotSuit as error:
         remarks.append(LeftOut(file, OTHER_COLUMNS if isinstance(error, NoSuchColumn) else _kind(file)))
     except DataError as error:
-        broken.append(Skipped(str(error)))
+        broken.append(Skipped(str(error), type(error).__name__))
 
 
 def _kind(file: Path) -> Kind:

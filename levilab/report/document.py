@@ -10,7 +10,7 @@ from levilab.crosscheck.own.study import OWN, quick_study
 from levilab.crosscheck.stored import read_study
 from levilab.crosscheck.table import blocks_of
 from levilab.errors import unquote
-from levilab.pipelines.sources import Doubt, mark_of
+from levilab.pipelines.sources import mark_of
 from levilab.present.document.blocks import (
     Banner,
     Code,
@@ -27,6 +27,7 @@ from levilab.present.document.blocks import (
 from levilab.present.numbers import list_in_words
 from levilab.report.inputs import About, describe, in_common
 from levilab.report.reproduction import Asked, paths_in_commands, reproduction
+from levilab.texts.note import is_doubt
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -106,7 +107,7 @@ def blocks_of_part(
         return Section(title, blocks, anchor=f"{analysis.name}-{anchor}" if deeper else anchor)
 
     grave, notes = (
-        tuple(tuple(map(unquote, alike)) for alike in found.grouped_warnings if isinstance(alike[0], Doubt) == doubtful)
+        tuple(tuple(map(unquote, alike)) for alike in found.grouped_warnings if is_doubt(alike[0]) == doubtful)
         for doubtful in (True, False)
     )
     doubts = [Warnings(grave)] if grave else []

@@ -10,6 +10,7 @@ import numpy as np
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.waveform import BLOCK, PulseTimes, Signal, Waveform, check_count, check_step
+from levilab.texts.note import of_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -50,7 +51,9 @@ def read_npy(path: Path, rate: float | None) -> Waveform | PulseTimes:
     signals = tuple(Signal(f"CH{k + 1}") for k in range(columns.shape[1]))
     whole = data.dtype.kind != "f"
     counts = (
-        (f"{path.name}: holds whole numbers, which are taken as V: voltages are in units of a code",) if whole else ()
+        (of_file("codes", f"{path.name}: holds whole numbers, which are taken as V: voltages are in units of a code"),)
+        if whole
+        else ()
     )
     return Waveform(path, "NumPy array", 0.0, 1 / rate, len(columns), signals, read, counts)
 

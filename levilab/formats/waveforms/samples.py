@@ -20,6 +20,7 @@ from levilab.formats.waveforms.waveform import (
     check_count,
     check_step,
 )
+from levilab.texts.note import of_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -198,15 +199,15 @@ def _rising_edges(
     others = [column.name for k, column in enumerate(header.columns) if counts[k] and k != chosen]
     more = f"; {quote_names(others)} change, too: cut the other columns off for them" if others else ""
     note = f"{path.name}: each row is a change: the rising edges of {header.columns[chosen].name} are the pulses{more}"
-    return PulseTimes(path, "changes of a logic signal", edges, (note,))
+    return PulseTimes(path, "changes of a logic signal", edges, (of_file("changes", note),))
 
 
 def _about_count(path: Path, header: Header, survey: _Survey) -> Iterator[str]:
     """Yield warnings about the end of the file."""
     if survey.torn:
-        yield f"{path.name}, {survey.torn}"
+        yield of_file("torn", f"{path.name}, {survey.torn}")
     if header.count is not None and header.count != survey.count:
-        yield f"{path.name}: its header announces {header.count} samples, it holds {survey.count}"
+        yield of_file("count", f"{path.name}: its header announces {header.count} samples, it holds {survey.count}")
 
 
 def _look_over(head: Head, header: Header) -> _Survey:
@@ -288,7 +289,7 @@ def _fit_step(path: Path, clock: _Clock, unit: float, *, first: float, mean: flo
         return _Times(first, step)
     lost = f"its printed times have lost digits (one unit of the last is {resolution:g} s, a step {step:.4g} s): the "
     known = f"{path.name}: {lost}sampling rate, and so any frequency, is known to {digits(u / step, 1)} of it"
-    return _Times(first, step, (known,), u)
+    return _Times(first, step, (of_file("digits", known),), u)
 
 
 #: Most uneven times, which are held in memory.
@@ -311,7 +312,9 @@ def _uneven_times(head: Head, header: Header, survey: _Survey) -> _Times:
     apart = np.diff(times)
     step, (longest, line) = float(np.median(apart)) or float(apart.mean()), survey.clock.longest
     text = f"its times are {shortest * unit:.4g} to {longest * unit:.4g} s apart (line {line}), mostly {step:.4g} s"
-    return _Times(float(times[0]), step, (f"{path.name}: {text}: they are used as printed",), times=times)
+    return _Times(
+        float(times[0]), step, (of_file("uneven", f"{path.name}: {text}: they are used as printed"),), times=times
+    )
 
 
 def _times_by_header(path: Path, header: Header, first: float, mean: float) -> _Times:

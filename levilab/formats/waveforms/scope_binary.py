@@ -12,6 +12,7 @@ import numpy as np
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.waveform import Signal, Waveform, check_count, check_step
 from levilab.software import how_to_install
+from levilab.texts.note import of_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -81,7 +82,7 @@ def _about_times(path: Path, times: Array, step: float) -> list[str]:
     if abs(mean / step - 1) <= _EVEN:
         return []
     text = f"RigolWFM says a sampling interval of {step:g} s and gives times {mean:g} s apart: compare with CSV"
-    return [f"{path.name}: {text}"]
+    return [of_file("interval", f"{path.name}: {text}")]
 
 
 def _about_volts(path: Path, model: str) -> list[str]:
@@ -90,4 +91,4 @@ def _about_volts(path: Path, model: str) -> list[str]:
         return []
     wrong = "a level of 0.02 V came as -0.40 V, with a gain 11 % off"
     text = f"RigolWFM's volts of a DS1000Z are wrong ({wrong}); times hold, for heights export CSV"
-    return [f"{path.name}: {text}"]
+    return [of_file("volts", f"{path.name}: {text}")]

@@ -9,6 +9,7 @@ import numpy as np
 
 from levilab.errors import UsageError
 from levilab.formats.columns import TableError, quote_names, shorten
+from levilab.texts.note import of_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -178,7 +179,9 @@ def about_rate(path: Path, known: float | None, rate: float | None) -> list[str]
     """
     if rate is None or known is None or known <= 0 or abs(known * rate - 1) <= 1e-6:
         return []
-    return [f"{path.name}: the given rate of {rate:g} Hz takes the place of {1 / known:.9g} Hz in the file"]
+    return [
+        of_file("rate", f"{path.name}: the given rate of {rate:g} Hz takes the place of {1 / known:.9g} Hz in the file")
+    ]
 
 
 def check_step(path: Path, step: float, what: str) -> None:

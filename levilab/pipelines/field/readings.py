@@ -13,6 +13,7 @@ from analysis.numbers import digits
 from levilab.formats.columns import TableError
 from levilab.formats.table import read_table, refuse
 from levilab.pipelines.sources import Readings
+from levilab.texts.note import of_file
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -80,7 +81,7 @@ def field_readings(table: Table) -> FieldReadings:
     doubts = []
     if strongest > _STRONGEST_MAGNET_T:
         doubt = f"{digits(strongest, 3)} T is more than a permanent magnet makes; say the unit, as b=NAME [mT]"
-        doubts.append(f"{table.path.name}: {doubt}")
+        doubts.append(of_file("strongest", f"{table.path.name}: {doubt}"))
     return FieldReadings(height, flux_density, height_u, u, own, (*table.warnings, *doubts))
 
 

@@ -11,7 +11,7 @@ from analysis.field.floating import FERRITE_PER_K
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, statistic
-from levilab.pipelines.sources import warning
+from levilab.pipelines.sources import Doubting, note_of
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.texts.text import Sentences, Text
 
@@ -171,8 +171,7 @@ _SHOWN = {"m": ("mm", 1e3), "T": ("µT", 1e6)}
 
 def remark(of: Remark) -> str:
     """Return a remark as a sentence, without its full stop."""
-    text = _REMARKS[of.kind]
-    return warning(of, text if isinstance(text, str) else text(*of.values, **({"name": of.name} if of.name else {})))
+    return note_of(of, _REMARKS, *of.values, **({"name": of.name} if of.name else {}))
 
 
 def _contradicts(found: float, stated: float, u: float, name: str) -> str:
@@ -184,7 +183,7 @@ def _contradicts(found: float, stated: float, u: float, name: str) -> str:
     )
 
 
-_REMARKS: Mapping[str, str | Callable[..., str]] = MappingProxyType({
+_REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType({
     "scan scatters": lambda reduced: (
         f"the fit leaves more than the stated uncertainties explain (χ²/dof = {digits(reduced, 3)}): all uncertainties "
         f"are enlarged by {digits(math.sqrt(reduced), 3)}; is the probe on the axis, and are the radii right?"
@@ -194,7 +193,9 @@ _REMARKS: Mapping[str, str | Callable[..., str]] = MappingProxyType({
         "to all of them, such as the scale of the instrument, belongs into gain_u and background_u_t"
     ),
     "contradicts": _contradicts,
-    "no strength": "the strength is not significantly different from zero: was the probe near the base?",
+    "no strength": Doubting(
+        "the strength is not significantly different from zero: was the probe near the base?"
+    ),
     "stray reading": lambda height, off: (
         f"the reading at {1e3 * height:.4g} mm lies {off:.1f} u off the others: measure that height again"
     ),

@@ -25,6 +25,7 @@ from levilab.simulator.keys import SceneError
 from levilab.simulator.published.printed import published
 from levilab.simulator.scene import Scene, scene_of
 from levilab.stability.thesis import is_thesis_device
+from levilab.texts.note import Note
 from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
@@ -417,29 +418,29 @@ def described_device(scene: Scene, name: str) -> Device:
     return Device(name, low, high, None if np.isnan(resonance) else resonance, is_thesis_device(scene))
 
 
-def warnings_of(statistics: Statistics) -> list[str]:
+def warnings_of(statistics: Statistics) -> list[Note]:
     """Return what to know before using the mean."""
-    texts = []
+    texts: dict[str, str] = {}
     if statistics.outliers:
         numbers = ", ".join(str(i + 1) for i in statistics.outliers)
         plural = "s" * (len(statistics.outliers) > 1)
-        texts.append(
+        texts["outliers"] = (
             f"repetition{plural} {numbers} do{'es' * (not plural)} not belong to the others; the mean includes them"
         )
     if statistics.drifts and statistics.trend:
-        texts.append(
+        texts["drifts"] = (
             f"the limit drifts by {with_uncertainty(statistics.trend)} a repetition: the mean is of no fixed state of "
             "the top; look for its mass, or the room's temperature"
         )
     if statistics.scatter is None:
-        texts.append("a single repetition: its scatter is not known, repeat it")
+        texts["single"] = "a single repetition: its scatter is not known, repeat it"
     if statistics.mean.u and statistics.step**2 > 0.5 * statistics.mean.u**2 and statistics.scatter:
-        texts.append(
+        texts["steps"] = (
             "the tops scatter by less than the drive's steps, which leave "
             f"{digits(statistics.step)} Hz to the mean however often it is repeated: creep slower, or look more often "
             "(limit.creep_hz_per_s, limit.interval_s)"
         )
-    return texts
+    return [Note(kind, text) for kind, text in texts.items()]
 
 
 # --- in words ---

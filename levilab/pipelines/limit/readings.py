@@ -20,6 +20,7 @@ from levilab.formats.titles import read_title, unit_factor
 from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import read_field_record
 from levilab.runs.events import RunEvent
+from levilab.texts.note import of_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -124,7 +125,10 @@ def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> Limi
             falls.append(spin_at_fall(track.time[part], track.frequency[part], u, (one.end - reach, one.end + reach)))
     if not falls:
         raise DoesNotSuit(f"{path}: no top falls in it after {FEWEST} windows whose spin is certain")
-    notes = (*record.warnings, f"{path.name}: {len(falls)} of {len(track.flights)} tops fall in this record")
+    notes = (
+        *record.warnings,
+        of_file("falls", f"{path.name}: {len(falls)} of {len(track.flights)} tops fall in this record"),
+    )
     return LimitReadings(np.array([one.value for one in falls]), np.array([one.u for one in falls]), notes)
 
 

@@ -14,6 +14,7 @@ from levilab.formats.table import FEWEST, read_table, refuse
 from levilab.pipelines.sources import SAME, Readings
 from levilab.present.numbers import pulses_too_many
 from levilab.runs.gates import gates_of
+from levilab.texts.note import of_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -153,7 +154,8 @@ def sweep_readings(table: Table) -> SweepReadings:
     warnings = list(table.warnings)
     if "spin_frequency_u_hz" in u and "spin_frequency_hz" not in table.columns and "precession_frequency_u_hz" not in u:
         u["precession_frequency_u_hz"] = u.pop("spin_frequency_u_hz")
-        warnings.append(f"{table.path.name}: the column of uncertainties is taken for that of the precession")
+        text = f"{table.path.name}: the column of uncertainties is taken for that of the precession"
+        warnings.append(of_file("of the precession", text))
     for name, values in u.items():
         _check_u(table, values, _OF_U[name], precession)
     has_spin = "spin_frequency_hz" in table.columns

@@ -10,7 +10,7 @@ from analysis.numbers import digits
 from analysis.precession.sweep import EXCLUDED_P
 from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Quantity, columns_of, entry, statistic
-from levilab.pipelines.sources import warning
+from levilab.pipelines.sources import Doubting, note_of
 from levilab.present.numbers import plain, pulses_too_many, with_uncertainty
 from levilab.texts.text import Sentences, Text
 
@@ -105,10 +105,7 @@ def miscount_as_text(of: Miscount) -> str:
 
 def remarks_of(fit: SweepFit) -> tuple[str, ...]:
     """Return the remarks on a sweep as sentences, without their full stops."""
-    return tuple(
-        warning(of, text if isinstance(text := _REMARKS[of.kind], str) else text(fit.points, *of.values))
-        for of in fit.remarks
-    )
+    return tuple(note_of(of, _REMARKS, fit.points, *of.values) for of in fit.remarks)
 
 
 def _miscount(points: tuple[Point, ...], k: float, gates_known: float = 1.0) -> str:
@@ -126,11 +123,11 @@ def _point(points: tuple[Point, ...], k: float) -> str:
     return f"point {k + 1:.0f}, at {points[int(k)].drive:.5g} Hz"
 
 
-_REMARKS: Mapping[str, str | Callable[..., str]] = MappingProxyType({
-    "many miscounts": lambda _, named, n: (
+_REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType({
+    "many miscounts": Doubting(lambda _, named, n: (
         f"{named:.0f} of {n:.0f} points look like miscounts: too many to leave out, so the line goes through all of "
         "them; look at the laser's signal and the trigger level"
-    ),
+    )),
     "miscount": _miscount,
     "unexplained": _miscount,
     "sweep scatters": lambda _, scale, p: (
@@ -158,10 +155,10 @@ _REMARKS: Mapping[str, str | Callable[..., str]] = MappingProxyType({
         f"uncertain by {digits(of_slope)} beside its u of {digits(u)}"
     ),
     "drive u unknown": "u of the drive's frequency is not known and taken as large as that of the precession",
-    "spin off": lambda _, off: (
+    "spin off": Doubting(lambda _, off: (
         f"the spin that was counted lies {digits(abs(off), 3)} Hz {'below' if off < 0 else 'above'} the drive: a "
         "locked top spins with it; is the tape on a loose washer, or was the top not locked?"
-    ),
+    )),
     "slopes differ": lambda _, n, p: (
         f"the slopes of the {n:.0f} runs differ by more than their u says (p = {digits(p, 1)}): the line through all "
         "points has too small a u; look at the runs one by one"

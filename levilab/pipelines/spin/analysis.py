@@ -33,6 +33,7 @@ from levilab.pipelines.spin.magnetometer import findings_of, spin_of_line, track
 from levilab.pipelines.spin.readings import Records, track_of_record
 from levilab.pipelines.spin.words import finding_text
 from levilab.present.numbers import with_uncertainty
+from levilab.texts.note import Note
 from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
@@ -250,7 +251,7 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
 
     def about_run(self, run: SpinRun) -> Iterable[str]:
         """Return what to know of one input."""
-        return (f"{finding_text(note, run.series.of)} ({note.name})" for note in run.notes)
+        return (Note(note.name, f"{finding_text(note, run.series.of)} ({note.name})") for note in run.notes)
 
 
 #: Number of samples that show the steps of a converter; closer numbers than this part of their range are rounding.

@@ -15,6 +15,7 @@ from levilab.formats.columns import TableError
 from levilab.formats.table import read_table
 from levilab.formats.titles import COMPONENTS, MAGNITUDE
 from levilab.formats.understanding import Request, SeveralRuns, plan_of
+from levilab.texts.note import of_file
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -98,12 +99,10 @@ def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
     if strongest > STRONGEST_T:
         units = ",".join(f"b{axis}=NAME [µT]" for axis in axes.values())
         what = f"{path.name}: a field of {strongest:.3g} T is stronger than a phone measures, so the unit is another"
-        warnings.append(f"{what}; say it with the columns: {units}")
+        warnings.append(of_file("strongest", f"{what}; say it with the columns: {units}"))
     if MAGNITUDE in axes:
-        warnings.append(
-            f"{path.name}: holds the field's magnitude alone: where the field that turns is the stronger part, its "
-            "line lies at twice the spin; record the axes x, y and z, too"
-        )
+        what = f"{path.name}: holds the field's magnitude alone: where the field that turns is the stronger part, its"
+        warnings.append(of_file("magnitude", f"{what} line lies at twice the spin; record the axes x, y and z, too"))
     record = FieldRecord(times, field, tuple(axes.values()), tuple(warnings))
     return record if record.duration > 0 and record.rate > SLOWEST_RATE else None
 

@@ -18,6 +18,7 @@ from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
 from levilab.runs.traces import INDEX, undescribed_codes
 from levilab.runs.waveforms import run_waveforms
+from levilab.texts.note import Note, of_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -107,9 +108,8 @@ def read_spin_file(path: Path, options: InputOptions) -> Records:
     warnings = list(record.warnings)
     if options.channel is None and len(record.signals) > 1:
         names = ", ".join(signal.name for signal in record.signals)
-        warnings.append(
-            f"{path.name}: has the channels {names}; {chosen} is analyzed, the option `channel` chooses another"
-        )
+        what = f"{path.name}: has the channels {names}; {chosen} is analyzed, the option `channel` chooses another"
+        warnings.append(of_file("channels", what))
     return Records(path, (record,), chosen, None, tuple(warnings))
 
 
@@ -132,18 +132,16 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
         raise DataError(
             f"{run.folder}: has no record of {chosen!r}, but of {', '.join(names)}: name one with `channel`"
         )
-    warnings = [
-        f"{run.folder.name}: {path} has no line in {INDEX}, as a process that was killed leaves it: it is left out"
+    warnings: list[str] = [
+        Note("undescribed", f"{path} has no line in {INDEX}, as a process that was killed leaves it: it is left out")
         for path in undescribed_codes(run.folder)
     ]
     warnings += [text for waveform in found for text in waveform.warnings]
     if chosen.casefold() in NO_SPIN:
-        warnings.append(f"{run.folder.name}: the frequency of {chosen} is no spin, but {NO_SPIN[chosen.casefold()]}")
+        warnings.append(Note("no spin", f"the frequency of {chosen} is no spin, but {NO_SPIN[chosen.casefold()]}"))
     if options.channel is None and len(names) > 1:
-        warnings.append(
-            f"{run.folder.name}: has records of {', '.join(names)}; {chosen} is analyzed, "
-            "the option `channel` chooses another"
-        )
+        what = f"has records of {', '.join(names)}; {chosen} is analyzed, the option `channel` chooses another"
+        warnings.append(Note("channels", what))
     return Records(run.folder, of_channel, chosen, None, tuple(warnings))
 
 

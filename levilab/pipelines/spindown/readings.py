@@ -21,11 +21,12 @@ from levilab.formats.understanding import is_possible_spin, possible_spins
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes
-from levilab.pipelines.sources import Doubt, Readings
+from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import findings_of, read_field_record
 from levilab.pipelines.spin.readings import track_of_record
 from levilab.pipelines.spin.words import finding_text
 from levilab.runs.events import RunEvent
+from levilab.texts.note import Note, of_file
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -107,7 +108,7 @@ def _between(readings: SpinReadings, options: "InputOptions", path: "Path") -> S
     u = None if readings.u is None else readings.u[part]
     kept = replace(readings, time=readings.time[part], frequency=readings.frequency[part], u=u)
     note = f"only the {len(kept)} of {len(readings)} readings {span} are fitted, as asked; the others are left out"
-    return replace(kept, warnings=(*readings.warnings, note))
+    return replace(kept, warnings=(*readings.warnings, Note("between", note)))
 
 
 def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings:
@@ -133,7 +134,7 @@ def _read_spin_table(path: "Path", options: "InputOptions") -> Table:
     table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=QUANTITIES[:2], guess=options.guess)
     if options.channel is not None:
         note = f"{path.name}: is a table of readings and has no channels: `columns` chooses its columns"
-        table = replace(table, warnings=(note, *table.warnings))
+        table = replace(table, warnings=(of_file("no channels", note), *table.warnings))
     return table
 
 
@@ -155,7 +156,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
             track = track_of_record(record, options.channel, WINDOW_S, "auto")
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)(f"{path}: {error}") from error
-    notes = [f"{path.name}: {finding_text(note)}" for note in track.notes]
+    notes = [of_file(note.name, f"{path.name}: {finding_text(note)}") for note in track.notes]
     what = f"{'list of pulse times' if times is not None else 'record'} of {digits(duration, 3)} s"
     return _of_track(path, track, WINDOW_S, what, (record.warnings, notes))
 
@@ -167,7 +168,7 @@ def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions")
         track = track_of_field(record.times, record.field, near=options.near)
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)(f"{path}: {error}") from error
-    notes = [f"{path.name}: {finding_text(note)}" for note in findings_of(track.spins)]
+    notes = [of_file(note.name, f"{path.name}: {finding_text(note)}") for note in findings_of(track.spins)]
     what = f"magnetometer's record of {digits(record.duration, 3)} s"
     window = record.duration / round(record.duration / FIELD_WINDOW_S)
     readings = _of_track(path, track, window, what, (record.warnings, notes))
@@ -190,10 +191,12 @@ def _of_track(
         seen = f"the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {last - first} windows of {window:.3g} s"
         expected = "a falling spin is expected: is the drive still on?"
         raise DoesNotSuit(f"{path}: {seen}, {expected}")
-    how_read = [f"{path.name}: a {what}: each reading is the frequency in a window of {window:.3g} s"]
+    text = f"{path.name}: a {what}: each reading is the frequency in a window of {window:.3g} s"
+    how_read = [of_file("windows", text)]
     if last - first < len(track.time):
         span = f"{track.time[first]:.1f} s to {track.time[last - 1]:.1f} s"
-        how_read.append(f"{path.name}: the top coasts from {span}; the windows before and after are left out")
+        text = f"{path.name}: the top coasts from {span}; the windows before and after are left out"
+        how_read.append(of_file("coasts", text))
     part = slice(first, last)
     of_record, of_track = notes
     return SpinReadings(track.time[part], track.frequency[part], track.u[part], (*of_record, *how_read, *of_track))
@@ -233,7 +236,7 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> SpinReadings:
     except AnalysisError as error:
         raise _in_the_file(table, error) from error
     doubts = _doubts(table, time, frequency)
-    return SpinReadings(time, frequency, u, (*map(Doubt, doubts), *table.warnings), doubtful=bool(doubts))
+    return SpinReadings(time, frequency, u, (*doubts, *table.warnings), doubtful=bool(doubts))
 
 
 def _without_rest(table: Table, fewest: int) -> Table:
@@ -247,7 +250,7 @@ def _without_rest(table: Table, fewest: int) -> Table:
         f"{table.path.name}: the last {rows} of 0 Hz, after the top fell, {'is' if left_out == 1 else 'are'} left out"
     )
     columns = {name: values[:end] for name, values in table.columns.items()}
-    return replace(table, columns=columns, lines=table.lines[:end], warnings=(*table.warnings, note))
+    return replace(table, columns=columns, lines=table.lines[:end], warnings=(*table.warnings, of_file("rest", note)))
 
 
 #: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, seconds that
@@ -257,7 +260,11 @@ FASTEST_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 1e-4
 FASTEST_BY_HAND_HZ = 60.0
 
 
-def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[str]:
+def _doubt(text: str) -> Note:
+    return Note("unit", text, is_doubt=True, names_input=True)
+
+
+def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[Note]:
     """Return doubts about units: a spin that no such top has, readings closer than a turn, turns counted twice."""
     middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
     if not is_possible_spin(middle):
@@ -267,24 +274,25 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
             for unit, spin in possible_spins(middle / table.factors.get("spin_frequency_hz", 1.0)).items()
         ]
         if meant:
-            return [f"{doubt}; say the unit with the column: {' or '.join(meant)}"]
+            return [_doubt(f"{doubt}; say the unit with the column: {' or '.join(meant)}")]
         thousands = "; if its point stands behind the thousands, write the numbers without it"
-        return [doubt + thousands * is_possible_spin(1e3 * middle)]
+        return [_doubt(doubt + thousands * is_possible_spin(1e3 * middle))]
     if step * middle < 1:  # nor does a counter give a reading in less
         doubt = f"{table.path.name}: the readings lie {1e3 * step:.3g} ms apart, the top needs {1e3 / middle:.3g} ms"
-        return [f"{doubt} for a turn; if the times are in seconds, say so with their column, as t=NAME [s]"]
+        return [_doubt(f"{doubt} for a turn; if the times are in seconds, say so with their column, as t=NAME [s]")]
     lasts = float(time[-1] - time[0])
     loss = float(np.log(frequency[0] / frequency[-1])) / lasts
     if loss > FASTEST_LOSS_PER_S or (0 < loss < SLOWEST_LOSS_PER_S):
         doubt = f"{table.path.name}: the spin goes from {frequency[0]:.4g} to {frequency[-1]:.4g} Hz in {lasts:.4g} s"
         minutes = loss < SLOWEST_LOSS_PER_S and table.factors.get("time_s", 1.0) > 1
         written, unit = ("minutes", "s") if minutes else ("seconds", "min" if loss > FASTEST_LOSS_PER_S else "ms")
-        return [f"{doubt}, in air it takes minutes; if the times are not in {written}, say so, as t=NAME [{unit}]"]
+        text = f"{doubt}, in air it takes minutes; if the times are not in {written}, say so, as t=NAME [{unit}]"
+        return [_doubt(text)]
     first, last = float(frequency[0]), float(frequency[-1])
     if first > FASTEST_BY_HAND_HZ and FALLS_BETWEEN_HZ[1] < last / 2 < FALLS_BETWEEN_HZ[0]:
         doubt = f"{table.path.name}: the spin goes from {first:.4g} to {last:.4g} Hz: is each turn counted twice?"
         why = f"No hand starts a top so fast, and it falls at {last / 2:.3g} Hz"
-        return [f"{doubt} {why}; f=NAME [1/2s] halves the numbers"]
+        return [_doubt(f"{doubt} {why}; f=NAME [1/2s] halves the numbers")]
     return []
 
 

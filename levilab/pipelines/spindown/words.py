@@ -15,9 +15,10 @@ from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from analysis.spindown.verdict import is_simple
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, estimate, statistic
-from levilab.pipelines.sources import warning
+from levilab.pipelines.sources import Doubting, note_of
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.units import name_with_unit
+from levilab.texts.note import reword
 from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
@@ -346,11 +347,9 @@ TILT_ALLOWED = (
 
 def remark(of: Remark) -> str:
     """Return a remark as a sentence, without its full stop."""
-    text = _REMARKS[of.kind]
-    said = text(of) if callable(text) else text
-    return warning(
-        of, Text("{law}: {said}", law=short_law(of.law), said=said) if of.law and of.kind in _OF_A_LAW else said
-    )
+    note = note_of(of, _REMARKS, of)
+    of_law = of.law and of.kind in _OF_A_LAW
+    return reword(note, Text("{law}: {said}", law=of.law, said=note)) if of_law else note
 
 
 _OF_A_LAW = frozenset({
@@ -386,7 +385,7 @@ def _few_runs(of: Remark) -> str:
     )
 
 
-_REMARKS: Mapping[str, str | Callable[[Remark], str]] = MappingProxyType({
+_REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyType({
     "not converged": "the fit did not converge, the numbers are those of the best point found",
     "no freedom": lambda of: (
         f"{of.values[0]:.0f} parameters pass through {of.values[0]:.0f} readings, so nothing shows their uncertainty: "
@@ -405,10 +404,10 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str]] = MappingProxyType({
         "exponent"
     ),
     "outlier": _outlier,
-    "calculated": lambda of: (
+    "calculated": Doubting(lambda of: (
         f"the readings lie on the {of.law} law to {digits(of.values[0], 1)} Hz, too good to be measured: were they "
         "calculated? Then no uncertainty here says anything about a top"
-    ),
+    )),
     "no u": (
         "the readings have no uncertainties of their own: their scatter about each law stands for them, so a law that "
         "does not fit shows only beside a better one"
@@ -431,10 +430,10 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str]] = MappingProxyType({
         r=of.values[0], u=of.values[1], n=of.values[2],
         worth=digits(of.values[2] * (1 - of.values[0]) / (1 + of.values[0])),
     ),
-    "changed": lambda of: (
+    "changed": Doubting(lambda of: (
         f"no law describes run {of.values[0]:.0f} of {of.values[1]:.0f}: that noise makes a change as large in any of "
         f"the runs has p = {digits(min(of.values[1] * of.values[2], 1.0))}; look at it"
-    ),
+    )),
     "mixed u": lambda of: (
         f"{of.values[0]:.0f} of {of.values[1]:.0f} runs give no uncertainties of their readings: theirs come from the "
         "scatter about each law"

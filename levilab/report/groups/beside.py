@@ -19,9 +19,9 @@ from analysis.spindown.drag import LAWS
 from analysis.uncertainty import Estimate
 from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import unquote
-from levilab.pipelines.sources import Doubt
 from levilab.present.numbers import enumeration, plain, with_sign, with_uncertainty
 from levilab.present.units import unit
+from levilab.texts.note import is_doubt
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -163,7 +163,7 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
             _model(part, model).get("statistics", {}),
             part.get("best_model", ""),
             tuple(map(_plain, texts)),
-            tuple(_plain(text) for text in texts if isinstance(text, Doubt)),
+            tuple(_plain(text) for text in texts if is_doubt(text)),
         )
         for source, part, texts in zip(found.sources, parts, said, strict=True)
     )

@@ -1,5 +1,6 @@
 """Every kind of a remark has its sentence, with its values."""
 
+import pickle
 from types import SimpleNamespace
 from typing import get_args
 
@@ -7,8 +8,10 @@ import pytest
 
 from analysis.precession.miscounts import Miscount
 from analysis.remarks import Kind, Remark
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.field import words as of_field
 from levilab.pipelines.precession import words as of_sweep
+from levilab.texts.note import Note, reword
 
 
 def of(kind, *values, name=""):
@@ -65,3 +68,19 @@ def test_a_remark_on_a_scan_is_a_sentence(remark, text):
 
 def test_all_kinds_are_tried_above():
     assert {remark.kind for remark in (*OF_SWEEP, *OF_FIELD)} == set(get_args(Kind))
+
+
+def test_notes_of_one_kind_stand_together_whatever_their_values(tmp_path):
+    for k in range(2):
+        rows = [f"{10 * n},{40 - n - 0.1 * k if n != 3 + k else '-'}" for n in range(12)]
+        (tmp_path / f"run-{k}.csv").write_text("\n".join(["t,f", *rows, ""]), encoding="utf-8")
+    found = ANALYSES["spindown"].analyze([tmp_path], ANALYSES["spindown"].options())
+    (missed,) = [group for group in found.grouped_warnings if "left out as missed" in group[0]]
+    assert [text.partition(".csv")[0][-5:] for text in missed] == ["run-0", "run-1"]
+
+
+def test_a_note_is_the_same_in_another_process():
+    note = Note("unit", "in kHz?", is_doubt=True, names_input=True)
+    again = pickle.loads(pickle.dumps(note))
+    assert (again, again.kind, again.is_doubt, again.names_input) == ("in kHz?", "unit", True, True)
+    assert reword(again, "in Hz?").is_doubt
