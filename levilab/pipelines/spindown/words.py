@@ -349,7 +349,7 @@ def remark(of: Remark) -> str:
     """Return a remark as a sentence, without its full stop."""
     note = note_of(of, _REMARKS, of)
     of_law = of.law and of.kind in _OF_A_LAW
-    return reword(note, Text("{law}: {said}", law=of.law, said=note)) if of_law else note
+    return reword(note, Text("{law}: {said}", law=short_law(of.law), said=note)) if of_law else note
 
 
 _OF_A_LAW = frozenset({
