@@ -207,12 +207,13 @@ def _falls(life: Life) -> Iterator[Finding]:
 
 
 def _gave_up(plan: Plan, life: Life) -> Iterator[Finding]:
-    """Yield a process that ended in the middle of its run because an instrument was out once, for a moment."""
+    """Yield a process that did not finish, though nothing went wrong, or an instrument was out once, for a moment."""
+    calm = not plan.events and not plan.typed and life.ended != "finished"
     of_life = [event for event in plan.events if event.life == life.number]
     brief = len(of_life) == 1 and of_life[0].what in {"cable", "plug"} and out_s(of_life[0].value) < _BRIEF_S
     by_hand = plan.experiment == "field" or "spin.drive_waveform=NONE" in plan.settings
-    if brief and by_hand and life.shown and life.ended == "failed":
-        yield Finding("gave up", f"process {life.number + 1}: {life.text}")
+    if calm or (brief and by_hand and life.shown and life.ended == "failed"):
+        yield Finding("gave up", f"process {life.number + 1} {life.ended}: {life.text}")
 
 
 def _readings_are_true(life: Life) -> Iterator[Finding]:

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from instruments.drivers.counter.reciprocal import ReciprocalCounter
 from instruments.drivers.magnetometer.lakeshore import LakeShoreGaussmeter
 from levilab.acquisition import driving
 from levilab.acquisition.experiments import field
@@ -146,6 +147,10 @@ def drives_on(patch):
     patch.setattr(driving, "drive_off", lambda _: None)
 
 
+def fails_without_a_reason(patch):
+    patch.setattr(ReciprocalCounter, "_reading", lambda driver, *asked: driver.reject(*asked, "another number"))
+
+
 def with_none_in_it(patch):
     patch.setattr("levilab.laboratory.visit.page_of", lambda _: "<p>None</p><svg>NaN</svg>")
 
@@ -167,6 +172,7 @@ def raises_what_the_disk_says(patch):
         (catches_up, "crowded", spin_down()),
         (not_set_up_again, "false fall", spin_down(Event("plug", 0, 150, 0.03))),
         (drives_on, "output", a_plan("spin", "hold_s=0", "drive_frequency_hz=35")),
+        (fails_without_a_reason, "gave up", spin_down()),
         (with_none_in_it, "report", spin_down()),
         (raises_what_the_disk_says, "traceback", replace(spin_down(), seed=31)),
         (left_on, "output", a_plan("spin", "drive_frequency_hz=35", events=[Event("ctrl-c", 0, 300)])),
