@@ -145,7 +145,7 @@ def test_notes_name_options_on_the_terminal_and_quantities_where_stored(levilab,
     (result,) = runs.rglob("result.json")
     levilab("report", runs, "--no-crosscheck")
     page = html.unescape((tmp_path / "report.html").read_text(encoding="utf-8"))
-    for text in (result.read_text(encoding="utf-8"), page):
+    for text in ("\n".join(json.loads(result.read_text(encoding="utf-8"))["warnings"]), page):
         assert "say columns = f=NAME" in text
         assert text.count("skipped") == 1
 
