@@ -16,6 +16,7 @@ from levilab.files import check_writable, replace_atomically, writing
 from levilab.pipelines.sources import SkippedRuns, data_files
 from levilab.pipelines.suits import recall_suiting, remarks, texts_of
 from levilab.present.clock import local
+from levilab.present.document.blocks import in_language_of_reader
 from levilab.present.numbers import list_in_words
 from levilab.report.document import document_of, notebook_blocks
 from levilab.report.html.page import fragment_of, page_of
@@ -24,6 +25,7 @@ from levilab.report.pdf.renderer import as_pdf, check_typst
 from levilab.report.reproduction import Asked, Heading
 from levilab.report.tables.values import folder_of, of_analysis, write_tables
 from levilab.runs.find import find_runs
+from levilab.texts.text import spoken
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -111,7 +113,7 @@ def write_report(
     asked = Asked(paths, output.name, given or {}, crosscheck, short, heading)
     document = heading.above(document_of(results, sections, asked))
     document = replace(document, date=newest_of(results, others))
-    content = form.content(document)
+    content = form.content(in_language_of_reader(replace(document, language=spoken())))
     with writing_report(output):
         output.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(output, content)

@@ -14,6 +14,7 @@ from levilab.pipelines.options import OF_REPORT, OPTIONS, options_of, typed_name
 from levilab.present.document.blocks import Code, Details, Fact, Facts, Note, Paragraph, Section, Tabular
 from levilab.present.tables import table
 from levilab.software import software_versions
+from levilab.texts.text import ENGLISH, spoken
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -81,7 +82,8 @@ class Asked:
         options = [word for name in OF_REPORT for word in _option(name, self.given.get(name))]
         no_crosscheck = [] if self.crosscheck else ["--no-crosscheck"]
         short = ["--short"] if self.short else []
-        words = [*paths, *options, *no_crosscheck, *short, *self.heading.typed]
+        language = [] if spoken() == ENGLISH else ["--language", spoken()]
+        words = [*paths, *options, *no_crosscheck, *short, *language, *self.heading.typed]
         return " ".join(["levilab", "report", *words, "-o", shlex.quote(self.name)])
 
 

@@ -153,6 +153,11 @@ def speak(code: str) -> None:
     _of_process = code
 
 
+def spoken() -> str:
+    """Return the code of the language of this process."""
+    return _of_process
+
+
 def _fill(template: str, values: Mapping[str, Any], code: str) -> str:
     return _FIELD.sub(lambda field: _write(values[field[1]], field[2] or "", code), template)
 

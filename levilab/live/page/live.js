@@ -342,7 +342,7 @@ function showMagnetometer(bench, last) {
   const field = from.flux_density_t, height = from.height_m ?? bench?.probe_m;
   write("field-value", Number.isFinite(field) ? fixed(field * 1000, 3) : "–");
   stale("field-value", !bench || bench.silent);
-  write("probe", Number.isFinite(height) ? phrase("{height} cm above the base", {height: short(height * 100)}) : bench?.virtual ? phrase("chamber, until a field run") : "–");
+  write("probe", Number.isFinite(height) ? phrase("{height} cm above the base", {height: short(height * 100)}) : bench?.virtual ? phrase("in its chamber") : "–");
   write("magnetometer-model", modelOf("magnetometer"));
   write("scope-model", modelOf("oscilloscope"));
 }

@@ -9,8 +9,10 @@ in a form of its own.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar
+
+from levilab.texts.text import in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
@@ -306,6 +308,23 @@ class Document:
     date: datetime | None = None
 
 
+#: What stands in a document as it is: names of parts, and what a person types.
+_NOT_SAID = frozenset({"name", "anchor", "narrow", "on_paper", "gid", "code", "byline", "kind"})
+
+
+def in_language_of_reader(part: T) -> T:
+    """Return a document, or a part of one, with its texts in the language of this process; commands stay."""
+    if isinstance(part, str):
+        return in_language(part)  # type: ignore[return-value]
+    if isinstance(part, tuple | list):
+        return type(part)(map(in_language_of_reader, part))
+    if not is_dataclass(part) or isinstance(part, type | Code) or (isinstance(part, Fact) and part.code):
+        return part
+    said = {field.name: getattr(part, field.name) for field in fields(part) if field.name not in _NOT_SAID}
+    return replace(part, **{name: in_language_of_reader(value) for name, value in said.items()})
+
+
+T = TypeVar("T")
 B = TypeVar("B", bound="Block")
 
 
