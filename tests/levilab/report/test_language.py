@@ -1,13 +1,15 @@
-"""A report in another language: what a person reads of it, and the figure in it."""
+"""A report in another language: what a person reads of it, and its figures."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 import pytest
+from matplotlib.figure import Figure
 
+from levilab.present.style import as_png
 from levilab.report.page import write_report
-from levilab.texts.text import speak
+from levilab.texts.text import Text, speak
 from support.paths import SAMPLE_DATA
 
 if TYPE_CHECKING:
@@ -23,15 +25,18 @@ def german() -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("german")
-def test_a_german_report_has_german_headings_answer_and_figure(tmp_path: Path) -> None:
+def test_a_german_report_has_german_headings_and_answer(tmp_path: Path) -> None:
     run = SAMPLE_DATA / "spin-down-1"
     page = write_report([run], tmp_path / "report.html", short=True).read_text(encoding="utf-8")
-    for said in (
-        ">Ergebnis<",
-        "Am besten passt das Scheibengesetz",
-        "Drehfrequenz",
-        "--language de",
-        'lang="de"',
-    ):
+    for said in (">Ergebnis<", "Am besten passt das Scheibengesetz", "--language de", 'lang="de"'):
         assert said in page
     assert ">Result<" not in page
+
+
+@pytest.mark.usefixtures("german")
+def test_a_figure_says_its_texts_and_numbers_in_german() -> None:
+    figure = Figure()
+    axes = figure.add_subplot(title=Text("Spin-down: {said}", said="fits"), xlabel="time  [s]", xlim=(0.0, 1.0))
+    as_png(figure)
+    assert (axes.get_title(), axes.get_xlabel()) == ("Auslaufen: passt", "Zeit  [s]")
+    assert axes.get_xticklabels()[1].get_text() == "0,2"
