@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from analysis.numbers import how_many
 from levilab.crosscheck.own.study import OWN, quick_study
@@ -211,14 +211,15 @@ def _measurements(results: Results, parts: Sequence[ReportPart]) -> Section:
 
 
 def _overview(inputs: Sequence[Input]) -> Iterable[Block]:
-    """Return the inputs: what several share once, and the rest of each, of many folded away."""
+    """Return the inputs: what several share once, and the rest of each folded away; on paper of many a line each."""
     common = in_common(inputs) if len(inputs) > 1 else ()
     if common:
         yield Section("All of them alike", (Facts(common),))
-    if len(inputs) > MOST_IN_FULL:
-        yield Section("Each by itself", tuple(one.without(common).fold() for one in inputs))
-    else:
-        yield from (one.without(common).section() for one in inputs)
+    if len(inputs) == 1:
+        yield inputs[0].section()
+        return
+    on_paper: Literal["whole", "summary"] = "whole" if len(inputs) <= MOST_IN_FULL else "summary"
+    yield Section("Each by itself", tuple(one.without(common).fold(on_paper) for one in inputs))
 
 
 # --- what is synthetic ---------------------------------------------------------------------------------

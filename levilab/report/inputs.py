@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from datetime import UTC
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from levilab.pipelines.sources import mark_of
 from levilab.pipelines.tune.owner import washers_text
@@ -76,9 +76,9 @@ class Input:
         """Return the input below a heading of its own."""
         return Section(self.name, (Facts(self.facts), *self.blocks))
 
-    def fold(self) -> Details:
-        """Return the input as one of many: it can be opened on a screen, and is one line on paper."""
-        return Details(self.name, (Facts(self.facts), *self.blocks), more=self.more, on_paper="summary")
+    def fold(self, on_paper: Literal["whole", "summary"]) -> Details:
+        """Return the input as one of several, which can be opened on a screen."""
+        return Details(self.name, (Facts(self.facts), *self.blocks), more=self.more, on_paper=on_paper)
 
 
 def in_common(inputs: Sequence[Input]) -> tuple[Fact, ...]:

@@ -278,7 +278,8 @@ def _mark(of: Class, k: int) -> Mark:
         if one.estimates[k] is None:
             wrong.append(f"{one.symbol}: no value with u")
         elif truth is not None and abs(truth) > FAR:
-            wrong.append(f"{one.symbol}: {with_sign(truth, 1)} u from its truth")
+            cause = "of another seed, cut short, or changed?"
+            wrong.append(f"{one.symbol}: {with_sign(truth, 1)} u from its truth: are the readings {cause}")
         elif truth is None and others is not None and abs(others) > FAR:
             odd.append(f"{one.symbol}: {with_sign(others, 1)} u from the others")
     wrong += group.doubts
