@@ -220,7 +220,7 @@ class Solution:
         expected, u = self.counted.expected if self.counted else (np.empty(0), np.empty(0))
         p, sigma = len(self.q) - len(u), np.sqrt(found.variance)
         moved = np.zeros(len(self.q))
-        moved[p + MORE :] = found.step[p + MORE :]  # what the fit itself keeps
+        moved[p + MORE : p + MORE + 2] = found.step[p + MORE : p + MORE + 2]  # what the fit itself keeps
         left = np.append(self.residuals - moved @ self.slopes, sigma * ((self.q + moved)[p:] - expected) / u)
         own = np.append(
             np.einsum("pn,pq,qn->n", self.slopes, found.covariance, self.slopes) / found.variance,
@@ -300,7 +300,7 @@ def _search(
             if found is None:
                 break
             step, own = found.step.copy(), np.sqrt(np.diagonal(found.covariance))
-            step[p + MORE :] = 0.0  # κ, β and the share of the nutation stay as they were given
+            step[p + MORE : p + MORE + 2] = 0.0  # κ and β stay as they were given
             if not np.isfinite(step).all():
                 return q, False, found
             if (np.abs(step) <= _CLOSE * own).all():

