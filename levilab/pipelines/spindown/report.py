@@ -44,6 +44,7 @@ from levilab.present.numbers import (
 from levilab.present.tables import Row, Table, table
 from levilab.present.units import unit as unit_row
 from levilab.runs.events import RunEvent
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -461,7 +462,11 @@ def _laws(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
     kept = [fit for fit in analysis.combined.fits if fit.name not in out]
     others = [fit for fit in analysis.combined.fits if fit.name in out]
     excluded = replace(_constants_table(analysis, others), title="")
-    folded = Details(f"Excluded: {law_names(out)}", (Tabular("spindown-laws-excluded", excluded),)) if others else None
+    folded = (
+        Details(Text("Excluded: {laws}", laws=law_names(out)), (Tabular("spindown-laws-excluded", excluded),))
+        if others
+        else None
+    )
     return (
         Tabular("spindown-laws", _constants_table(analysis, kept), constants),
         *([folded] if folded else []),

@@ -27,6 +27,7 @@ from levilab.present.document.blocks import (
     Warnings,
 )
 from levilab.present.document.typesetting import typeset
+from levilab.texts.text import in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -259,7 +260,7 @@ def _small_print(text: str) -> Html | str:
     """Return small print below a table; a long one opens from a line."""
     said = element("p", words(text), class_="note") if text else ""
     return (
-        element("details", element("summary", "What the columns mean", class_="note"), said)
+        element("details", element("summary", in_language("What the columns mean"), class_="note"), said)
         if len(text) > _LONG
         else said
     )
