@@ -18,6 +18,7 @@ from analysis.spindown.fall import times_of_fall
 from analysis.spindown.fit import fit_spin_down
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.uncertainty import Estimate
+from levilab.pipelines.spindown.words import law_names
 from levilab.present.numbers import plain, with_uncertainty
 from levilab.texts.text import Text
 
@@ -134,17 +135,17 @@ def spin_down(columns: Mapping[str, Array], size: int, *_: object) -> Running:
     others = [name for name in found.verdict.indistinguishable if name != found.best]
     lines = [
         Text("{constants:n}", constants=tuple(constants)),
-        Text("as good: {laws}", laws=tuple(others)) if others else "",
-        Text("excluded: {laws}", laws=tuple(found.verdict.excluded)) if found.verdict.excluded else "",
+        Text("as good: {laws}", laws=law_names(others)) if others else "",
+        Text("excluded: {laws}", laws=law_names(found.verdict.excluded)) if found.verdict.excluded else "",
     ]
     return Running(
-        Text("{law} law, the best so far   {equation}", law=found.best, equation=LAWS[found.best].equation),
+        Text("{law} law, the best so far   {equation}", law=law, equation=LAWS[found.best].equation),
         tuple(filter(None, lines)),
         Curve(x, y, solid_to=last),
         end,
         found.best,
         "dashed: the law alone; the count also sees the wobble" if best.has_tilt and end else "",
-        Text("{law} law   {equation}", law=found.best, equation=LAWS[found.best].equation),
+        Text("{law} law   {equation}", law=law, equation=LAWS[found.best].equation),
     )
 
 

@@ -149,7 +149,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     for (const tab of tabs) {
       const is = tab === chosen;
       put(tab, {ariaSelected: String(is), tabIndex: is ? 0 : -1});
-      put(by(tab.getAttribute("aria-controls")), {hidden: !is});
+      put(by(tab.getAttribute("aria-controls")), {hidden: !is, ariaLabel: tab.firstChild.data.trim()});
     }
   }
   tabs.forEach((tab, k) => {
