@@ -138,6 +138,7 @@ def spin_down(columns: Mapping[str, Array], size: int, *_: object) -> Running:
         Text("as good: {laws}", laws=law_names(others)) if others else "",
         Text("excluded: {laws}", laws=law_names(found.verdict.excluded)) if found.verdict.excluded else "",
     ]
+    law = law_names([found.best])
     return Running(
         Text("{law} law, the best so far   {equation}", law=law, equation=LAWS[found.best].equation),
         tuple(filter(None, lines)),
