@@ -86,7 +86,7 @@ def test_every_axis_says_quantity_and_unit(figure):
     spin, residuals, lines, strips = panels(figure)
     assert "Hz" in spin.get_ylabel()
     assert "[s]" in spin.get_xlabel()
-    assert [axes.get_title(loc="left") for axes in residuals] == list(COLOURS)
+    assert [axes.get_title(loc="left") for axes in residuals] == [law.capitalize() for law in COLOURS]
     assert [axes.get_ylabel().split()[0] for axes in lines] == ["ln", "1/ω", "ω$^{−1/2}$"]
     assert all("rad" in axes.get_ylabel() for axes in lines)
     assert all("[s]" in axes.get_xlabel() for axes in (*residuals, *strips))
@@ -101,11 +101,11 @@ def test_straight_line_panels_show_angular_frequency_as_the_tables_do(analysis, 
 def test_good_laws_share_a_scale_and_a_bad_one_says_that_it_has_its_own(figure):
     residuals = panels(figure)[1]
     tops = {axes.get_title(loc="left"): axes.get_ylim()[1] for axes in residuals}
-    assert tops["disc"] == tops["mixed"] == tops["power"]
-    assert tops["stokes"] > 3 * tops["disc"]
+    assert tops["Disc"] == tops["Mixed"] == tops["Power"]
+    assert tops["Stokes"] > 3 * tops["Disc"]
     assert all(axes.get_ylim()[0] == -axes.get_ylim()[1] for axes in residuals)
     notes = {axes.get_title(loc="left"): axes.get_title(loc="right") for axes in residuals}
-    assert notes == {"stokes": "own scale", "newton": "own scale", "disc": "", "mixed": "", "power": ""}
+    assert notes == {"Stokes": "own scale", "Newton": "own scale", "Disc": "", "Mixed": "", "Power": ""}
 
 
 @pytest.mark.parametrize("known", [True, False])
@@ -150,12 +150,12 @@ def test_every_law_is_drawn_against_the_best_one_and_named_with_the_verdict(figu
     assert set(drawn) == set(COLOURS.values())
     assert np.abs(drawn[COLOURS["disc"]]).max() == 0
     names = {text.partition(":")[0]: text for text in legend(axes)}
-    assert set(names) == set(COLOURS)
-    assert names["disc"] == "disc: best, 2 u shaded"
+    assert set(names) == {law.capitalize() for law in COLOURS}
+    assert names["Disc"] == "Disc: best, 2 u shaded"
     farthest = np.abs(drawn[COLOURS["stokes"]]).max()
     assert farthest > axes.get_ylim()[1]
-    assert "excluded, to" in names["stokes"]
-    assert float(names["stokes"].split()[-2].lstrip("+−")) == pytest.approx(farthest, rel=0.05)
+    assert "excluded, to" in names["Stokes"]
+    assert float(names["Stokes"].split()[-2].lstrip("+−")) == pytest.approx(farthest, rel=0.05)
 
 
 def test_the_band_of_the_best_law_is_twice_its_u(analysis, figure):
@@ -200,10 +200,10 @@ def test_the_legend_shows_short_names_and_takes_them_literally(tmp_path):
     assert legend(panels(figure)[0])[1:] == ["spin-7f3a.csv", " _hidden.csv", r"\$a_{b\$.csv", "□.csv"]
     # of several runs the weight of an excluded law is 0 to the last bit; it is written as that of one run
     stokes, *_, mixed, _ = (text.get_text() for text in figure.axes[1].texts)
-    assert stokes == "stokes  <\u20090.01, excluded"
-    assert mixed.startswith("mixed  ")
+    assert stokes == "Stokes  <\u20090.01, excluded"
+    assert mixed.startswith("Mixed  ")
     assert mixed.endswith(", needless")
-    assert "mixed: needless constants" in legend(differences(figure))
+    assert "Mixed: needless constants" in legend(differences(figure))
 
 
 def test_many_readings_are_thinned_out_and_means_show_the_shape(tmp_path):
