@@ -280,7 +280,7 @@ class Projection:
     """The fit of pulse, slope of the pulse and a constant to each piece; all of shape (turns,).
 
     Attributes:
-        usable: whether the piece holds enough of the pulse.
+        usable: whether the piece holds enough of the pulse and of its slope.
         height: in units of the mean pulse.
         shift: of the height times the shift [turns].
         power: sum of squares of the pulse in the piece; height has a variance of that of the noise over this.
@@ -315,9 +315,12 @@ def _project(pieces: Pieces, pulse: Pulse) -> Projection:
     power, mixed, steepness = covariance("shape", "shape"), covariance("shape", "slope"), covariance("slope", "slope")
     with_shape, with_slope = covariance("x", "shape"), covariance("x", "slope")
     determinant = power * steepness - mixed**2
-    usable = (power > LEAST * np.median(power)) & (steepness > LEAST * np.median(steepness)) & (determinant > 0)
-    determinant, power = np.where(usable, determinant, 1.0), np.where(usable, power, 1.0)
-    height = np.where(usable, steepness * with_shape - mixed * with_slope, 0.0) / determinant
+    seen = power > LEAST * np.median(power)
+    usable = seen & (steepness > LEAST * np.median(steepness)) & (determinant > 0)
+    determinant, power = np.where(usable, determinant, 1.0), np.where(seen, power, 1.0)
+    # a pulse whose edges lie between the samples has a height, and says nothing of its place
+    alone = np.where(seen, with_shape, 0.0) / power
+    height = np.where(usable, (steepness * with_shape - mixed * with_slope) / determinant, alone)
     shift = np.where(usable, power * with_slope - mixed * with_shape, 0.0) / determinant
     return Projection(
         usable=usable,
@@ -393,7 +396,7 @@ def _regress(
         noise=float(np.sqrt(noise2)),
         height=mean * height_of_pulse,
         bound=float(np.sqrt(fit.unit_covariance[1, 1])) / fit.half,
-        missing=int(np.count_nonzero(~found.usable | (found.height < FAINT * mean))),
+        missing=int(np.count_nonzero(found.height < FAINT * mean)),
         wrong=int(np.count_nonzero(there & ~use)),
         pulse=pulse,
         window=window,

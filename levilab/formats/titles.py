@@ -23,6 +23,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "frequency": {
         "Hz": 1, "hertz": 1, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, "μHz": 1e-6, "1/s": 1, "s-1": 1, "rps": 1, "U/s": 1,
         "rpm": PER_MINUTE, "1/min": PER_MINUTE, "min-1": PER_MINUTE, "/min": PER_MINUTE, "U/min": PER_MINUTE,
+        "UPM": PER_MINUTE,
         "rad/s": PER_RADIAN, "rads-1": PER_RADIAN, "rad_s": PER_RADIAN, "rad_per_s": PER_RADIAN,
         "°/s": 1 / 360, "°s-1": 1 / 360, "deg/s": 1 / 360, "deg_s": 1 / 360, "grad/s": 1 / 360,
     },

@@ -98,7 +98,8 @@ def _refuse_what_is_no_spin(time: pd.Series[Any], spin: pd.Series[Any]) -> None:
     """Raise UsageError where times and frequencies seem to be exchanged, or other quantities."""
     seen = f"{{}} from {spin.min():.3g} to {spin.max():.3g}"
     if spin.is_monotonic_increasing and time.is_monotonic_decreasing and len(time) > 2:
-        raise UsageError("data", "times come first: analyze((t, f))", value=seen.format("a second array that rises"))
+        expected = "times come first, and rise: analyze((t, f)), or sort both by time, analyze((t[::-1], f[::-1]))"
+        raise UsageError("data", expected, value=seen.format("a second array that rises"))
     if spin.min() >= _LEAST_HZ and spin.max() >= _SLOWEST_HZ:
         return
     of_turns = "times of a turn are inverted first, analyze((t, 1 / T)); " if spin.min() > 0 else ""

@@ -297,7 +297,7 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
 
 
 #: Beyond these a number is no measurement, and its powers would leave the range of floating point.
-EARLIEST_S, SLOWEST_HZ, HIGHEST_HZ = 1e15, 1e-9, 1e12
+EARLIEST_S, SLOWEST_HZ, HIGHEST_HZ = 1e11, 1e-9, 1e12
 
 
 def _must_be_ordinary(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:
@@ -311,7 +311,8 @@ def _must_be_ordinary(table: Table, time: "NDArray[np.float64]", frequency: "NDA
 
 
 def _no_measurement(what: str, values: "NDArray[np.float64]", allowed: str, i: int) -> str:
-    return f"a {what} of {values[i]:.9g} is no measurement, {allowed}: check the unit"
+    unit = ", and say it: t=NAME [ms]" if what == "time" else ""
+    return f"a {what} of {values[i]:.9g} is no measurement, {allowed}: check the unit{unit}"
 
 
 def _in_the_file(table: Table, error: AnalysisError) -> TableError:
@@ -321,10 +322,11 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
         what = "is repeated" if error.before == error.after else "comes"
         text = f"the time {error.after:.16g} s {what} after {error.before:.16g} s in line {before}, times must increase"
         frequency = table.column("spin_frequency_hz")
-        swapped = np.all(np.diff(table.column("time_s")) < 0) and np.all(np.diff(frequency) > 0)
+        turned = np.all(np.diff(table.column("time_s")) < 0) and np.all(np.diff(frequency) > 0)
         advice = (
-            "name the columns the other way round with `columns`, since the frequencies increase and the times fall"
-            if swapped
+            "sort the rows by time, the latest comes first; or, if the columns are exchanged, name them the other way "
+            "round with `columns`"
+            if turned
             else "sort the readings, or correct one"
         )
         return TableError(table.path, f"{text}: {advice}", line=after)

@@ -28,8 +28,8 @@ class Sheet:
         chosen = "".join(f" --set {one}" for one in self.settings)
         return (
             f'levilab acquire {self.experiment} --mock --group "{group}" --seed {seed}{spoken} --out class{chosen}',
-            f"levilab analyze {self.analysis} class",
-            "levilab report class -o report.html",
+            f"levilab analyze {self.analysis} class{spoken}",
+            f"levilab report class -o report.html{spoken}",
         )
 
 

@@ -359,7 +359,7 @@ def test_a_wrong_call_names_the_argument_or_the_kind_of_failure(case: str) -> No
 
 
 @pytest.mark.parametrize(("call", "said"), [
-    (lambda: levilab.analyze(([9.0, 7.0, 6.0], [1, 2, 3])), r"from 1 to 3: times come first: analyze\(\(t, f\)\)"),
+    (lambda: levilab.analyze(([9.0, 7.0, 6.0], [1, 2, 3])), "from 1 to 3: times come first, and rise: analyze"),
     (lambda: levilab.analyze(([1, 2, 3], [0.02, 0.03, 0.04])), r"inverted first, analyze\(\(t, 1 / T\)\)"),
     (lambda: levilab.analyze(levilab.analyze(spin_down())), "^data = a result: .* give what it was made of"),
     (lambda: levilab.analyze(([0, 1], [40, 39])), "^the data: holds 2 readings, at least 3"),
