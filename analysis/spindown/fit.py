@@ -152,6 +152,8 @@ def fit_spin_down(
     """
     chosen = _check_names("drag law", laws, LAWS)
     given = check_readings(time, spin_frequency, u)
+    if released_hz is not None and not 0 < released_hz < np.inf:
+        raise AnalysisError(f"released_hz = {released_hz:g}: a spin above 0 Hz is expected")
     model = CountModel(tilt, top, released_hz)
     outliers = _search_outliers(given, model)
     while True:

@@ -370,8 +370,8 @@ def _of_priors(found: Solution, slopes: Array) -> Array:
 
 
 def _shared_u(found: Solution, slopes: Array) -> dict[str, float]:
-    """Return the part of each u that all runs of one top share: by A, a, κ and β, not by the nutation."""
-    rows = np.delete(_of_priors(found, slopes), (MORE - 1, -1), axis=0)
+    """Return the part of each u that all runs of one top share: not that of the nutation beyond a release's."""
+    rows = np.delete(_of_priors(found, slopes), MORE - 1, axis=0)
     shared = np.linalg.norm(rows, axis=0)
     return {n: float(part) for n, part in zip(found.form.parameters, shared, strict=True) if np.isfinite(part)}
 

@@ -61,7 +61,7 @@ STANDING = np.array([
 #: A top that is set free, or that a drive takes hold of, stands upright, where its moment would have it lean by the
 #: synchronous tilt: so it nutates by the angle α, α² = RELEASE δ²/((ν/ν_r)² − 1)², as a pendulum that is let go beside
 #: its place.  A drive adds a tenth (0.2 mT across 18 mT are 0.011 rad, δ is 0.03), the hand adds to α or takes
-#: from it.  This was not checked at a bench.
+#: from it: 0.6 is a guess, half of the share.  This was not checked at a bench.
 RELEASE, RELEASE_U = 1.1, 0.6
 #: u of K/ν_ref beside it: 95 % of the nutations of calm tops are below 0.02 rad, which move the rim by 0.3 mm, as much
 #: as the eye sees from 1 m; K/ν_ref = 1.2 α² there.

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 Law = Literal["even", "even in the logarithm", "normal", "log-normal"]
 #: Each with its two numbers as text.
-LAWS: MappingProxyType[Law, str] = MappingProxyType({
+FORMS: MappingProxyType[Law, str] = MappingProxyType({
     "even": "{a:g} to {b:g} {unit}, evenly",
     "even in the logarithm": "{a:.2g} to {b:.2g} {unit}, evenly in its logarithm",
     "normal": "({a:g} ± {b:g}) {unit}, normal",
@@ -57,11 +57,11 @@ class Prior:
     @property
     def text(self) -> str:
         """Its distribution as text."""
-        return LAWS[self.law].format(a=self.a, b=self.b, unit=self.unit)
+        return FORMS[self.law].format(a=self.a, b=self.b, unit=self.unit)
 
 
 _TOPS = "wider than the 2 % by which the published runs scatter: the analysis knows no scale"
-_MASSES = "the masses that float above this base"
+_MASSES = "the masses that float above this base with {} of the moment along the axis"
 
 #: Rows by subject.  Names of fields of a camera, and of keys of a scene, are theirs.
 _ROWS: dict[str, tuple[Prior, ...]] = {
@@ -80,9 +80,10 @@ _ROWS: dict[str, tuple[Prior, ...]] = {
         Prior("scatter of the pulses", "even", 0.5, 2, "× usual", "the usual one scatters a reading by 0.03 Hz"),
     ),
     "motion": (
-        Prior("moment across the axis", "even", 0.022, 0.034, "of 0.97 along it", "a maker's tolerance of direction"),
+        Prior("moment across the axis", "even", 0.022, 0.034, "of the whole (0.97 lies along it)",
+              "near the root mean square of a maker's tolerance"),
         Prior("drag", "even", 0.85, 1.15, "× usual", _TOPS),
-        Prior("top.mass_kg", "even", 0.0242, 0.0244, "kg", _MASSES),
+        Prior("top.mass_kg", "even", 0.0242, 0.0244, "kg", _MASSES.format(0.97)),
         Prior("start.spin_hz", "even", 29, 31, "Hz", "a hand"),
     ),
     "field": (
@@ -91,7 +92,7 @@ _ROWS: dict[str, tuple[Prior, ...]] = {
         Prior("height as measured", "normal", 0, 2e-4, "m", "its u, of a ruler"),
     ),
     "sway": (
-        Prior("top.mass_kg", "even", 0.025, 0.0254, "kg", _MASSES),
+        Prior("top.mass_kg", "even", 0.025, 0.0254, "kg", _MASSES.format("all")),
         Prior("push", "even", 2e-4, 1e-3, "m", "a hand; more would be seen to hit the base"),
         Prior("azimuth", "even", 0, 2 * math.pi, "rad", "any"),
         Prior("height", "even", -5e-4, 5e-4, "m", "beside where it floats, as the push"),

@@ -18,12 +18,14 @@ from analysis.spindown.fall import times_of_fall
 from analysis.spindown.fit import fit_spin_down
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.uncertainty import Estimate
+from levilab.pipelines.spindown.readings import released_at
 from levilab.pipelines.spindown.words import law_names
 from levilab.present.numbers import plain, with_uncertainty
+from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Iterable, Mapping
 
     from analysis.spindown.lawfit import LawFit
     from levilab.live.envelope import Array, Groups
@@ -84,7 +86,7 @@ def fit_so_far(
     groups: Groups,
     settings: Mapping[str, Any] = MappingProxyType({}),
     *,
-    levels_off: frozenset[int] = frozenset(),
+    events: Iterable[Mapping[str, Any]] = (),
     ended: bool = False,
 ) -> Running | None:
     """Fit the readings of a run so far; None for an experiment without a running fit.
@@ -94,7 +96,7 @@ def fit_so_far(
         columns: names of the readings' channels.
         groups: the readings.
         settings: of the experiment.
-        levels_off: numbers of the tops that only levelled off, from 1.
+        events: of the run.
         ended: whether no reading will come any more: nothing is forecast then.
     """
     method = METHODS.get(experiment)
@@ -102,7 +104,7 @@ def fit_so_far(
         return None
     by_name = {name: groups.mean[k] for k, name in enumerate(columns)}
     try:
-        found = method(by_name, groups.size, settings, levels_off)
+        found = method(by_name, groups.size, settings, events)
     except TooFewReadings as error:
         return Running("no fit", (str(error),)) if ended else Running("no fit yet", ("it begins after some readings",))
     except (AnalysisError, KeyError) as error:
@@ -120,12 +122,17 @@ def _without_forecast(found: Running) -> Running:
     return replace(found, head=found.final or found.head, curve=curve, end_s=None, dashed="")
 
 
-def spin_down(columns: Mapping[str, Array], size: int, *_: object) -> Running:
+def spin_down(
+    columns: Mapping[str, Array],
+    size: int,
+    _: Mapping[str, Any] = MappingProxyType({}),
+    events: Iterable[Mapping[str, Any]] = (),
+) -> Running:
     """Fit the drag laws through a spin-down, the best of them drawn on to the fall."""
     time, spin, u = columns["time_s"], columns["spin_frequency_hz"], columns.get("spin_frequency_u_hz")
     used = np.isfinite(spin) & (np.isfinite(u) if u is not None else True)
     time, spin = time[used], spin[used]
-    found = fit_spin_down(time, spin, None if u is None else u[used] / np.sqrt(size))
+    found = fit_spin_down(time, spin, None if u is None else u[used] / np.sqrt(size), released_hz=released_at(events))
     best = found.fit(found.best)
     last, duration = float(time[-1]), float(time[-1] - time[0])
     end = _times_of_fall(best, last, duration)
@@ -175,11 +182,12 @@ def locked_line(columns: Mapping[str, Array], size: int, *_: object) -> Running:
 
 
 def mean_limit(
-    columns: Mapping[str, Array], size: int, settings: Mapping[str, Any], levels_off: frozenset[int]
+    columns: Mapping[str, Array], size: int, settings: Mapping[str, Any], events: Iterable[Mapping[str, Any]]
 ) -> Running:
     """Return the mean of the limits so far, or of tops that all level off, with the u of `levilab analyze limit`."""
     spin, time, u = columns["spin_frequency_hz"], columns["time_s"], columns.get("spin_frequency_u_hz")
-    levels = np.isin(np.arange(1, spin.size + 1), list(levels_off))
+    levelled_off = [event["top"] for event in events if event["kind"] == RunEvent.LEVELS_OFF]
+    levels = np.isin(np.arange(1, spin.size + 1), levelled_off)
     used = np.isfinite(spin) & (np.isfinite(u) if u is not None else True) & (~levels | levels.all())
     spin, time = spin[used], time[used]
     if not len(spin):
@@ -205,7 +213,7 @@ def _value(value: float, u: float | None, unit: str = "") -> str:
     return with_uncertainty(Estimate(value, u, unit))
 
 
-METHODS: dict[str, Callable[[Mapping[str, Array], int, Mapping[str, Any], frozenset[int]], Running]] = {
+METHODS: dict[str, Callable[[Mapping[str, Array], int, Mapping[str, Any], Iterable[Mapping[str, Any]]], Running]] = {
     "spin": spin_down,
     "precession": locked_line,
     "limit": mean_limit,

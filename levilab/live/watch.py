@@ -16,7 +16,6 @@ from levilab.live.envelope import by_columns
 from levilab.live.follow import Followed
 from levilab.live.running import Running, fit_so_far
 from levilab.live.views import u_of, unit_of, view_of
-from levilab.runs.events import RunEvent
 from levilab.telemetry.address import read_address
 from levilab.telemetry.codec import pack
 from levilab.telemetry.messages import Poses, Record, State
@@ -183,8 +182,7 @@ class Watch:
         experiment, columns, groups = followed.record.experiment, followed.columns, followed.readings.groups()
         settings = followed.record.configuration.get(experiment)
         settings = settings if isinstance(settings, dict) else {}
-        level = frozenset(event["top"] for event in followed.events if event["kind"] == RunEvent.LEVELS_OFF)
-        fit = partial(fit_so_far, experiment, columns, groups, settings, levels_off=level, ended=ended)
+        fit = partial(fit_so_far, experiment, columns, groups, settings, events=[*followed.events], ended=ended)
         return followed.folder, fit
 
     def take_fit(self, folder: Path, found: Running | None, took_s: float) -> None:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.spindown.tilt import RELEASE_U
 from instruments.clock import VirtualClock
 from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.mock import acquire_mock
@@ -91,7 +90,7 @@ def _fall(found: SpinDown, run: Run, scene: Scene) -> Pull:
     fitted = scene.changed({"drag.coefficient": constant.value, "start.spin_hz": start})
     readings = run.readings()
     wobble = parameters["wobble"].value or 0.0
-    u_wobble = math.hypot(parameters["wobble"].u or 0.0, RELEASE_U * wobble)
+    u_wobble = parameters["wobble"].u or 0.0
     late, early = (_simulated_fall(fitted, max(wobble + sign * u_wobble, _LEAST_HZ)) for sign in (-1, 1))
     times = readings.column("time_s")
     interval, gate = float(np.median(np.diff(times))), float(run.record.configuration["spin"]["gate_s"])

@@ -29,8 +29,9 @@ from levilab.runs.events import RunEvent
 from levilab.texts.note import Note, of_file
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
     from pathlib import Path
+    from typing import Any
 
     from numpy.typing import NDArray
 
@@ -71,10 +72,16 @@ class SpinReadings(Readings):
 
 def read_run_readings(run: "Run", options: "InputOptions") -> SpinReadings:
     """Return the readings of a run of the experiment `spin`, which drives the top up."""
-    drives = [event for event in run.events() if event["kind"] == RunEvent.DRIVE_ON]
-    slowest = min((event["frequency_hz"] for event in drives if event.get("frequency_hz")), default=None)
-    readings = replace(spin_readings(run.readings()), released_hz=slowest, upright=run.record.world == "spin")
+    readings = replace(
+        spin_readings(run.readings()), released_hz=released_at(run.events()), upright=run.record.world == "spin"
+    )
     return _between(readings, options, run.folder)
+
+
+def released_at(events: "Iterable[Mapping[str, Any]]") -> float | None:
+    """Return the slowest spin at which a drive took hold of the top, by the events of a run; None: no drive did."""
+    drives = (event.get("frequency_hz") for event in events if event["kind"] == RunEvent.DRIVE_ON)
+    return min(filter(None, drives), default=None)
 
 
 def read_spin_file(path: "Path", options: "InputOptions") -> SpinReadings:
@@ -296,14 +303,15 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
     return []
 
 
-#: Beyond these a number is no measurement, and its powers would leave the range of floating point.
-EARLIEST_S, SLOWEST_HZ, HIGHEST_HZ = 1e11, 1e-9, 1e12
+#: Beyond these a number is no measurement: 3000 years (a clock in ms since 1970 shows 1.8e12), and spins whose powers
+#: would leave the range of floating point.
+LONGEST_S, SLOWEST_HZ, HIGHEST_HZ = 1e11, 1e-9, 1e12
 
 
 def _must_be_ordinary(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:
     size = np.abs(frequency)
     for wrong, values, what, allowed in (
-        (np.abs(time) > EARLIEST_S, time, "time", f"up to {EARLIEST_S:g} s"),
+        (np.abs(time) > LONGEST_S, time, "time", f"up to {LONGEST_S:g} s"),
         (size > HIGHEST_HZ, frequency, "frequency", f"up to {HIGHEST_HZ:g} Hz"),
         ((size > 0) & (size < SLOWEST_HZ), frequency, "frequency", f"from {SLOWEST_HZ:g} Hz"),
     ):

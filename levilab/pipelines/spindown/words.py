@@ -294,7 +294,7 @@ def _wobble(tilt: Estimate | None) -> str:
 
 
 def _needless(said: Verdict, names: str) -> str:
-    return Text("As well as {law} fit with more constants: {laws}.", laws=names, law=law_names([said.best]))
+    return Text("No better than {law}, with more constants: {laws}.", laws=names, law=law_names([said.best]))
 
 
 def _no_law(found: SpinDown | Combined, runs: Sequence[SpinDown], rms: str) -> str:

@@ -185,7 +185,7 @@ def test_a_field_is_shown_in_the_units_of_the_laboratory(found):
     assert any("mm" in row.cells[2] for row in table.rows)
 
 
-def test_budgets_are_blocks_with_a_sentence_each_and_their_origins(found):
+def test_budgets_are_folds_and_their_origins_are_said_once(found):
     budgets = found["a sweep"].budget
     blocks = budget_blocks(budgets)
     assert [type(block) for block in blocks] == [
