@@ -50,8 +50,8 @@ class Later(typer.core.TyperCommand):
         except Exception as error:
             if hasattr(error, "option_name") and hasattr(error, "possibilities"):  # typer keeps the class to itself
                 _explain_unknown(error, info_name or "", self.command)
-            elif hasattr(error, "message"):
-                error.message += _explain_blank(args)
+            elif hasattr(error, "message") and "unexpected extra argument" in error.message:
+                error.message = error.message.rstrip(".") + _explain_blank(args)
             raise
 
 

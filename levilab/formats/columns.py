@@ -39,7 +39,7 @@ SHORTHANDS = {
     "y": "y_m",
     "z": "height_m",
     "b": "flux_density_t",
-    **{f"b{axis}": f"flux_density_{axis}_t" for axis in "xyz"},
+    **{f"b{axis}": f"flux_density_{axis}_t" for axis in ("x", "y", "z", "abs")},
 }
 
 

@@ -212,7 +212,7 @@ class Run:
         try:
             lines = path.read_text(encoding="utf-8", errors="replace").split("\n") if path.is_file() else []
         except OSError as error:
-            raise DataError(f"{path}: cannot be read ({error.strerror}): copy the run from another disk") from error
+            raise DataError(f"{path}: cannot be read ({error.strerror}): restore it from a copy") from error
         return [event for line in lines if (event := _event(line))]
 
     def warnings(self) -> tuple[str, ...]:

@@ -214,7 +214,11 @@ def _zero(session: Session[FieldSettings]) -> None:
         size = "a field beyond its range" if seen is None else Text("{field:.1f} mT", field=1e3 * seen)
         text = Text("The probe sees {size}, and none in its zero-gauss chamber: put it there.", size=size)
     else:
-        session.warn("the probe was zeroed in {size}, which all heights are off by now; scan again", size=size)
+        session.warn(
+            "the probe showed {size} before it was zeroed: if it was not in its chamber, all fields are off by that; "
+            "scan again",
+            size=size,
+        )
     session.insist("magnetometer", magnetometer.zero, lambda: _set_up(session))
 
 

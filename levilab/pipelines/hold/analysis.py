@@ -16,7 +16,7 @@ from levilab.pipelines.hold.readings import HoldReadings
 from levilab.pipelines.options import HoldOptions, SpinDownOptions
 from levilab.pipelines.row import Quantity, columns_of
 from levilab.pipelines.spindown.document import SPINDOWN
-from levilab.pipelines.spindown.words import SYMBOLS
+from levilab.pipelines.spindown.words import SYMBOLS, law_names
 from levilab.present.numbers import enumeration, plain, with_uncertainty
 from levilab.runs.run import read_record
 from levilab.texts.text import Sentences, Text
@@ -105,7 +105,7 @@ def _of_laws(found: HeldTogether) -> Iterable[str]:
             Text("{symbol} = {value:n}", symbol=SYMBOLS[name], value=with_uncertainty(one))
             for name, one in best.constants.items()
         ]
-        yield Text("The {law} law fits best: {how}.", law=best.name, how=enumeration(constants))
+        yield Text("The {law} law fits best: {how}.", law=law_names([best.name]), how=enumeration(constants))
         if (chi := best.statistics.reduced_chi_square) is not None:
             yield Text("The held spins scatter about it by {times:n} of their u.", times=plain(math.sqrt(chi), 2))
     for law in found.laws[: 1 if best else None]:  # a single drag lies on each
@@ -119,7 +119,7 @@ def _of_laws(found: HeldTogether) -> Iterable[str]:
                 "uncertainties off."
             )
             value = with_uncertainty(spindown)
-            yield Text(agrees, law=law.name, symbol=SYMBOLS[name], value=value, pull=plain(pull, 2))
+            yield Text(agrees, law=law_names([law.name]), symbol=SYMBOLS[name], value=value, pull=plain(pull, 2))
 
 
 def fit_source(source: Source[HoldReadings], _: HoldOptions) -> Hold:

@@ -97,7 +97,7 @@ def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
         raise TableError(path, f"{what} again", line=int(table.lines[k + 1]))
     strongest = float(np.abs(np.median(field, axis=0)).max())
     if strongest > STRONGEST_T:
-        units = ",".join(f"b{axis}=NAME [µT]" for axis in axes.values())
+        units = ",".join(f"{'babs' if axis == '|B|' else 'b' + axis}=NAME [µT]" for axis in axes.values())
         what = f"{path.name}: a field of {strongest:.3g} T is stronger than a phone measures, so the unit is another"
         warnings.append(of_file("strongest", f"{what}; say it with the columns: {units}"))
     if MAGNITUDE in axes:

@@ -342,8 +342,8 @@ def verdict(of: Class) -> str:
 def _beside_truth(of: Compared) -> str:
     if of.truth is None:
         return ""
-    agrees = "and agrees with the truth" if abs(of.truth[1]) <= _AGREES else "and not the truth"
-    return f", {agrees} (it is {with_sign(of.truth[1], 1)} u from it)"
+    agrees = "agrees with" if abs(of.truth[1]) <= _AGREES else "disagrees with"
+    return f", and {agrees} the truth, which is {with_sign(-of.truth[1], 1)} u from it"
 
 
 def agreement(of: Class) -> str:

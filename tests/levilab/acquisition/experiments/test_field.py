@@ -109,12 +109,12 @@ def test_a_height_that_is_typed_is_the_one_that_is_kept(tmp_path):
 
 
 def test_a_probe_that_sees_a_field_is_asked_into_its_chamber_again(tmp_path):
-    """On this bench it is left where it was, and all heights are off by what is zeroed there."""
+    """On this bench it is left where it was, and all fields are off by the one that is zeroed there."""
     asked = []
     run = acquire(request_of(tmp_path, person=lambda task: asked.append(task.text) or ""), Silent())
     assert [text.partition(",")[0] for text in asked[1:3]] == ["The probe sees 19.4 mT"] * 2
     (warning,) = (event["text"] for event in run.events() if event["kind"] == "warning")
-    assert warning.startswith("the probe was zeroed in 19.4 mT")
+    assert warning.startswith("the probe showed 19.4 mT before it was zeroed")
 
 
 @pytest.mark.parametrize(
