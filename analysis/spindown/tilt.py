@@ -66,7 +66,7 @@ RELEASE, RELEASE_U = 1.1, 0.6
 #: u of K/ν_ref beside it: 95 % of the nutations of calm tops are below 0.02 rad, which move the rim by 0.3 mm, as much
 #: as the eye sees from 1 m; K/ν_ref = 1.2 α² there.
 CALM_U = 0.00016
-#: No hand and no drive starts a top below so many ν_r: it falls within half a minute there.
+#: In units of ν_r: no hand and no drive starts a top below, where it falls within half a minute.
 _SLOWEST_START = 1.15
 
 _NODES = 120

@@ -352,7 +352,7 @@ def _shown(source: bytes, edit: Edit) -> str:
 
 
 def chosen(seed: int, number: int, only: Collection[str] = ()) -> list[Mutation]:
-    """So many at random, each room with its share by lines of code, and never two on one line; only: these rooms."""
+    """Return places at random, a room's share by its lines of code, and never two on one line; only: these rooms."""
     rooms = {room: found for room, found in generated(seed).items() if not only or room in only}
     lines = {
         room: sum(

@@ -28,7 +28,7 @@ _OUT_S = (0.5, 3.0, 15.0, 100.0)
 _SET_S = (-3600.0, -90.0, -2.0, 2.0, 90.0, 3600.0)
 #: Errors of a disk.
 _ERRORS = (errno.EIO, errno.EDQUOT, errno.EROFS, errno.EACCES)
-#: A file that cannot be read is one of so many that are opened next.
+#: The file that cannot be read is one of the next ones that are opened; their number.
 _READS = 3
 #: Room that is left on a full disk, at most [bytes].
 _ROOM = 3000

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 #: Processes that a laboratory has at most: the first, and those that resume its run.
 MOST_LIVES = 4
-#: A slip is drawn so many times as often as anything else that goes wrong, where a person has tasks.
+#: Where a person has tasks, the chance of a slip over that of anything else that goes wrong.
 _SLIPS = 3
 #: Share of laboratories in which nothing goes wrong: there every number must be right.
 _CALM = 0.15

@@ -308,7 +308,9 @@ class Document:
     date: datetime | None = None
 
 
-#: What stands in a document as it is: names of parts, and what a person types.
+T = TypeVar("T")
+
+#: What stands in a document as it is: names of parts, and commands.
 _NOT_SAID = frozenset({"name", "anchor", "narrow", "on_paper", "gid", "code", "byline", "kind"})
 
 
@@ -324,7 +326,6 @@ def in_language_of_reader(part: T) -> T:
     return replace(part, **{name: in_language_of_reader(value) for name, value in said.items()})
 
 
-T = TypeVar("T")
 B = TypeVar("B", bound="Block")
 
 
