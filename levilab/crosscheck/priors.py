@@ -15,12 +15,15 @@ if TYPE_CHECKING:
     import numpy as np
 
 Law = Literal["even", "even in the logarithm", "normal", "log-normal"]
-#: Each with its two numbers as text.
-FORMS: MappingProxyType[Law, str] = MappingProxyType({
-    "even": "{a:g} to {b:g} {unit}, evenly",
-    "even in the logarithm": "{a:.2g} to {b:.2g} {unit}, evenly in its logarithm",
-    "normal": "({a:g} ± {b:g}) {unit}, normal",
-    "log-normal": "{a:g} {unit}, its logarithm ± {b:g}, normal",
+#: Each with its two numbers as text, and the function that draws from it.
+FORMS: MappingProxyType[Law, tuple[str, Callable[[np.random.Generator, float, float], float]]] = MappingProxyType({
+    "even": ("{a:g} to {b:g} {unit}, evenly", lambda by, a, b: by.uniform(a, b)),
+    "even in the logarithm": (
+        "{a:.2g} to {b:.2g} {unit}, evenly in its logarithm",
+        lambda by, a, b: 10 ** float(by.uniform(math.log10(a), math.log10(b))),
+    ),
+    "normal": ("({a:g} ± {b:g}) {unit}, normal", lambda by, a, b: by.normal(a, b)),
+    "log-normal": ("{a:g} {unit}, its logarithm ± {b:g}, normal", lambda by, a, b: a * math.exp(b * by.normal())),
 })  # fmt: skip
 
 
@@ -46,18 +49,12 @@ class Prior:
 
     def draw(self, by: np.random.Generator) -> float:
         """Return the next number."""
-        if self.law == "even":
-            return float(by.uniform(self.a, self.b))
-        if self.law == "even in the logarithm":
-            return 10 ** float(by.uniform(math.log10(self.a), math.log10(self.b)))
-        if self.law == "normal":
-            return float(by.normal(self.a, self.b))
-        return self.a * math.exp(self.b * float(by.standard_normal()))
+        return float(FORMS[self.law][1](by, self.a, self.b))
 
     @property
     def text(self) -> str:
         """Its distribution as text."""
-        return FORMS[self.law].format(a=self.a, b=self.b, unit=self.unit)
+        return FORMS[self.law][0].format(a=self.a, b=self.b, unit=self.unit)
 
 
 _TOPS = "wider than the 2 % by which the published runs scatter: the analysis knows no scale"

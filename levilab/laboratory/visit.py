@@ -56,8 +56,8 @@ if TYPE_CHECKING:
 #: Where the runs are, the bench file of a bench that goes on between processes, and the command of each run.
 _RUNS, _BENCH, _COMMAND = Path("runs"), Path("bench.toml"), ["levilab", "acquire"]
 
-#: One laboratory in so many has a report, whose figure takes longer than all the rest; in another one the analyses are
-#: repeated with one of the first files that cannot be read.
+#: Of this number of laboratories one has a report, whose figure takes longer than all the rest; in one of the second
+#: number the analyses are repeated, where one of the first files, of the third number, cannot be read.
 _REPORTED, _ANALYZED_AGAIN, _READ_BY_ANALYSIS = 20, 5, 7
 
 

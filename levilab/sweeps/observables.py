@@ -93,7 +93,7 @@ def _columns_of_line(start: str, name: str) -> tuple[Observable, Observable]:
     )
 
 
-#: Name, unit, meaning, type of the array, and what it is made from.
+#: Rows of Observable.
 _ROWS: tuple[tuple[str, str, str, str, Need], ...] = (
     ("survived", "1", "Whether the top is still up at the end.", "bool", "ends"),
     ("lifetime_s", "s", "Time from the start to the fall; NaN of a top that is still up.", "float64", "ends"),

@@ -36,7 +36,7 @@ def with_less_work() -> Iterator[None]:
 
 
 def _once(fit: Callable[..., Any]) -> Callable[..., Any]:
-    """Remember what a fit gave; an error is raised each time anew."""
+    """Remember what a fit gave; an error is raised again each time."""
     known: dict[bytes, Any] = {}
 
     def call(*readings: Any, **options: Any) -> Any:

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 #: The true moment [A m²].
 MOMENT = 0.714
 #: How well it is stated, relative; how well a mass [kg] and a height [m] are measured.
-MOMENT_U, MASS_U, HEIGHT_U = (prior.b for prior in PRIORS["field"].values())
+MOMENT_U, MASS_U, HEIGHT_U = (
+    PRIORS["field"][name].b for name in ("moment as stated", "mass as weighed", "height as measured")
+)
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:

@@ -8,7 +8,7 @@ from levilab.formats.columns import TableError
 from levilab.formats.table import read_run_readings, read_table
 from levilab.pipelines.options import SpinDownOptions, read_options
 from levilab.pipelines.spindown.document import SPINDOWN
-from levilab.pipelines.spindown.readings import spin_readings
+from levilab.pipelines.spindown.readings import read_spin_file, spin_readings
 from levilab.pipelines.spindown.words import TILT_ALLOWED
 from support.spin_downs import spin_down_csv
 
@@ -40,6 +40,8 @@ def test_uncertainties_may_be_absent(tmp_path):
         ("0,61,.1\n2,60,.1\n# x\n1,59,.1\n", 5, ["the time 1 s comes after 2 s in line 3"]),
         ("0,61,.1\n1,0,.1\n2,59,.1\n", 3, ["the frequency is 0 Hz", "delete such rows"]),
         ("0,61,.1\n1,60,.1\n2,-59,.1\n", 4, ["the frequency is -59 Hz", "magnitude"]),
+        ("2,59,.1\n1,60,.1\n0,61,.1\n", 3, ["the time 1 s comes after 2 s in line 2", "sort the rows by time"]),
+        ("1.8e12,61,.1\n1.8e12,60,.1\n2e12,59,.1\n", 2, ["a time of 1.8e+12 is no measurement", "t=NAME [ms]"]),
         ("0,61,.1\n1,60,0\n2,59,.1\n", 3, ["the uncertainty is 0 Hz"]),
         ("0,61,.1\n1,60,.1\n2,59,-.1\n", 4, ["the uncertainty is -0.1 Hz"]),
     ],
@@ -51,6 +53,13 @@ def test_what_cannot_be_a_spin_down_is_reported_with_its_line(rows, line, words,
     assert f"data.csv, line {line}: " in str(caught.value)
     assert str(caught.value).isprintable()
     assert all(word in str(caught.value) for word in words), str(caught.value)
+
+
+def test_a_table_titled_seconds_and_upm_is_no_capture_of_a_logic_analyser(tmp_path):
+    path = tmp_path / "data.csv"
+    path.write_text("seconds,n (UPM)\n" + "".join(f"{10 * k},{2400 - 60 * k}\n" for k in range(9)))
+    readings = read_spin_file(path, SpinDownOptions())
+    np.testing.assert_allclose(readings.frequency, 40 - np.arange(9), rtol=1e-12)
 
 
 def test_rows_of_0_hz_after_the_fall_are_left_out_with_a_note(tmp_path):
