@@ -12,6 +12,7 @@ from levilab.formats.titles import (
     CANONICAL,
     COMPANIONS,
     LISTED,
+    NAMES,
     QUANTITIES,
     UNITS,
     Title,
@@ -22,6 +23,7 @@ from levilab.formats.titles import (
     implied_unit,
     is_unit,
     nearly_a_frequency,
+    plain_name,
     read_title,
     unit_factor,
     without_runs_of_blanks,
@@ -41,6 +43,18 @@ SHORTHANDS = {
     "b": "flux_density_t",
     **{f"b{axis}": f"flux_density_{axis}_t" for axis in ("x", "y", "z", "abs")},
 }
+
+
+def key_of(name: str) -> str | None:
+    """Return the key of a quantity in the option `columns`, by any of its names; None for an unknown one.
+
+    >>> key_of("f"), key_of("time_s"), key_of("Frequency"), key_of("colour")
+    ('f', 'time_s', 'f', None)
+    """
+    if name in SHORTHANDS or name in CANONICAL:
+        return name
+    column = NAMES.get(plain_name(name))
+    return next((short for short, long in SHORTHANDS.items() if long == column), column)
 
 
 class TableError(DataError):
@@ -88,6 +102,7 @@ class Column:
         inverse: the file has the inverse of the quantity, a period [s] after the factor, or that one's uncertainty.
         unit: of the numbers in the file, as it was understood.
         written: whether the file or the user says that unit.
+        behind: whether it is what stands behind a ± in its fields.
     """
 
     name: str
@@ -97,6 +112,7 @@ class Column:
     inverse: bool = False
     unit: str = ""
     written: bool = False
+    behind: bool = False
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from functools import cached_property
 from itertools import takewhile
 from typing import Literal
 
-from levilab.formats.titles import is_unit, known_titles
+from levilab.formats.titles import UNITS, is_unit, known_titles
 
 COMMENTS = ("#", "%", "//")
 COMMENTS_UNLESS_SEMICOLON = (*COMMENTS, ";", "'")
@@ -40,7 +40,18 @@ _DATE = re.compile(r"(\d\d?)([./])(\d\d?)\2(\d{4}|\d\d),?[T ]+(\d\d?:\d\d)(:\d\d
 #: What phyphox writes for a cell that a spreadsheet would take for a formula: '-1.5.
 GUARDED = re.compile(r"'[=+@-]")
 #: A number and the unit behind it.
-_WITH_UNIT = re.compile(r"(?P<number>[+-]?[\d.,]+(?:[eE][+-]?\d+)?)\s*(?P<unit>[^\d\s.,+/-].*)")
+_NUMBER = r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?"
+_WITH_UNIT = re.compile(rf"(?P<number>{_NUMBER})\s*(?P<unit>[^\d\s.,+/±-].*)")
+#: A number and its uncertainty: 40.00 ± 0.03 Hz, or 40.00(3) Hz, whose digits count from the last one on.
+_MARK = r"\s*(?:±|\+/-|\+-)\s*"
+_WITH_U = re.compile(rf"\(?(?P<value>{_NUMBER}){_MARK}(?P<u>{_NUMBER})\)?\s*(?P<unit>[^\d\s.,+/-].*)?")
+_CONCISE = re.compile(r"(?P<value>[+-]?\d+(?:[.,](?P<decimals>\d+))?)\((?P<digits>\d+)\)\s*(?P<unit>[^\d\s.,+/-].*)?")
+#: Blanks around ±, and those between a number and its unit.
+_AROUND_MARK = re.compile(_MARK)
+_BEFORE_UNIT = re.compile(
+    rf"(?<!\S)({_NUMBER}(?:(?:±|\+/-|\+-){_NUMBER})?)\s+"
+    rf"(?=(?:{'|'.join(re.escape(name) for units in UNITS.values() for name in units)})(?:\s|$))"
+)
 Kind = Literal["number", "clock", "missing", "text"]
 
 
@@ -96,10 +107,32 @@ class Dialect:
         if text.casefold() in MISSING or text == UNVALUED:
             return "missing"
         try:
-            self.number(_without_unit(text))
+            self.value(text)
         except ValueError:
             return "clock" if CLOCK.fullmatch(text) or is_dated(text) else "text"
         return "number"
+
+    def value(self, text: str) -> float:
+        """Return the number in a field that may have its uncertainty and its unit behind it.  Raises ValueError."""
+        combined = value_and_u(text)
+        return self.number(_without_unit(combined[0] if combined else text))
+
+
+def value_and_u(text: str) -> tuple[str, str] | None:
+    """Return a number and its uncertainty, each with the unit behind both; None where there are not both.
+
+    >>> value_and_u("40,00 ± 0,03 Hz"), value_and_u("40.00(3)"), value_and_u("40.00 Hz")
+    (('40,00Hz', '0,03Hz'), ('40.00', '0.03'), None)
+    """
+    if found := _WITH_U.fullmatch(text):
+        unit = found["unit"] or ""
+        return f"{found['value']}{unit}", f"{found['u']}{unit}"
+    if found := _CONCISE.fullmatch(text):
+        unit, decimals = found["unit"] or "", len(found["decimals"] or "")
+        padded = found["digits"].zfill(decimals + 1)
+        u = f"{padded[:-decimals]}{found['value'][-decimals - 1]}{padded[-decimals:]}" if decimals else padded
+        return f"{found['value']}{unit}", f"{u}{unit}"
+    return None
 
 
 def unit_behind(text: str) -> str:
@@ -108,7 +141,8 @@ def unit_behind(text: str) -> str:
     >>> unit_behind("38,01 Hz"), unit_behind("38 apples")
     ('Hz', '')
     """
-    found = _WITH_UNIT.fullmatch(text)
+    combined = value_and_u(text)
+    found = _WITH_UNIT.fullmatch(combined[0] if combined else text)
     return found["unit"] if found and is_unit(found["unit"]) else ""
 
 
@@ -273,4 +307,8 @@ def _split_at_blanks(line: str) -> list[str]:
         return [field.strip('"') for field in re.findall(r'"[^"]*"|\S+', line)]
     if any(mark in line for mark in "[(/"):  # "f [Hz]" and "f / Hz" are one title each
         line = re.sub(r"(?<!\s)\s+(?=[\[(/])|(?<=/)\s+", "", line)
+    if "±" in line or "+" in line:
+        line = _AROUND_MARK.sub("±", line)
+    if line.upper() != line.lower():  # 0 s   40.00 Hz
+        line = _BEFORE_UNIT.sub(r"\1", line)
     return line.split()

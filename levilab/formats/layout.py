@@ -32,6 +32,8 @@ BYTE_ORDER_MARKS = (
 )  # fmt: skip
 ALIGNED = Dialect("\t", ".")  # of a text that was written from cells
 CONTROL = re.compile("[\x00-\x08\x0e-\x19]")  # DOS may end a text with 0x1a
+#: Part of the lines of a text that a starting micro-controller or a loose plug may have filled with other bytes.
+_MOST_NOISE = 0.2
 EXPORT = "a table of text is expected: export it as CSV"
 
 
@@ -123,9 +125,12 @@ def lines_of(path: Path, head: bytes, encoding: str, *, whole: bool, padding: st
     """
     text = codecs.getincrementaldecoder(encoding)(errors="replace").decode(head, final=whole)
     text = text.replace(padding, "") if padding else text
-    if CONTROL.search(text):
-        raise NoTable(path, f"is a binary file; {EXPORT}")
     lines = list(io.StringIO(text, newline=None))
+    if CONTROL.search(text):
+        clean = ["\n" if CONTROL.search(line) else line for line in lines]
+        if sum(one != line for one, line in zip(clean, lines, strict=True)) > _MOST_NOISE * len(lines):
+            raise NoTable(path, f"is a binary file; {EXPORT}")
+        lines = clean
     if not whole and lines and not lines[-1].endswith("\n"):
         lines.pop()
     if not any(line.strip() for line in lines):

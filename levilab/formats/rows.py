@@ -21,10 +21,20 @@ import numpy as np
 
 from analysis.numbers import how_many
 from levilab.formats.columns import Column, TableError, shorten
-from levilab.formats.dialect import CLOCK, MISSING, UNVALUED, clock_time, is_dated, slashed_date, unit_behind
-from levilab.formats.layout import Layout
+from levilab.formats.dialect import (
+    CLOCK,
+    MISSING,
+    UNVALUED,
+    clock_time,
+    is_dated,
+    slashed_date,
+    unit_behind,
+    value_and_u,
+)
+from levilab.formats.layout import CONTROL, Layout
 from levilab.formats.texts import Text
 from levilab.formats.titles import dimension, unit_factor
+from levilab.formats.transposed import LIES
 from levilab.texts.note import Note
 
 if TYPE_CHECKING:
@@ -35,7 +45,8 @@ BLOCK = 1 << 17  # bytes counted at once: small enough for the cache
 ONE_BYTE_ENCODINGS = ("utf-8", "utf-8-sig", "latin-1")  # those in which a line end is one byte, whatever precedes it
 #: In a field behind the last column a digit is a number too many; a word is a person's remark.
 _NUMBER_IN = re.compile(r"\d")
-_ITS_OWN_COLUMN = "write what stands behind the ± into a column of its own, with the title u"
+#: Lines that are no rows, before the rest is not looked at, and those that a note names.
+_MOST_REFUSED, _MOST_NAMED = 1000, 5
 TRUTHS = (b"rue", b"RUE", b"alse", b"ALSE")  # of True and False, which pandas takes for 1 and 0
 SPELLINGS = sorted({form for text in MISSING for form in (text, text.upper(), text.title(), "NaN")})
 
@@ -54,10 +65,13 @@ class Rows:
     notes: tuple[str, ...] = ()
 
 
-def read_rows(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool = False) -> Rows:
+def read_rows(
+    text: Text, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool = False, skip_doubtful: bool = False
+) -> Rows:
     """Read all rows of the chosen columns.
 
-    A last line without line end is left out if it is no full row, or in any case if `drop_unended`.
+    A last line without line end is left out if it is no full row, or in any case if `drop_unended`; with
+    `skip_doubtful` each line that is no row is.
 
     Raises:
         TableError: a line is damaged.
@@ -65,7 +79,12 @@ def read_rows(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_unen
     """
     few = text.size < FEW
     rows = None if few else _read_at_once(text, layout, chosen, drop_unended=drop_unended)
-    return rows or _read_lines(text, layout, chosen, drop_unended=drop_unended)
+    try:
+        return rows or _read_lines(text, layout, chosen, drop_unended=drop_unended, skip_doubtful=skip_doubtful)
+    except TableError as error:
+        if not text.lies:
+            raise
+        raise TableError(error.path, f"{error.message}; {LIES}", line=error.line) from None
 
 
 def _read_at_once(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows | None:
@@ -73,6 +92,8 @@ def _read_at_once(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_
     import pandas as pd
 
     dialect, fields, used = layout.dialect, layout.width, [column.index for column in chosen]
+    if any(column.behind for column in chosen):
+        return None
     count, rest = _plain_lines(text, layout) if _may_be_plain(layout, used) else (0, b"")
     if count == 0:
         return None
@@ -163,13 +184,15 @@ def _with_last(
     return Rows(values, np.append(rows.lines, line))
 
 
-def _read_lines(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows:
+def _read_lines(
+    text: Text, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool, skip_doubtful: bool = False
+) -> Rows:
     """Read all rows line by line; some 2 µs a number."""
     lines, values = array("q"), [array("d") for _ in chosen]
     time, path, notes = "", text.path, list[str]()
     layout = _with_order_of_dates(text, layout, chosen, notes)
-    below: list[tuple[TableError, str]] = []  # lines that may be means below the readings
-    for number, line in _lines(text, layout):
+    refused: list[tuple[TableError, str]] = []
+    for number, line in _lines(text, layout, notes):
         if not line.endswith("\n"):
             row = None if drop_unended else _row_or_none(path, layout, chosen, number, line)
             if row is None:
@@ -178,12 +201,10 @@ def _read_lines(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_un
         try:
             row = _row(path, layout, chosen, number, line)
         except TableError as error:
-            below.append((error, _left_out(number, line, "is no reading")))
-            if not lines or not _begins_with_words(layout, line):
-                raise below[0][0] from None
+            refused.append((error, line))
+            if len(refused) > _MOST_REFUSED:
+                break
             continue
-        if below:
-            raise below[0][0]
         time = time or _time_in(layout, chosen, line)
         notes += _remark_behind(layout, number, line)
         lines.append(number)
@@ -193,16 +214,55 @@ def _read_lines(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_un
         _clocks(np.array(found, np.float64), column, time) if column.name == "time_s" else np.array(found, np.float64)
         for column, found in zip(chosen, values, strict=True)
     )
-    notes += [note for _, note in below]
+    notes += _notes_on_refused(layout, refused, lines, skip=skip_doubtful, may_skip=not drop_unended)
     return Rows(numbers, np.array(lines, np.int64), (*notes, *_doubts_about(time)))
 
 
-def _lines(text: Text, layout: Layout) -> Iterator[tuple[int, str]]:
-    """Yield the lines that should be rows, with their numbers."""
+def _notes_on_refused(
+    layout: Layout, refused: Sequence[tuple[TableError, str]], lines: Sequence[int], *, skip: bool, may_skip: bool
+) -> Iterator[str]:
+    """Yield notes on the lines that are no rows: means and remarks below the readings, and with `skip` all others.
+
+    Args:
+        layout: of the text.
+        refused: what is wrong with each line, and the line.
+        lines: numbers of the rows.
+        skip: whether they are to be left out.
+        may_skip: whether they could be.
+
+    Raises:
+        TableError: of the first line that is not left out.
+    """
+    last = lines[-1] if lines else 0
+    below: list[tuple[TableError, str]] = []
+    doubtful: list[tuple[TableError, str]] = []
+    for error, line in refused:
+        number = error.line or 0
+        is_below = lines and number > last and _begins_with_words(layout, line)
+        (below if is_below else doubtful).append((error, _left_out(number, line, "is no reading")))
+    numbers = [str(error.line) for error, _ in doubtful]
+    places = ", ".join([*numbers[:_MOST_NAMED], *["…"] * (len(numbers) > _MOST_NAMED)])
+    if doubtful and not skip:
+        error, _ = doubtful[0]
+        also = f" (also in {how_many(len(numbers) - 1, 'other line')})" if len(numbers) > 1 else ""
+        do = "; `skip_doubtful` leaves such rows out" if may_skip and len(doubtful) < len(lines) else ""
+        raise TableError(error.path, f"{error.message}{also}{do}", line=error.line)
+    if doubtful:
+        rows = f"{how_many(len(numbers), 'doubtful row')} {'is' if len(numbers) == 1 else 'are'} left out, as asked"
+        yield Note("doubtful", f"{rows}: line{'s' * (len(numbers) > 1)} {places}")
+    yield from (note for _, note in below)
+
+
+def _lines(text: Text, layout: Layout, notes: list[str] | None = None) -> Iterator[tuple[int, str]]:
+    """Yield the lines that should be rows, with their numbers; notes get those with bytes that are no text."""
     with io.TextIOWrapper(text.open(), layout.encoding, errors="replace", newline=None) as stream:
         for number, line in enumerate(stream, 1):
-            if number >= layout.first_line and not _skips(layout, line):
+            if number < layout.first_line or _skips(layout, line):
+                continue
+            if not CONTROL.search(line):
                 yield number, line
+            elif notes is not None:
+                notes.append(_left_out(number, line, "has bytes that are no text"))
 
 
 def _remark_behind(layout: Layout, number: int, line: str) -> Iterator[str]:
@@ -299,6 +359,10 @@ def _row_or_none(path: Path, layout: Layout, chosen: Sequence[Column], line: int
 
 
 def _number(path: Path, layout: Layout, column: Column, line: int, text: str) -> float:
+    if combined := value_and_u(text):
+        text = combined[column.behind]
+    elif column.behind:
+        return float("nan")
     try:
         return layout.dialect.number(text)
     except ValueError:
@@ -313,8 +377,7 @@ def _number(path: Path, layout: Layout, column: Column, line: int, text: str) ->
         what = f"column '{shorten(column.label)}' holds a formula without its value"
         raise TableError(path, f"{what}: open the file in Excel or LibreOffice, save it", line=line)
     mark = "comma" if layout.dialect.decimal == "," else "point"
-    combined = "±" in text or "+/-" in text
-    do = _ITS_OWN_COLUMN if combined else "correct it, or leave it empty if the reading was missed"
+    do = "correct it, or leave it empty if the reading was missed"
     raise TableError(
         path,
         f"'{shorten(text)}' stands in column '{shorten(column.label)}', a number with decimal {mark} is expected: {do}",

@@ -15,7 +15,7 @@ import numpy as np
 
 from analysis.numbers import how_many
 from levilab.errors import UsageError
-from levilab.formats.columns import SHORTHANDS, Column, TableError, shorten
+from levilab.formats.columns import SHORTHANDS, Column, TableError, key_of, shorten
 from levilab.formats.dialect import MISSING_WORDS, Dialect
 from levilab.formats.layout import Layout
 from levilab.formats.rows import Rows, read_rows
@@ -79,6 +79,7 @@ def read_table(
     quantities: Collection[str] = CANONICAL,
     needed: Collection[str] = (),
     guess: bool = True,
+    skip_doubtful: bool = False,
 ) -> Table:
     """Read a table: CSV of any kind, a spreadsheet, a zip, JSON; decimal point or comma, with or without units.
 
@@ -88,6 +89,7 @@ def read_table(
         quantities: canonical columns that are wanted; others are not looked at.
         needed: canonical columns without which the table is of another kind, whatever stands in its rows.
         guess: whether columns without titles are taken as time, spin frequency and its uncertainty.
+        skip_doubtful: whether rows in which a cell is no number are left out, with a note.
 
     Returns:
         At least three rows. Rows with a missed reading (empty, -, n/a, nan, inf, 9.91E37 …) are left out, with a
@@ -100,7 +102,7 @@ def read_table(
     with file_errors(path):
         plan = plan_of(path, Request(columns or {}, quantities, needed, guess))
         layout = plan.layout
-        rows = read_rows(plan.text, layout, plan.columns)
+        rows = read_rows(plan.text, layout, plan.columns, skip_doubtful=skip_doubtful)
     table = _table(plan.path, plan.header, plan.columns, _of_run(rows, plan), plan.warnings)
     path = plan.path
     if len(table) >= FEWEST:
@@ -164,25 +166,36 @@ class ColumnsError(UsageError):
     """`columns` cannot be understood."""
 
 
-def parse_columns(text: str) -> dict[str, str]:
-    """Return the parsed option `columns`, as `read_table` takes it; titles may hold commas and equals signs.
+#: What stands before the name of a quantity in the option `columns`: a comma, a semicolon; a blank before a short one.
+_BETWEEN = re.compile(rf"[,;](?=\s*[^\W\d]\w*\s*=)|\s+(?=(?:{'|'.join(SHORTHANDS)})\s*=)")
 
-    >>> parse_columns("t=Zeit, s,f=3")
-    {'t': 'Zeit, s', 'f': '3'}
+
+def parse_columns(given: object) -> dict[str, str]:
+    """Return the option `columns` as `read_table` takes it; titles in its text may hold commas and equals signs.
+
+    >>> parse_columns("t=Zeit, s,f=3"), parse_columns("time=1 f=2 [rpm]")
+    ({'t': 'Zeit, s', 'f': '3'}, {'t': '1', 'f': '2 [rpm]'})
 
     Raises:
         ColumnsError: it is not NAME=COLUMN,NAME=COLUMN.
     """
-    parts = [part.partition("=") for part in re.split(r",(?=\s*[a-z_]+\s*=)", text) if text.strip()]
-    found = {name.strip(): title.strip() for name, _, title in parts}
-    if len(found) < len(parts) or not all(name and title for name, title in found.items()):
+    if isinstance(given, Mapping):
+        parts = [(str(name), str(title)) for name, title in given.items()]
+    elif isinstance(given, str):
+        texts = (part.partition("=") for part in _BETWEEN.split(given) if given.strip())
+        parts = [(name.strip(), title.strip()) for name, _, title in texts]
+    else:
+        expected = 'names of quantities with their columns are expected, as {"t": "Zeit", "f": 3} or "t=Zeit,f=3"'
+        raise ColumnsError("columns", expected, value=given)
+    found = dict(parts)
+    if len(found) < len(parts) or not all(name and title for name, title in parts):
         expected = "NAME=COLUMN,NAME=COLUMN is expected, each NAME once, as t=Zeit,f=3"
-        raise ColumnsError("columns", expected, value=f"'{shorten(text)}'")
-    unknown = [name for name in found if name not in {*SHORTHANDS, *CANONICAL}]
+        raise ColumnsError("columns", expected, value=f"'{shorten(str(given))}'")
+    unknown = [name for name in found if key_of(name) is None]
     if unknown:
         what = f"'{shorten(unknown[0])}' is no quantity known here; {', '.join(SHORTHANDS)} are, as t=Zeit,f=3"
         raise ColumnsError("columns", what)
-    return found
+    return {key_of(name) or name: title for name, title in found.items()}
 
 
 @contextmanager

@@ -20,7 +20,7 @@ from typing import Any, BinaryIO
 import python_calamine
 
 from levilab.formats.columns import NoTable, TableError, shorten
-from levilab.formats.dialect import UNVALUED
+from levilab.formats.dialect import UNVALUED, value_and_u
 from levilab.formats.dress import undress
 
 #: Bytes that a workbook or an archive may unpack to: a spreadsheet of a million rows has some 100 MB, and a reader
@@ -53,12 +53,14 @@ class Text:
         content: None where it is the file's own.
         titles: of the columns, where each row of the file has them.
         aligned: whether a field stands in its column whatever stands beside it, as in a spreadsheet.
+        lies: whether the lines are the columns of the file.
     """
 
     path: Path
     content: bytes | None = None
     titles: tuple[str, ...] = ()
     aligned: bool = False
+    lies: bool = False
 
     @property
     def rewritten(self) -> bool:
@@ -379,6 +381,8 @@ def _plain(text: str) -> str:
 
 
 def _with_points(text: str) -> str:
+    if value_and_u(text.strip()):
+        return _plain(text).replace(",", ".")
     return _COMMA.sub(r"\1.\2", _plain(text)) if _COMMA.fullmatch(text.strip()) else _plain(text)
 
 

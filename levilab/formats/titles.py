@@ -201,10 +201,20 @@ def dimension(column: str) -> str:
     return QUANTITIES[COMPANIONS.get(column, column)][0]
 
 
-#: Units of a phone's other sensors.
-OTHER_SENSORS: Mapping[str, str] = {
-    "lx": "the light sensor", "m/s2": "the accelerometer", "hPa": "the barometer", "dB": "the microphone's level",
-}  # fmt: skip
+#: Units of a phone's other sensors, and of those along its three axes.
+OTHER_SENSORS: Mapping[str, str] = {"lx": "the light sensor", "hPa": "the barometer", "dB": "the microphone's level"}
+MOTION_SENSORS: Mapping[str, str] = {"m/s2": "the accelerometer", "rad/s": "the gyroscope"}
+
+
+def motion_sensor(titles: Sequence[str]) -> tuple[str, str] | None:
+    """Return the first title of a phone's sensor of its own motion, and the sensor; None without its three axes.
+
+    >>> motion_sensor([f"Acceleration {axis} (m/s^2)" for axis in "xyz"])
+    ('Acceleration x (m/s^2)', 'the accelerometer')
+    """
+    units = [plain_unit(read_title(title).unit or "") for title in titles]
+    found = ((title, MOTION_SENSORS[unit]) for title, unit in zip(titles, units, strict=True) if unit in MOTION_SENSORS)
+    return next(found, None) if any(units.count(unit) >= 3 for unit in MOTION_SENSORS) else None
 
 
 _FOLDED_UNITS = frozenset(name.casefold() for units in UNITS.values() for name in units)
@@ -292,8 +302,8 @@ def read_title(text: str) -> Title:
     ('kHz', '/10 s')
     >>> read_title("period [ms]").inverse, read_title("ω in 1/s").angular
     (True, True)
-    >>> read_title("10 Umdrehungen in s").turns, read_title("Laufzeit s").unit
-    (10, 's')
+    >>> read_title("10 Umdrehungen in s").turns, read_title("Laufzeit s").unit, read_title("sec").unit
+    (10, 's', 'sec')
     """
     text = without_runs_of_blanks(text)
     if len(text) > LONGEST_TITLE:
@@ -313,7 +323,9 @@ def read_title(text: str) -> Title:
     bare = _BARE_UNIT.fullmatch(text)
     if bare and not found:  # Laufzeit s, Frequenz Hz
         return _title_of_name(bare["name"], bare["unit"]) or Title(None, bare["unit"])
-    return Title(None, next((unit for _, unit in found if is_unit(unit)), found[0][1] if found else None))
+    # a title may be a unit alone, as sec; m, h, T and G are symbols of quantities, too
+    units = [unit for _, unit in found] or [text] * (len(text) > 1 or text == "s")
+    return Title(None, next((unit for unit in units if is_unit(unit)), found[0][1] if found else None))
 
 
 #: A unit behind a name and a blank: those alone that are no symbol of a quantity.

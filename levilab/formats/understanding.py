@@ -26,7 +26,7 @@ from levilab.formats.columns import (
     quote_names,
     shorten,
 )
-from levilab.formats.dialect import UNVALUED, unit_behind
+from levilab.formats.dialect import UNVALUED, value_and_u
 from levilab.formats.layout import Layout, sniff
 from levilab.formats.rows import read_rows
 from levilab.formats.texts import Text, locate, texts_of
@@ -40,13 +40,16 @@ from levilab.formats.titles import (
     QUANTITIES,
     Title,
     as_a_period,
+    companion,
     dimension,
+    motion_sensor,
     nearly_a_frequency,
     plain_name,
     plain_unit,
     read_title,
     unit_factor,
 )
+from levilab.formats.transposed import LIES, set_upright
 from levilab.texts.note import of_file
 
 TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
@@ -165,7 +168,7 @@ def _shown(look: "_Look", request: "Request", *, alone: bool) -> UnderstoodRun:
     name = "" if alone else look.name
     if layout is None or part is None or isinstance(error, NoTable):
         return UnderstoodRun(look.path, name, 0, (), problem=str(error))
-    used = {column.index: column for column in _known(look, layout, part, request)}
+    used = {column.index: column for column in _known(look, layout, part, request) if not column.behind}
     seen = [_column(k, layout, used.get(k)) for k in range(layout.width) if part.has(k, layout.header)]
     seen = [column for column in seen if column.title or any(column.values)]
     doubts = [doubt for column in used.values() if (doubt := _unit_doubt(layout, column, used.values()))]
@@ -216,7 +219,7 @@ def possible_spins(number: float) -> dict[str, float]:
 def _numbers(layout: Layout, index: int) -> list[float]:
     """Return the numbers among the first fields of a column."""
     fields = [row[index] for row in layout.sample if index < len(row) and layout.dialect.kind(row[index]) == "number"]
-    return [layout.dialect.number(field.removesuffix(unit_behind(field)).strip()) for field in fields]
+    return [layout.dialect.value(field) for field in fields]
 
 
 def _question(
@@ -424,6 +427,7 @@ def is_named(inside: str, name: str) -> bool:
 def _looks_at(file: Path, text: Text, request: Request) -> Iterator[_Look]:
     """Yield what is seen of each run in a text."""
     name = text.path.relative_to(file).as_posix() if text.path != file else ""
+    text = set_upright(text)
     try:
         layout = sniff(text)
     except TableError as error:
@@ -446,6 +450,8 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
     """Return how one run in a text is read.  Raises TableError."""
     quantities, needed = request.quantities, request.needed
     header, wanted, warnings = _titles(path, layout, request.columns, guess=request.guess)
+    if text.lies:
+        warnings.append(of_file("lies", f"{shorten(str(path), 200)}: {LIES}"))
     meant = part.titles if layout.header else header
     if not {"t", "time_s"} & {*wanted}:
         _must_be_one_time(path, layout, meant)
@@ -470,8 +476,28 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
     for name in needed:
         if name not in {column.name for column in chosen}:
             raise no_column(path, name, header, _which_columns(layout, [name]))
-    chosen = tuple(sorted(chosen, key=lambda column: CANONICAL.index(column.name)))
-    return Plan(path, text, layout, header, chosen, part.own, (*warnings, *doubts))
+    behind, notes = _behind(path, layout, chosen, quantities)
+    chosen = tuple(sorted((*chosen, *behind), key=lambda column: CANONICAL.index(column.name)))
+    return Plan(path, text, layout, header, chosen, part.own, (*warnings, *doubts, *notes))
+
+
+def _behind(
+    path: Path, layout: Layout, chosen: Sequence[Column], quantities: Collection[str]
+) -> tuple[list[Column], list[str]]:
+    """Return the uncertainties that stand behind a ± in the columns of their quantities, and a note for each column."""
+    found: list[Column] = []
+    notes: list[str] = []
+    known = {column.name for column in chosen}
+    for column in chosen:
+        if not any(value_and_u(field) for row in layout.sample for field in row[column.index : column.index + 1]):
+            continue
+        u = companion(column.name)
+        taken = u in quantities and u not in known
+        found += [replace(column, name=u, behind=True)] * taken
+        said = "taken as the standard uncertainty" if taken else "not used"
+        note = f"column '{shorten(column.label)}': the number behind the ± is {said}"
+        notes.append(of_file("±", f"{shorten(str(path), 200)}: {note}"))
+    return found, notes
 
 
 def _must_be_one_time(path: Path, layout: Layout, meant: Sequence[str]) -> None:
@@ -540,13 +566,14 @@ def no_column(path: Path, name: str, header: Sequence[str], doubt: Doubt | None 
         text = f"no column is known to be {name}; '{shorten(nearly)}' could become one: {how_else(nearly, name)}"
     else:
         sensors = {title: OTHER_SENSORS.get(plain_unit(read_title(title).unit or "")) for title in header}
-        title, sensor = next((pair for pair in sensors.items() if pair[1]), ("", None))
+        title, sensor = motion_sensor(header) or next((pair for pair in sensors.items() if pair[1]), ("", None))
         field = next((one for one in header if name == _SPIN and _is_field(one)), None)
         if field:
             text = f"'{shorten(field)}' is a magnetic field, no spin frequency: levilab analyze spin FILE reads it"
         elif sensor:
             text = f"'{shorten(title)}' is of {sensor}, which shows no turns: record with the magnetometer, or name its"
             text += f" sheet or file; no column is known to be {name}"
+            doubt = None  # no column is likely
     return NoSuchColumn(path, text, doubt=doubt)
 
 

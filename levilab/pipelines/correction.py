@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DataError, UsageError
 from levilab.files import parse_toml, replace_atomically, toml_value, writing
-from levilab.formats.columns import SHORTHANDS
+from levilab.formats.columns import SHORTHANDS, key_of
 from levilab.formats.texts import locate, texts_of
-from levilab.formats.titles import CANONICAL
 from levilab.formats.understanding import is_named, understand
 from levilab.pipelines.options import OF_FILES, read_options
 
@@ -25,6 +24,7 @@ _HEAD = "# How levilab reads {name}; options on the command line go before.  lev
 #: The values of each key, as text.
 _EXPECTED = {
     "columns": '{t = "Zeit", f = "Drehzahl [rpm]"}, each a title or a number',
+    "skip_doubtful": "true or false",
     "channel": "a name or a number of a channel",
     "rate": "samples per second",
 }
@@ -115,12 +115,14 @@ _SHORT = {name: key for key, name in SHORTHANDS.items()}
 
 
 def _is_of_kind(key: str, value: object) -> bool:
+    if key == "skip_doubtful":
+        return isinstance(value, bool)
     if key == "rate":
         return isinstance(value, float | int) and not isinstance(value, bool)
     if key == "channel" or isinstance(value, str):
         return type(value) in {str, int}
     named = value if isinstance(value, dict) else {"": ""}
-    return {*named} <= {*SHORTHANDS, *CANONICAL} and all(type(to) in {str, int} for to in named.values())
+    return all(map(key_of, named)) and all(type(to) in {str, int} for to in named.values())
 
 
 def write_correction(file: Path, options: Mapping[str, Any]) -> Path:
@@ -136,9 +138,11 @@ def write_correction(file: Path, options: Mapping[str, Any]) -> Path:
     kept: dict[str, dict[str, Any]] = {"": {}}
     with suppress(CorrectionError):
         kept |= _read_all(file)
-    kept[inside] = {**kept.get(inside, {}), **{key: options[key] for key in OF_FILES if options.get(key) is not None}}
+    kept[inside] = {**kept.get(inside, {}), **{key: options[key] for key in OF_FILES if options.get(key)}}
     if not kept[inside]:
-        raise UsageError("keep", "goes with `columns`, `channel` or `rate`: without one the file is read as it is")
+        raise UsageError(
+            "keep", "goes with `columns`, `skip_doubtful`, `channel` or `rate`: without one the file is read as it is"
+        )
     lines = []
     for name, those in kept.items():
         lines += [f"\n[{_SHEET}.{toml_value(name)}]\n"] if name else []

@@ -88,7 +88,7 @@ def _read_columns(given: Mapping[str, str | int] | str) -> dict[str, str] | None
     """Return the names of columns; None where none is named: those of an earlier result count."""
     from levilab.formats.table import parse_columns
 
-    return (parse_columns(given) if isinstance(given, str) else {key: str(to) for key, to in given.items()}) or None
+    return parse_columns(given) or None
 
 
 def _read_between(given: str | Sequence[float]) -> tuple[float, float]:
@@ -158,6 +158,9 @@ class InputOptions:
     columns: Mapping[str, str] | None = field(default=None, metadata=_about(
         'Columns of your file: "t=Zeit,f=Kanal2" or "t=1,f=3"; with a unit in brackets: "f=Drehzahl [rpm]".',
         metavar="NAME=COLUMN,…", read=_read_columns,
+    ))  # fmt: skip
+    skip_doubtful: bool = field(default=False, metadata=_about(
+        "Leave out the rows of a table in which a cell is no plain number, as 35.8? or ca. 40.", kind=bool,
     ))  # fmt: skip
     channel: str | None = None
     rate: float | None = None
@@ -335,7 +338,7 @@ OPTIONS: Mapping[str, Option] = MappingProxyType(
     {name: one for kind in KINDS.values() for name, one in options_of(kind).items()}
 )
 #: Those that say how a data file is read.
-OF_FILES = ("columns", "channel", "rate")
+OF_FILES = ("columns", "skip_doubtful", "channel", "rate")
 #: Those that `levilab report` has, too.
 OF_REPORT = (*OF_FILES, "reading_u", "keep_outliers")
 

@@ -32,6 +32,7 @@ from levilab.formats.titles import (
     LONGEST_TITLE,
     QUANTITIES,
     is_unit,
+    motion_sensor,
     plain_unit,
     read_title,
     unit_factor,
@@ -488,6 +489,10 @@ _RECOGNISERS = (
 def _recognise_plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) -> Header:
     """Recognise a column of times and others beside it, with titles or without."""
     layout = lay_out(list(head.lines), head.encoding, dialect, b"")
+    if moving := motion_sensor(layout.header):
+        title, sensor = moving
+        text = f"'{shorten(title)}' is of {sensor}, which shows no turns of the top: record with the magnetometer"
+        raise NoWaveform(head.path, text)
     titles = [read_title(text) for text in layout.header]
     readings = [title.column for title in titles if title.column in QUANTITIES and title.column not in _NO_READINGS]
     if readings:

@@ -105,7 +105,14 @@ NEEDED = ("height_m", "flux_density_t")
 
 def read_scan_file(path: Path, options: InputOptions) -> FieldReadings:
     """Return the scan in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
-    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=options.guess)
+    table = read_table(
+        path,
+        columns=options.columns,
+        quantities=QUANTITIES,
+        needed=NEEDED,
+        guess=options.guess,
+        skip_doubtful=options.skip_doubtful,
+    )
     return field_readings(table)
 
 

@@ -73,7 +73,12 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
         return limits_in_field(path, field, options.near)
     try:
         table = read_table(
-            path, columns=options.columns, quantities=(_TIME, *QUANTITIES), needed=QUANTITIES[:1], guess=options.guess
+            path,
+            columns=options.columns,
+            quantities=(_TIME, *QUANTITIES),
+            needed=QUANTITIES[:1],
+            guess=options.guess,
+            skip_doubtful=options.skip_doubtful,
         )
     except (NoTable, NoSuchColumn) as error:
         single = _single_column(path, guess=options.guess)

@@ -70,7 +70,14 @@ class SweepReadings(Readings):
 
 def read_sweep_file(path: Path, options: InputOptions) -> SweepReadings:
     """Return the sweep in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
-    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=NEEDED, guess=options.guess)
+    table = read_table(
+        path,
+        columns=options.columns,
+        quantities=QUANTITIES,
+        needed=NEEDED,
+        guess=options.guess,
+        skip_doubtful=options.skip_doubtful,
+    )
     return sweep_readings(table)
 
 

@@ -80,7 +80,14 @@ def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
     needed = next((pair for pair in NEEDED if _holds(path, options, pair)), None)
     if needed is None:
         return None
-    table = read_table(path, columns=options.columns, quantities=QUANTITIES, needed=needed, guess=False)
+    table = read_table(
+        path,
+        columns=options.columns,
+        quantities=QUANTITIES,
+        needed=needed,
+        guess=False,
+        skip_doubtful=options.skip_doubtful,
+    )
     axes = {name: name[-3] for name in COMPONENTS if name in table.columns}
     if COMPONENTS[2] not in axes and "flux_density_t" in table.columns:
         axes["flux_density_t"] = "z"

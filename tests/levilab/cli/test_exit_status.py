@@ -33,7 +33,7 @@ WRONG_USAGE = {
     f"analyze spindown {SAMPLE} --reading-u -0.1": "--reading-u -0.1: ",
     f"analyze spindown {SAMPLE} --reading-u nan": "--reading-u nan: ",
     f"analyze spindown {SAMPLE} --columns t": "--columns 't': ",
-    f"analyze spindown {SAMPLE} --columns speed=f": "--columns: 'speed' is no quantity",
+    f"analyze spindown {SAMPLE} --columns colour=f": "--columns: 'colour' is no quantity",
     f"analyze spin {SCOPE} --rate -1": "--rate -1: ",
     f"analyze spin {SCOPE} --channel CH7": "--channel 'CH7': ",
     f"report {SAMPLE} --reading-u inf": "--reading-u inf: ",

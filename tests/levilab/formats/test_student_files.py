@@ -70,6 +70,74 @@ def test_a_folder_with_the_mark_is_left_out_of_a_search_above_it():
     assert not [path for path in data_files(FILES.parent) if FILES in path.parents]
 
 
+# --- tables as hands and plugs leave them ----------------------------------------------------------------------------
+
+INSTANTS, SPINS = (0.0, 10.0, 20.0, 30.0, 40.0, 50.0), (40.0, 38.5, 37.1, 35.8, 34.5, 33.3)
+
+
+def rows(form):
+    return "".join(form.format(t=t, f=f) + "\n" for t, f in zip(INSTANTS, SPINS, strict=True))
+
+
+@pytest.mark.parametrize(
+    ("text", "u"),
+    [
+        ("t,f\n" + rows("{t},{f} ± 0.03"), 0.03),
+        ("t (s);n (U/min)\n" + rows("{t} ± 0.5;{f} ± 0.03").replace(".", ","), 0.03 / 60),
+        (rows("{t} s   {f} +/- 0.03 Hz"), 0.03),
+        ("t,f\n" + rows("{t:.0f},{f:.2f}(3)"), 0.03),
+        ("t,f\n" + rows("{t},({f} ± 0.03) Hz"), 0.03),
+        ("t,f\n" + rows("{t},{f} ± 0.03").replace("38.5 ± 0.03", "38.5"), None),  # no u for want of one
+        (rows("{t} s   {f} Hz"), None),
+        ("Zeit Frequenz\n" + rows("{t} s {f} Hz"), None),
+        ("sec,Hz\n" + rows("{t},{f}"), None),
+        ("s;Hz\n" + rows("{t};{f}"), None),
+        ("t (s)," + ",".join(map(str, INSTANTS)) + "\nf (Hz)," + ",".join(map(str, SPINS)) + "\n", None),
+        ("Zeit;s;" + ";".join(map(str, INSTANTS)) + "\nFrequenz;Hz;" + ";".join(map(str, SPINS)) + "\n", None),
+        ("\t".join(map(str, INSTANTS)) + "\n" + "\t".join(map(str, SPINS)) + "\n", None),
+        ("\0\x01boot rst:0x1\nt,f\n" + rows("{t},{f}"), None),
+    ],
+)
+def test_readings_are_read_however_they_are_written(text, u, tmp_path):
+    path = tmp_path / "my.txt"
+    path.write_text(text, encoding="utf-8")
+    table = read_table(path, quantities=SPIN, needed=SPIN[:2])
+    factor = 60 if "U/min" in text else 1
+    assert table.column("time_s").tolist() == [*INSTANTS]
+    assert table.column("spin_frequency_hz") * factor == pytest.approx(SPINS, rel=1e-14)  # rounding of the factor
+    assert ("spin_frequency_u_hz" in table.columns) == (u is not None)
+    if u:
+        assert table.column("spin_frequency_u_hz") == pytest.approx(u, rel=1e-14)
+        assert "behind the ± is taken as the standard uncertainty" in " ".join(table.warnings)
+
+
+def test_rows_that_a_person_doubts_are_left_out_on_request_and_named(tmp_path):
+    path = tmp_path / "my.csv"
+    path.write_text("t,f\n" + rows("{t},{f}").replace("37.1", "37.1?").replace("30.0,35", "~30.0,35"), encoding="utf-8")
+    with pytest.raises(TableError, match=r"line 4: '37.1\?'.*also in 1 other line"):
+        read_table(path)
+    table = read_table(path, skip_doubtful=True)
+    assert table.column("time_s").tolist() == [0, 10, 40, 50]
+    assert "2 doubtful rows are left out, as asked: lines 4, 5" in " ".join(table.warnings)
+
+
+def test_a_line_with_bytes_that_are_no_text_is_left_out_with_its_number(tmp_path):
+    path = tmp_path / "my.csv"
+    path.write_text("t,f\n" + rows("{t},{f}").replace("37.1", "3\x007.1"), encoding="utf-8")
+    table = read_table(path)
+    assert table.column("time_s").tolist() == [0, 10, 30, 40, 50]
+    assert "line 4: '20.0,3�7.1' has bytes that are no text and is left out" in " ".join(table.warnings)
+
+
+@pytest.mark.parametrize(("unit", "sensor"), [("m/s^2", "accelerometer"), ("rad/s", "gyroscope")])
+def test_a_phones_sensor_of_its_own_motion_is_no_record_of_the_top(unit, sensor, tmp_path):
+    path = tmp_path / "phone.csv"
+    samples = "".join(f"{k / 100},{k % 7},{k % 5},9.8\n" for k in range(50))
+    path.write_text(f"Time (s),x ({unit}),y ({unit}),z ({unit})\n{samples}", encoding="utf-8")
+    with pytest.raises(NoWaveform, match=f"of the {sensor}, which shows no turns of the top"):
+        read_record(path)
+
+
 # --- several runs in a file ------------------------------------------------------------------------------------------
 
 

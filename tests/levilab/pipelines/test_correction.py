@@ -142,7 +142,7 @@ def test_a_report_follows_a_changed_correction(swapped):
         ('colums = "t=1"', "colums: did you mean columns?"),
         ("rate = -5", "rate"),
         ('rate = "fast"', "rate"),
-        ('columns = {speed = "2"}', "columns"),
+        ('columns = {colour = "2"}', "columns"),
         ('columns = "t"', "columns"),
         ("columns = {t = 1", "is no TOML"),
         ("sheet = 3", "sheet"),
