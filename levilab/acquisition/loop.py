@@ -264,5 +264,6 @@ def _record(request: AcquisitionRequest) -> RunRecord:
         washers_kg=request.washers_kg,
         synthetic=request.synthetic_how is not None,
         synthetic_how=request.synthetic_how,
+        synthetic_says=request.synthetic_how.as_table() if isinstance(request.synthetic_how, Text) else None,
         world=request.world,
     )

@@ -44,7 +44,10 @@ HOW = (
     "and no real top was measured"
 )
 _ADVICE = "correct it or start again"
-_SPIN_ONLY = "the top a spin that decays by the {law}; drag and fall were drawn by the seed"
+_SPIN_ONLY = (
+    "the top a spin that decays by the {law} law with {constants:.4e} (SI), falling at {fall:.2f} Hz; drag and fall "
+    "were drawn by the seed"
+)
 _BASE = (
     "the base a ring of strength {strength_t_m:.6e} T m, radii {inner_radius_m:.6f} and {outer_radius_m:.6f} m, "
     "thickness {thickness_m:.6f} m, its middle at {origin_m:+.6f} m, in a background of {background_t:+.3e} T, all "
@@ -432,7 +435,7 @@ def _on_the_virtual_bench(
         request,
         config=config,
         wiring=lambda: virtual_wiring(scene_world(scene, clock, options.tell, seed=seed), config.limits, request.named),
-        synthetic_how=HOW.format(what=_IN_MOTION.format(name=scene.name)),
+        synthetic_how=Text(HOW, what=Text(_IN_MOTION, name=scene.name)),
         scene=scene.as_table(),
     )
 
@@ -470,7 +473,7 @@ def request_at(wiring: Wiring, scene: Scene, experiment: str, options: Acquisiti
         out=options.out,
         group=_group(options.group),
         note=options.note,
-        synthetic_how=HOW.format(what=_IN_MOTION.format(name=scene.name)),
+        synthetic_how=Text(HOW, what=Text(_IN_MOTION, name=scene.name)),
         scene=scene.as_table(),
         seed=options.seed,
     )
@@ -488,7 +491,7 @@ def _with_a_spinning_top(
         request,
         config=config,
         wiring=lambda: virtual_wiring(SpinWorld(scene, clock()), config.limits, request.named),
-        synthetic_how=HOW.format(what=_describe_world(scene, request.experiment)),
+        synthetic_how=Text(HOW, what=_describe_world(scene, request.experiment)),
         world="spin",
     )
 
@@ -497,13 +500,8 @@ def _describe_world(scene: SpinScene, experiment: str) -> str:
     """Return a description of the part of the world that an experiment measures."""
     if "magnetometer" in EXPERIMENTS[experiment].instruments:
         base = scene.base
-        return _BASE.format(**vars(base))
-    return _SPIN_ONLY.format(law=_describe_law(scene))
-
-
-def _describe_law(scene: SpinScene) -> str:
-    constants = ", ".join(f"{c:.4e}" for c in scene.constants)
-    return f"{scene.drag} law with {constants} (SI), falling at {scene.fall_hz:.2f} Hz"
+        return Text(_BASE, **vars(base))
+    return Text(_SPIN_ONLY, law=scene.drag, constants=tuple(scene.constants), fall=scene.fall_hz)
 
 
 def _scene(name: str | None, run: Run | None) -> Scene | None:

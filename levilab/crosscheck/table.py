@@ -6,13 +6,14 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from analysis.numbers import digits, how_many
+from analysis.numbers import digits
 from levilab.crosscheck.own.model import OF_ONE_RUN
 from levilab.crosscheck.own.study import ENOUGH, TRIALS
 from levilab.crosscheck.study import LONG_TAILS, Spread, Verdict, by_pulls
 from levilab.present.document.blocks import Details, Note, Paragraph, Tabular
-from levilab.present.numbers import enumeration, with_sign
+from levilab.present.numbers import enumeration, how_many, with_sign
 from levilab.present.tables import Row, Table, table
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -90,7 +91,7 @@ def _name(quantity: str, symbols: Mapping[str, str]) -> str:
 def failures_as_text(study: Study) -> list[str]:
     """Return a sentence for each reason for which trials came to no estimate."""
     return [
-        f"{count} of {study.trials} trials came to no estimate: {reason}"
+        Text("{count} of {all} trials came to no estimate: {reason}.", count=count, all=study.trials, reason=reason)
         for reason, count in sorted(study.failures.items(), key=lambda item: -item[1])
     ]
 
@@ -102,39 +103,60 @@ def as_text(study: Study, symbols: Mapping[str, str] | None = None) -> str:
         study: the trials.
         symbols: quantity → its symbol.
     """
-    texts = [f"{study.trials} trials: {study.about}."]
+    texts: list[str] = [Text("{n} trials: {about}.", n=study.trials, about=study.about)]
     if not study.spreads:
         texts.append("No trial came to an estimate.")
     elif study.holds:
-        so_far = "" if study.trials >= ENOUGH else f", as far as so few trials show ({study.trials} of {TRIALS})"
-        texts.append(f"Values and uncertainties of this analysis are right for readings such as these{so_far}.")
+        so_far = (
+            ""
+            if study.trials >= ENOUGH
+            else Text(", as far as so few trials show ({some} of {all})", some=study.trials, all=TRIALS)
+        )
+        texts.append(
+            Text(
+                "Values and uncertainties of this analysis are right for readings such as these{so_far}.", so_far=so_far
+            )
+        )
     else:
-        wrong = ", ".join(_name(one.quantity, {}) for one in study.spreads if one.verdict is Verdict.WRONG)
-        texts.append(f"For readings such as these the analysis is not right in {wrong}: trust its u the less.")
+        wrong = tuple(_name(one.quantity, {}) for one in study.spreads if one.verdict is Verdict.WRONG)
+        texts.append(
+            Text("For readings such as these the analysis is not right in {wrong}: trust its u the less.", wrong=wrong)
+        )
     texts += [*_about_laws(study), *_about_student(study, symbols or {})]
-    texts += [f"{text[0].upper()}{text[1:]}." for text in (*study.more, *failures_as_text(study))]
-    return " ".join(texts)
+    texts += [f"{text[0].upper()}{text[1:]}." for text in study.more]
+    return Sentences(*texts, *failures_as_text(study))
 
 
 def _about_laws(study: Study) -> Iterator[str]:
     """Yield how often the best law is the true one, or the true hypothesis is excluded."""
     if study.law and study.laws:
         n, again = sum(study.laws.values()), study.laws.get(study.law, 0)
-        others = ", ".join(
-            f"{law} {'once' if count == 1 else f'{count} times'}"
+        others = tuple(
+            Text("{law} {times}", law=law, times="once" if count == 1 else Text("{n} times", n=count))
             for law, count in study.laws.items()
             if law != study.law
         )
-        yield (
-            f"The {study.law} law, which is true there, is the best one in {again} of {n} trials"
-            + (f" (else {others})" if others else "")
-            + f", and is excluded in {study.excluded}."
+        yield Text(
+            "The {law} law, which is true there, is the best one in {again} of {n} trials{other}, and is excluded in "
+            "{excluded}.",
+            law=study.law,
+            again=again,
+            n=n,
+            other=Text(" (else {others})", others=others) if others else "",
+            excluded=study.excluded,
         )
     elif study.hypothesis and study.tested:
         chance = study.expected_share * study.tested
         yield (
-            f"The test excludes {study.hypothesis} in {study.excluded} of {study.tested} trials; chance alone does so "
-            f"in {chance:.0f} ± {math.sqrt(chance * (1 - study.expected_share)):.0f}."
+            Text(
+                "The test excludes {hypothesis} in {excluded} of {tested} trials; chance alone does so in "
+                "{chance:.0f} ± {u:.0f}.",
+                hypothesis=study.hypothesis,
+                excluded=study.excluded,
+                tested=study.tested,
+                chance=chance,
+                u=math.sqrt(chance * (1 - study.expected_share)),
+            )
         )
 
 
@@ -144,30 +166,43 @@ def _about_student(study: Study, symbols: Mapping[str, str]) -> Iterator[str]:
     if few:
         fewest = min(few.values(), key=lambda one: one.freedom or 0)
         freedom = fewest.freedom or 0
-        share = f"{100 * fewest.wanted_coverage:.0f} %"
+        share = Text("{percent:.0f} %", percent=100 * fewest.wanted_coverage)
         of = enumeration([_name(name, symbols) for name in few])
-        yield f"As u of {of} comes from the scatter of few values, {share} within 1 u are right (Student's t)."
+        yield Text(
+            "As u of {of} comes from the scatter of few values, {share} within 1 u are right (Student's t).",
+            of=of,
+            share=share,
+        )
         if freedom <= LONG_TAILS:
-            degrees = f"{how_many(freedom, 'degree')} of freedom"
+            degrees = Text("{degrees} of freedom", degrees=how_many(freedom, "degree"))
             # the variance of Student's t is n/(n − 2)
             tails = "has no finite standard deviation" if freedom <= 2 else "has long tails"
-            yield f"Student's t with {degrees} {tails}, so the standard deviation of these pulls is not judged."
+            yield Text(
+                "Student's t with {degrees} {tails}, so the standard deviation of these pulls is not judged.",
+                degrees=degrees,
+                tails=tails,
+            )
     widened = next((one for one in study.spreads if one.widened is not None and one.widened < _MANY), None)
     if widened is not None:
         wanted = widened.wanted_deviation
-        pulls = f"pulls have a standard deviation of {wanted:.2f}" if math.isfinite(wanted) else "pulls have long tails"
-        yield f"As u comes from few pulses and holds 68 % by Student's factor, {pulls}."
+        pulls = (
+            Text("pulls have a standard deviation of {wanted:.2f}", wanted=wanted)
+            if math.isfinite(wanted)
+            else "pulls have long tails"
+        )
+        yield Text("As u comes from few pulses and holds 68 % by Student's factor, {pulls}.", pulls=pulls)
 
 
 def blocks_of(study: Study, symbols: Mapping[str, str] | None = None) -> tuple[Block, ...]:
     """Return the trials as blocks of a report."""
     room = max((one.room for one in study.spreads), default=0.0)
-    note = (
-        "A pull is (estimate − truth)/u. Wanted is a mean of 0; the wanted standard deviation and share within 1 u "
-        "stand in parentheses: 1 and 68 %, or what Student's t gives where u comes from few values. Behind ± stands "
-        f"one standard error. Yes: no number misses what is wanted by more than {room:.1f} standard errors, which "
-        "chance does in one right study of a hundred; a smaller standard deviation and a larger share mean that u is "
-        "on the safe side."
+    note = Text(
+        "A pull is (estimate − truth)/u. Wanted is a mean of 0; the wanted standard deviation and "
+        "share within 1 u stand in parentheses: 1 and 68 %, or what Student's t gives where u comes "
+        "from few values. Behind ± stands one standard error. Yes: no number misses what is wanted "
+        "by more than {room:.1f} standard errors, which chance does in one right study of a hundred; "
+        "a smaller standard deviation and a larger share mean that u is on the safe side.",
+        room=room,
     )
     found = crosscheck_table([study], symbols)
     # the readings of the trials are synthetic, whatever the result is of

@@ -24,7 +24,7 @@ Opt = TypeVar("Opt", bound=InputOptions)
 
 #: Where numbers come from that no result had.
 NOW = "analyzed now"
-FOR_THIS_PAGE = "analyzed for this page"
+FOR_THIS_PAGE = "analyzed for this page: {why}"
 
 
 @dataclass(frozen=True)
@@ -34,8 +34,7 @@ class Origin(Generic[Opt]):
     Attributes:
         options: how they were made.
         text: for people.
-        budget: what the uncertainties of the input's numbers are made of; None: to be worked out from what was found,
-            empty: the result that was read holds none.
+        budget: what the uncertainties of the input's numbers are made of; None: to be worked out from what was found.
         lacks_result: whether it was analyzed since no result of it was found.
     """
 

@@ -17,6 +17,7 @@ from levilab.present.document.blocks import Bullets, Details, Note, Paragraph, T
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.tables import Row, Table, table
 from levilab.present.units import unit
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -46,7 +47,7 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
         given: relative standard uncertainty, as given to the analysis.
         what: the row in words; empty: the time base of the instrument.
     """
-    what = what or f"time base of the {kind}"
+    what = what or Text("time base of the {kind}", kind=kind)
     configuration = source.run.record.configuration if source.run else {}
     if kind == "counter" and configuration.get("count_with"):
         kind = str(configuration["count_with"])
@@ -59,20 +60,30 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
     if given is not None:
         u, note = given, "as given to the analysis"
     elif isinstance(measured, float) and measured > 0:
-        u, note = measured, f"{kind}.clock_u of the bench file"
+        u, note = measured, Text("{kind:s}.clock_u of the bench file", kind=kind)
     elif drift := _clock_drift(about):
         u = math.hypot(*drift)
-        note = (
-            f"it gained {1e6 * drift[0]:.0f}×10⁻⁶ on the computer's clock during the run, to {1e6 * drift[1]:.0f}×10⁻⁶"
+        note = Text(
+            "it gained {gained:.0f}×10⁻⁶ on the computer's clock during the run, to {u:.0f}×10⁻⁶",
+            gained=1000000.0 * drift[0],
+            u=1000000.0 * drift[1],
         )
     elif known:
         u = u_of_limit(known.limit)
-        note = (
-            f"±{known.limit * 1e6:g}×10⁻⁶ when new, even over that range, and {known.per_year * 1e6:g}×10⁻⁶ more "
-            f"each year ({known.source})"
+        note = Text(
+            "±{limit:g}×10⁻⁶ when new, even over that range, and {drift:g}×10⁻⁶ more each year ({manual})",
+            limit=known.limit * 1000000.0,
+            drift=known.per_year * 1000000.0,
+            manual=known.source,
         )
     elif about:
-        u, note = None, f"not known for {driver or 'this instrument'}: the option --clock-u gives it, from its manual"
+        u, note = (
+            None,
+            Text(
+                "not known for {driver}: the option --clock-u gives it, from its manual",
+                driver=driver or "this instrument",
+            ),
+        )
     else:
         u, note = None, "no instrument is recorded: the option --clock-u gives it, from the manual"
     return Component("time_base", what, "B", u, "1", sensitivity, included=False, note=note, remedy=remedy)
@@ -145,7 +156,11 @@ def budget_table(budget: Budget, shown: Mapping[str, str] | None = None) -> Tabl
     rows = [Row(_cells(budget, one)) for one in budget.included]
     rows.append(Row(("combined: u", "", "", "", _number(budget.u, budget.unit), "100 %"), "together"))
     left_out = budget.left_out
-    rows += [Row((f"{cells[0]} (not in u)", *cells[1:])) for one in left_out if (cells := _cells(budget, one))]
+    rows += [
+        Row((Text("{source} (not in u)", source=cells[0]), *cells[1:]))
+        for one in left_out
+        if (cells := _cells(budget, one))
+    ]
     if any(one.contribution for one in left_out):
         rows.append(
             Row(("u with all that is known", "", "", "", _number(budget.u_with_all, budget.unit), ""), "together")
@@ -167,8 +182,13 @@ def _in_shown_units(budget: Budget) -> Budget:
 def title_of(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
     """Return the result, with its uncertainty."""
     name = (shown or {}).get(budget.quantity, budget.quantity.replace("_", " "))
-    of = f" ({budget.model})" if budget.model else ""
-    return f"{name} = {with_uncertainty(Estimate(budget.value, budget.u, budget.unit))}{of}"
+    of = Text(" ({model})", model=budget.model) if budget.model else ""
+    return Text(
+        "{name} = {value:n}{of}",
+        name=name,
+        value=with_uncertainty(Estimate(budget.value, budget.u, budget.unit)),
+        of=of,
+    )
 
 
 def _cells(budget: Budget, one: Component) -> tuple[str, ...]:
@@ -185,7 +205,7 @@ def _cells(budget: Budget, one: Component) -> tuple[str, ...]:
 
 def _number(value: float, unit: str) -> str:
     """Two digits: no uncertainty is known better."""
-    return f"{digits(value)} {unit}".strip()
+    return Text("{number:n} {unit}", number=digits(value), unit=unit) if unit else digits(value)
 
 
 def _ratio(above: str, below: str) -> str:
@@ -194,7 +214,7 @@ def _ratio(above: str, below: str) -> str:
         return ""
     if below == _NO_UNIT:
         return above
-    return f"per {below}" if above == _NO_UNIT else f"{above} per {below}"
+    return Text("per {unit}", unit=below) if above == _NO_UNIT else Text("{unit} per {below}", unit=above, below=below)
 
 
 def _percent(share: float | None) -> str:
@@ -205,7 +225,7 @@ def _percent(share: float | None) -> str:
     """
     if share is None:
         return "—"
-    return "< 0.1 %" if share < _LEAST_SHARE else f"{digits(100 * share, 2)} %"
+    return "< 0.1 %" if share < _LEAST_SHARE else Text("{percent:n} %", percent=digits(100 * share, 2))
 
 
 def sentences_of(budget: Budget, shown: Mapping[str, str] | None = None) -> list[str]:
@@ -214,21 +234,47 @@ def sentences_of(budget: Budget, shown: Mapping[str, str] | None = None) -> list
     budget = _in_shown_units(budget)
     largest, texts = budget.largest, []
     if largest is not None:
-        texts.append(f"{_percent(budget.share(largest))} of u² of {name} comes from: {largest.source}.")
-        texts += [f"It gets smaller with {largest.remedy}."] if largest.remedy else []
+        texts.append(
+            Text(
+                "{percent} of u² of {name} comes from: {source}.",
+                percent=_percent(budget.share(largest)),
+                name=name,
+                source=largest.source,
+            )
+        )
+        texts += [Text("It gets smaller with {remedy}.", remedy=largest.remedy)] if largest.remedy else []
     known = [one for one in budget.left_out if one.contribution]
     if known and not budget.misses_nothing:
         whole = _number(budget.u_with_all, budget.unit)
-        texts.append(f"Not in u: {enumeration([one.source for one in known])}; with all that is known u is {whole}.")
+        texts.append(
+            Text(
+                "Not in u: {sources}; with all that is known u is {u}.",
+                sources=enumeration([one.source for one in known]),
+                u=whole,
+            )
+        )
     elif known:
-        texts.append(f"Not in u, and negligible: {enumeration([one.source for one in known])}.")
+        texts.append(Text("Not in u, and negligible: {sources}.", sources=enumeration([one.source for one in known])))
     unknown = [one for one in budget.left_out if one.u is None and one.sensitivity]
     clocks = [one for one in unknown if one.unit == _NO_UNIT]
     if clocks:
         most = max(abs(one.sensitivity) for one in clocks) * _TEN_PPM
         size = "less than 1 % of u" if most < 0.01 * budget.u else _number(most, budget.unit)
-        texts.append(f"Not known: {enumeration([one.source for one in clocks])}; an error of 10⁻⁵ would add {size}.")
-    return [*texts, *(f"Not known: {one.source}; it takes {one.remedy}." for one in unknown if one not in clocks)]
+        texts.append(
+            Text(
+                "Not known: {sources}; an error of 10⁻⁵ would add {size}.",
+                sources=enumeration([one.source for one in clocks]),
+                size=size,
+            )
+        )
+    return [
+        *texts,
+        *(
+            Text("Not known: {source}; it takes {remedy}.", source=one.source, remedy=one.remedy)
+            for one in unknown
+            if one not in clocks
+        ),
+    ]
 
 
 def budgets_of_result(found: Analyzed[Any, Any, Any, Any], shown: Mapping[str, str] | None = None) -> tuple[Block, ...]:
@@ -261,7 +307,7 @@ def _by_itself(
 ) -> Details:
     """Return the budgets of one input among several."""
     blocks = budget_blocks(budgets, shown, source.name, lambda _: mark_of([source]))
-    return Details(f"{source.name} by itself", blocks, on_paper="whole" if is_printed else "out")
+    return Details(Text("{name:s} by itself", name=source.name), blocks, on_paper="whole" if is_printed else "out")
 
 
 #: From so many runs on their budgets are not printed on paper, but for the first one where no mean has one; and so many
@@ -292,8 +338,8 @@ def budget_blocks(
         name = re.sub(r"[^a-z0-9]+", "-", words.casefold()).strip("-")
         found = budget_table(budget, shown)
         part = Tabular(name, replace(found, title=""), first_column_wraps=True, mark=mark(budget) if mark else None)
-        blocks.append(Details(found.title, (part,), more=" ".join(text for text in texts if text not in of_all)))
-    blocks += [Paragraph(" ".join(of_all))] if of_all else []
+        blocks.append(Details(found.title, (part,), more=Sentences(*(text for text in texts if text not in of_all))))
+    blocks += [Paragraph(Sentences(*of_all))] if of_all else []
     notes = notes_of(budgets)
     if notes:
         explained = Details("What the columns mean", (Note(EXPLAINED),), on_paper="out")
@@ -311,5 +357,10 @@ EXPLAINED = (
 
 def notes_of(budgets: Sequence[Budget]) -> list[str]:
     """Return the sources of the numbers in the rows, each once."""
-    said = (f"{one.source}: {one.note}" for budget in budgets for one in budget.components if one.note)
+    said = (
+        Text("{source}: {note}", source=one.source, note=one.note)
+        for budget in budgets
+        for one in budget.components
+        if one.note
+    )
     return list(dict.fromkeys(said))

@@ -15,7 +15,9 @@ from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.sway.document import SWAY
 from levilab.pipelines.video.document import VIDEO
 from levilab.present.clock import moment
+from levilab.present.document.blocks import in_language_of_reader
 from levilab.present.numbers import short_name
+from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -59,19 +61,23 @@ def print_analysis(
     from levilab.present.terminal import draw, terminal  # with rich
 
     console = console or terminal()
+
+    def say(lead: str, text: str, style: str = "bold") -> None:
+        console.print(f"[{style}]{in_language(lead)}[/{style}] {escape(in_words(in_language(text)))}")
+
     for doubt in found.doubts:
-        console.print(f"[bold yellow]Before you use the numbers.[/bold yellow] {escape(in_words(doubt))}")
-    console.print(f"[bold]What the data say.[/bold] {escape(found.text)}")
+        say("Before you use the numbers.", doubt, "bold yellow")
+    say("What the data say.", found.text)
     if tables:
         console.print()
         for table in analysis.tables(found):
-            console.print(draw(table))
+            console.print(draw(in_language_of_reader(table)))
     starts = [f"{short_name(one.name)} {moment(one.start)}" for one in found.sources if one.start]
     if starts:
-        more = f"; and {len(starts) - MOST_STARTS} more" if len(starts) > MOST_STARTS else ""
-        console.print(f"[bold]Start, local time.[/bold] {escape('; '.join(starts[:MOST_STARTS]))}{more}")
+        more = [Text("and {n} more", n=len(starts) - MOST_STARTS)] * (len(starts) > MOST_STARTS)
+        say("Start, local time.", "; ".join([*starts[:MOST_STARTS], *map(in_language, more)]))
     for first, *others in (group for group in found.grouped_warnings if group[0] not in found.doubts):
         many = len(others) >= MANY_ALIKE
-        more = f" (and {len(others)} more like this one)" if many else ""
-        for warning in [first] if many else [first, *others]:
-            console.print(f"[yellow]note:[/yellow] {escape(in_words(warning))}{more}")
+        alike = Text("{note} (and {n} more like this one)", note=first, n=len(others))
+        for warning in [alike] if many else [first, *others]:
+            say("note:", warning, "yellow")

@@ -34,7 +34,7 @@ from levilab.pipelines.sources import Needs, Skipped, collect
 from levilab.present.units import name_with_unit, split
 from levilab.runs.find import find_run
 from levilab.software import software_versions
-from levilab.texts.text import Sentences, as_tables
+from levilab.texts.text import Sentences, Text, as_tables
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -180,8 +180,6 @@ class Analysis(Needs[Any], Generic[A]):
         options: Any,
         one: Callable[[Source[Any]], Done],
         recall: Callable[[Sequence[Any]], Any] | None = None,
-        *,
-        budget: tuple[Budget, ...] = (),
     ) -> A:
         """Return what is found of all inputs, each by itself and together.  Raises DataError.
 
@@ -191,7 +189,6 @@ class Analysis(Needs[Any], Generic[A]):
             options: as they were given.
             one: from one input to what is found of it.
             recall: from what is found of each to what was found of all together; None where it is not known.
-            budget: that of all together, which goes with `recall`.
         """
         done, warnings = self._each(found.sources, one)
         sources, runs, origins = (list(column) for column in zip(*done, strict=True))
@@ -208,10 +205,7 @@ class Analysis(Needs[Any], Generic[A]):
             warnings=(*found.warnings, *warnings, *self.about_inputs(sources, used)),
             remarks=found.remarks,
             origins=tuple(origins),
-            budget=budget,
         )
-        if recall is not None:
-            return found_of_all
         of_all = (origins[0].budget or ()) if len(origins) == 1 else self.budget_of_all(found_of_all)
         return replace(found_of_all, budget=of_all)
 
@@ -348,7 +342,6 @@ class Analysis(Needs[Any], Generic[A]):
                 options,
                 lambda source: self._read_one(source, whole.of(source)),
                 lambda _: self.renumber(whole.result.combined, numbers),
-                budget=whole.result.budget,
             )
         return self.gather(paths, found, options, lambda source: self._recall_one(source, archive, given))
 
@@ -358,10 +351,10 @@ class Analysis(Needs[Any], Generic[A]):
     def _problem(self, earlier: Earlier[Any], given: Mapping[str, Any], source: Source[Any]) -> str:
         """Return why an input has to be analyzed again; empty where its result holds."""
         if earlier.sha256 != source.sha256:
-            return f"the readings are others than in {earlier.file}"
+            return Text("the readings are others than in {file}", file=earlier.file)
         made_with = self._options(earlier)
         if self.settings(replace(made_with, **self._own_values(given, source))) != self.settings(made_with):
-            return f"other options than those of {earlier.file}"
+            return Text("other options than those of {file}", file=earlier.file)
         return self.outdated(earlier.part.result)
 
     def _own_values(self, given: Mapping[str, Any], source: Source[Any]) -> dict[str, Any]:
@@ -378,7 +371,7 @@ class Analysis(Needs[Any], Generic[A]):
             options = replace(self._options(earlier), **own)
         else:
             return self._read_one(source, earlier)
-        origin = Origin(options, f"{FOR_THIS_PAGE}: {why}", lacks_result=earlier is None)
+        origin = Origin(options, Text(FOR_THIS_PAGE, why=why), lacks_result=earlier is None)
         return source, self.fit(source, options), origin
 
     def _read_one(self, source: Source[Any], earlier: Earlier[Any]) -> Done:
@@ -388,7 +381,7 @@ class Analysis(Needs[Any], Generic[A]):
             self.check(part.result)
         except ValueError as error:
             raise DataError(f"{earlier.file}: {error}: {AGAIN}") from error
-        return source, part.result, Origin(self._options(earlier), earlier.text, part.budget)
+        return source, part.result, Origin(self._options(earlier), earlier.text)
 
     # --- for people ---
 

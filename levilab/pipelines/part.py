@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from analysis.numbers import digits, how_many
+from analysis.numbers import digits
 from levilab.present.document.blocks import Points
-from levilab.present.numbers import short_name
+from levilab.present.numbers import how_many, short_name
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
@@ -90,7 +91,7 @@ def first_of(shown: int, count: int) -> str:
     >>> first_of(200, 20000), first_of(20, 20)
     ('The first 200 of 20000; all of them are in the data.', '')
     """
-    return f"The first {shown} of {count}; all of them are in the data." if count > shown else ""
+    return Text("The first {shown} of {n}; all of them are in the data.", shown=shown, n=count) if count > shown else ""
 
 
 def input_parts(
@@ -116,8 +117,9 @@ def input_parts(
 def title_of(subject: str, sources: Sequence[Source[Any]], noun: str = "run") -> str:
     """Return the title of a first table: the subject, the number of inputs, and how many are synthetic."""
     total, synthetic = len(sources), sum(source.synthetic for source in sources)
-    mark = "" if not synthetic else ", SYNTHETIC" if synthetic == total else f", {synthetic} of them SYNTHETIC"
-    return f"{subject}, {how_many(total, noun)}{mark}"
+    some = Text(", {synthetic} of them SYNTHETIC", synthetic=synthetic)
+    mark = "" if not synthetic else ", SYNTHETIC" if synthetic == total else some
+    return Text("{subject}, {inputs}{mark}", subject=subject, inputs=how_many(total, noun), mark=mark)
 
 
 def labels_of(sources: Sequence[Source[Any]]) -> list[str]:
@@ -145,7 +147,8 @@ def points_of(
 def size_of_u(u: NDArray[np.float64]) -> str:
     """Return the least and the greatest standard uncertainty of readings [Hz], as text."""
     low, high = float(u.min()), float(u.max())
-    return f"{digits(low)} Hz" if low == high else f"{digits(low)} Hz to {digits(high)} Hz"
+    low_hz = Text("{low:n} Hz", low=digits(low))
+    return low_hz if low == high else Text("{low} to {high:n} Hz", low=low_hz, high=digits(high))
 
 
 def origin_of_u(source: Source[Any], column: str, options: Any) -> str:

@@ -36,6 +36,7 @@ from levilab.formats.texts import locate
 from levilab.runs.find import RECORD
 from levilab.settings import in_one_line
 from levilab.software import software_versions
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -459,8 +460,10 @@ class Earlier(Generic[R]):
     def text(self) -> str:
         """Where it comes from, for people."""
         then = self.result.software
-        by = f", by levilab {then.get('levilab', '?')}" if then != software_versions() else ""
-        return f"as levilab analyze found it{by}: {self.file}"
+        if then == software_versions():
+            return Text("as levilab analyze found it: {file}", file=self.file)
+        version = then.get("levilab", "?")
+        return Text("as levilab analyze found it, by levilab {version:s}: {file}", version=version, file=self.file)
 
     def of(self, source: Source[Any]) -> Earlier[R]:
         """Return the same of another input of the result."""

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
-from analysis.numbers import how_many
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.formats.columns import NoSuchColumn
 from levilab.formats.kinds import AUDIO, OTHER, Kind, kind_of
@@ -26,7 +25,7 @@ from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.record import SEARCHED
 from levilab.pipelines.correction import corrected_parts, describe, place_of_correction, read_correction
 from levilab.present.clock import local
-from levilab.present.numbers import list_in_words, short_name
+from levilab.present.numbers import how_many, list_in_words, short_name
 from levilab.runs.find import RECORD, find_runs, no_such_path
 from levilab.runs.run import READINGS, Run
 from levilab.texts.note import Note, of_file

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from analysis.errors import AnalysisError
-from analysis.numbers import how_many
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.pipelines import catalogue
 from levilab.pipelines.result import ResultError, is_of_another, read_inputs, results_in
 from levilab.pipelines.result import save as save_files
 from levilab.pipelines.sources import Found, LeftOut, NothingSuits, Skipped, data_files, find, in_words, join
+from levilab.present.numbers import how_many
 from levilab.runs.find import RECORD, find_run, find_runs
 from levilab.runs.run import Run
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
+from levilab.texts.text import Text
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -53,4 +55,4 @@ def with_clock(
     if zero is None or times_s is None or any(abs(time) > _LONGEST_S for time in times_s):
         return [*heads], [()] * count
     cells: list[tuple[str, ...]] = [(f"{zero + timedelta(seconds=float(time)):%H:%M:%S}",) for time in times_s]
-    return [f"clock {offset(zero)}", *heads], cells
+    return [Text("clock {offset:s}", offset=offset(zero)), *heads], cells

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from levilab.present.units import split
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -29,11 +30,12 @@ def settings_in_words(settings: Mapping[str, Any]) -> str:
     """
     drive = [value_in_words(key, settings[key]) for key in _DRIVE if key in settings]
     if "output" not in settings or not drive:
-        return ", ".join(setting_in_words(key, value) for key, value in settings.items())
-    others = [setting_in_words(key, value) for key, value in settings.items() if key not in {"output", *_DRIVE}]
-    named = "drive" if settings["output"] else "last drive"
-    parts = [setting_in_words("output", settings["output"]), f"{named} {', '.join(drive)}", ", ".join(others)]
-    return "; ".join(filter(None, parts))
+        return Text("{settings}", settings=tuple(setting_in_words(key, value) for key, value in settings.items()))
+    others = tuple(setting_in_words(key, value) for key, value in settings.items() if key not in {"output", *_DRIVE})
+    named = "drive {settings}" if settings["output"] else "last drive {settings}"
+    parts = [setting_in_words("output", settings["output"]), Text(named, settings=tuple(drive))]
+    said = Text("{output}; {drive}", output=parts[0], drive=parts[1])
+    return Text("{drive}; {others}", drive=said, others=others) if others else said
 
 
 def setting_in_words(key: str, value: Any) -> str:
@@ -44,7 +46,7 @@ def setting_in_words(key: str, value: Any) -> str:
     >>> setting_in_words("creep_hz_per_s", 0.1), setting_in_words("shows", ["tape", "laser"])
     ('creep 0.1 Hz/s', 'shows tape, laser')
     """
-    return f"{split(key)[0].replace('_', ' ')} {value_in_words(key, value)}"
+    return Text("{setting} {value:n}", setting=split(key)[0].replace("_", " "), value=value_in_words(key, value))
 
 
 def value_in_words(key: str, value: Any) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
-from analysis.numbers import how_many
 from levilab.crosscheck.own.study import OWN, quick_study
 from levilab.crosscheck.stored import read_study
 from levilab.crosscheck.table import blocks_of
@@ -24,10 +23,11 @@ from levilab.present.document.blocks import (
     Warnings,
     with_marks,
 )
-from levilab.present.numbers import list_in_words
+from levilab.present.numbers import enumeration, how_many, list_in_words
 from levilab.report.inputs import About, describe, in_common
 from levilab.report.reproduction import Asked, paths_in_commands, reproduction
 from levilab.texts.note import is_doubt
+from levilab.texts.text import Sentences, Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -107,7 +107,11 @@ def blocks_of_part(
         return Section(title, blocks, anchor=f"{analysis.name}-{anchor}" if deeper else anchor)
 
     grave, notes = (
-        tuple(tuple(map(unquote, alike)) for alike in found.grouped_warnings if is_doubt(alike[0]) == doubtful)
+        tuple(
+            tuple(unquote(in_language(text)) for text in alike)
+            for alike in found.grouped_warnings
+            if is_doubt(alike[0]) == doubtful
+        )
         for doubtful in (True, False)
     )
     doubts = [Warnings(grave)] if grave else []
@@ -153,7 +157,12 @@ def _verdict(found: Analyzed[Any, Any, Any, Any]) -> str:
     if not _mixes(found):
         return found.text
     made_up = sum(source.synthetic for source in found.sources)
-    return f"MIXED, and so no measurement ({made_up} of {len(found.sources)} inputs are SYNTHETIC): {found.text}"
+    return Text(
+        "MIXED, and so no measurement ({some} of {all} inputs are SYNTHETIC): {said}",
+        some=made_up,
+        all=len(found.sources),
+        said=found.text,
+    )
 
 
 def picture_of(analysis: Analysis[A], found: A, part: ReportPart, *, short: bool = False) -> Picture:
@@ -189,14 +198,15 @@ def _of_one_analysis(
 def _title(counts: str, others: Sequence[Section]) -> str:
     """Return the title of a document of several parts; counts: of the measurements, empty for none."""
     if not counts:
-        return others[0].title if len(others) == 1 else f"Report of {len(others)} simulations"
-    return f"Report of {counts}{', with simulations' if others else ''}"
+        return others[0].title if len(others) == 1 else Text("Report of {n} simulations", n=len(others))
+    return Text("Report of {counts}{others}", counts=counts, others=", with simulations" if others else "")
 
 
 def _lead(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
     """Return the amount of data used."""
     count = sum(map(len, found.grouped_warnings))
-    return f"{count_inputs(found.sources)}, {part.lead}, {how_many(count, 'note') if count else 'no notes'}"
+    notes = how_many(count, "note") if count else "no notes"
+    return Text("{inputs}, {used}, {notes}", inputs=count_inputs(found.sources), used=part.lead, notes=notes)
 
 
 def _measurements(results: Results, parts: Sequence[ReportPart]) -> Section:
@@ -251,15 +261,29 @@ def banner_of(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner 
         return Banner("SYNTHETIC.", "This run did not come from a real bench. How it was made stands in its run.json.")
     how = "How each was made stands in its run.json."
     if len(made_up) == total:
-        return Banner("SYNTHETIC.", f"None of these {total} runs came from a real bench. {how}")
-    said = f"{len(made_up)} of {total} runs did not come from a real bench ({list_in_words(made_up)})."
+        return Banner(
+            "SYNTHETIC.", Sentences(Text("None of these {total} runs came from a real bench.", total=total), how)
+        )
+    said = Text(
+        "{some} of {total} runs did not come from a real bench ({names:s}).",
+        some=len(made_up),
+        total=total,
+        names=list_in_words(made_up),
+    )
     if not mixed and files:
-        said = f"Of {count_inputs(sources)} {len(made_up)} did not come from a real bench ({list_in_words(made_up)})."
-        return Banner("SYNTHETIC IN PART.", f"{said} A data file does not say where it is from. {how}")
+        said = Text(
+            "Of {inputs} {some} did not come from a real bench ({names:s}).",
+            inputs=count_inputs(sources),
+            some=len(made_up),
+            names=list_in_words(made_up),
+        )
+        return Banner("SYNTHETIC IN PART.", Sentences(said, "A data file does not say where it is from.", how))
     if not mixed:
-        return Banner("REAL AND SYNTHETIC RUNS.", f"{said} {how}")
-    consequence = "Means, comparisons and figure are of both together and so no measurement: report the real runs "
-    return Banner("REAL AND SYNTHETIC RUNS MIXED.", f"{said} {consequence}by themselves. {how}")
+        return Banner("REAL AND SYNTHETIC RUNS.", Sentences(said, how))
+    consequence = (
+        "Means, comparisons and figure are of both together and so no measurement: report the real runs by themselves."
+    )
+    return Banner("REAL AND SYNTHETIC RUNS MIXED.", Sentences(said, consequence, how))
 
 
 # --- a part in a notebook ------------------------------------------------------------------------------
@@ -286,4 +310,5 @@ def count_inputs(sources: Sequence[Source[Any]]) -> str:
     """Return how many inputs of which kind: "4 runs and 1 data file"."""
     files = sum(source.run is None for source in sources)
     kinds = ((len(sources) - files, "run"), (files, "data file"))
-    return " and ".join(how_many(n, kind) for n, kind in kinds if n)
+    counts = [how_many(n, kind) for n, kind in kinds if n]
+    return enumeration(counts) if counts else ""

@@ -13,6 +13,7 @@ from levilab.present.document.blocks import Details, Fact, Facts, Listing, Note,
 from levilab.present.tables import table
 from levilab.present.units import split
 from levilab.present.words import setting_in_words, settings_in_words, value_in_words
+from levilab.texts.text import Text, text_from
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -66,7 +67,7 @@ class Input:
         """Its status unless that is finished, and the number of its readings."""
         facts = {fact.name: fact.texts for fact in self.facts}
         texts = [*facts.get("Status", ()), *facts.get("Readings", ())[:1]]
-        return "; ".join(text for text in texts if text != "finished")
+        return Text("{texts}", texts=tuple(text for text in texts if text != "finished"))
 
     def without(self, common: Sequence[Fact]) -> Input:
         """Return the input without the facts that all inputs share."""
@@ -111,7 +112,11 @@ def _facts(source: Source[Any], parts: Sequence[About]) -> list[Fact]:
     if source.run is None:
         return [*about_readings, none]
     record = source.run.record
-    made_up = (_sentence(record.synthetic_how or "not said how", record.seed),) if record.synthetic else ()
+    made_up = (
+        (_sentence(text_from(record.synthetic_says, record.synthetic_how or "not said how"), record.seed),)
+        if record.synthetic
+        else ()
+    )
     instruments = [Fact(kind.capitalize(), _instrument(about)) for kind, about in record.instruments.items()]
     return [
         Fact("Synthetic", made_up),
@@ -144,8 +149,8 @@ def _of_several(about: About) -> Fact:
 
 def _sentence(how: str, seed: int | None) -> str:
     """Return how the input was made, without saying again that it is synthetic."""
-    text = how.removeprefix("SYNTHETIC").lstrip(":, ") or how
-    return text if seed is None else f"{text} (seed {seed})"
+    text = how.removeprefix("SYNTHETIC").lstrip(":, ") if how.startswith("SYNTHETIC:") else how
+    return text if seed is None else Text("{made} (seed {seed})", made=text, seed=seed)
 
 
 # --- when, and what happened ---------------------------------------------------------------------------
@@ -154,14 +159,16 @@ def _sentence(how: str, seed: int | None) -> str:
 def _when(record: RunRecord) -> tuple[str, ...]:
     """Begin and end, as far as they are known; a virtual clock may have made one of them."""
     ends = [_time(utc) for utc in (record.started_utc, record.ended_utc) if utc]
-    return (" to ".join(dict.fromkeys(ends)),) if ends else ()
+    first, *last = dict.fromkeys(ends) or ("",)
+    return (Text("{first} to {last}", first=first, last=last[0]) if last else first,)
 
 
 def _local_start(source: Source[Any]) -> tuple[str, ...]:
     """Return the start on the clock of the person who reads."""
     if source.start is None:
         return ()
-    return (f"{'time zero' if source.time_zero else 'started'} at {moment(source.start)}, local time",)
+    said = "time zero at {moment}, local time" if source.time_zero else "started at {moment}, local time"
+    return (Text(said, moment=moment(source.start)),)
 
 
 def _time(utc: str) -> str:
@@ -176,14 +183,14 @@ def _events(source: Source[Any]) -> tuple[Block, ...]:
     if not events or source.run is None:
         return ()
     zero = source.run.record.time_zero_utc
-    rows = [(_moment(event, zero), event["text"]) for event in events[:MOST_EVENTS]]
+    rows = [(_moment(event, zero), text_from(event.get("says"), event["text"])) for event in events[:MOST_EVENTS]]
     left_out = len(events) - MOST_EVENTS
-    note = f"and {left_out} more, in events.jsonl" if left_out > 0 else ""
+    note = Text("and {n} more, in events.jsonl", n=left_out) if left_out > 0 else ""
     heads = ("at", "what happened")
     shown = Tabular("events", table("", heads, rows, numbers=heads[:1]), note, wraps=heads[1:])
     if len(rows) <= _FEW_EVENTS:
         return (Section("What happened", (shown,)),)
-    return (Details("What happened", (shown,), more=f"{len(events)} events", on_paper="out"),)
+    return (Details("What happened", (shown,), more=Text("{n} events", n=len(events)), on_paper="out"),)
 
 
 def _moment(event: Mapping[str, Any], zero: str | None) -> str:
@@ -202,11 +209,12 @@ def _drive(record: RunRecord) -> tuple[str, ...]:
     if not isinstance(settings, dict) or settings.get(_DRIVE[1], 0) is None:  # nothing drives the top
         return ()
     signal = [value_in_words(key, settings[key]) for key in _DRIVE if key in settings]
-    ramp = [f"raised by {settings['ramp_hz_per_s']} Hz/s"] if "ramp_hz_per_s" in settings else []
+    ramp = [Text("raised by {ramp} Hz/s", ramp=settings["ramp_hz_per_s"])] if "ramp_hz_per_s" in settings else []
     if not signal + ramp:
         return ()
     bounds = [setting_in_words(key, value) for key, value in limits.items()] if isinstance(limits, dict) else []
-    return (", ".join(signal + ramp), *([f"limits of the bench: {', '.join(bounds)}"] if bounds else []))
+    limit = [Text("limits of the bench: {bounds}", bounds=tuple(bounds))] if bounds else []
+    return (Text("{settings}", settings=(*signal, *ramp)), *limit)
 
 
 def _conditions(record: RunRecord) -> tuple[str, ...]:
@@ -220,17 +228,20 @@ def _conditions(record: RunRecord) -> tuple[str, ...]:
         for key in sorted(settings)
         if key not in said and settings[key] is not None
     ]
-    return (", ".join(others),) if others else ()
+    return (Text("{settings}", settings=tuple(others)),) if others else ()
 
 
 def _instrument(about: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the instrument's identity and link, and the settings of the measurement: at its end, else at its start."""
-    where = f"{about.get('identity', 'did not answer')} at {about.get('address', 'an unknown address')}"
+    identity, address = about.get("identity", "did not answer"), about.get("address", "an unknown address")
+    where = Text("{identity} at {address}", identity=str(identity), address=str(address))
     at_start, at_end = (about.get(when) for when in ("settings_start", "settings_end"))
     if isinstance(at_end, dict):
         return where, settings_in_words(at_end)
     if isinstance(at_start, dict):
-        return where, f"at the start, no later settings are recorded: {settings_in_words(at_start)}"
+        return where, Text(
+            "at the start, no later settings are recorded: {settings}", settings=settings_in_words(at_start)
+        )
     return where, "settings not recorded"
 
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any
 
-from analysis.numbers import how_many
 from levilab.errors import LevilabError
 from levilab.formats.table import parse_columns
 from levilab.pipelines.options import OF_REPORT, OPTIONS, options_of, typed_name
 from levilab.present.document.blocks import Code, Details, Fact, Facts, Note, Paragraph, Section, Tabular
+from levilab.present.numbers import how_many
 from levilab.present.tables import table
 from levilab.software import software_versions
-from levilab.texts.text import ENGLISH, spoken
+from levilab.texts.text import ENGLISH, Text, spoken
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -91,7 +91,7 @@ def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked) -> 
     """Return the section at the end of a report of measurements; of a short one the command that made it."""
     sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
     if asked.short:
-        return Note(f"Made by: {asked.command(sources)}")
+        return Note(Text("Made by: {command:s}", command=asked.command(sources)))
     data = (_data(sources), *_recording(sources))
     return Section(
         "How to reproduce this",
@@ -102,7 +102,11 @@ def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked) -> 
             ),
             Code("\n".join([*_commands(results, asked.paths), asked.command(sources)])),
             *_others(results),
-            Details("The data", data, more=f"{how_many(len(sources), 'input')}, by hash, command and versions"),
+            Details(
+                "The data",
+                data,
+                more=Text("{inputs}, by hash, command and versions", inputs=how_many(len(sources), "input")),
+            ),
             *_versions_here(sources),
         ),
         anchor="reproduce",
@@ -180,7 +184,7 @@ def _others(results: Sequence[tuple[Analysis[Any], Any]]) -> tuple[Note, ...]:
     """Return the names of options that are no plain words, such as a file of the top's sizes."""
     options = [origin.options for _, found in results for origin in found.origins]
     names = sorted({_flag(name) for one in options for name in _given_options(one)})
-    return (Note(f"Besides, these options were given: {', '.join(names)}."),) if names else ()
+    return (Note(Text("Besides, these options were given: {names}.", names=", ".join(names))),) if names else ()
 
 
 def _given_options(options: Any) -> Iterator[str]:
@@ -219,7 +223,7 @@ def _recording(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
         if texts:
             facts.append(Fact(source.name, tuple(texts), code=True))
     if len(facts) > 1 and len({fact.texts for fact in facts}) == 1:
-        facts = [replace(facts[0], name=f"all {len(facts)} runs")]
+        facts = [replace(facts[0], name=Text("all {n} runs", n=len(facts)))]
     return (Section("Recorded by", (Facts(tuple(facts)),)),) if facts else ()
 
 

@@ -76,12 +76,15 @@ class RunRecord(BaseModel):
     washers_kg: tuple[float, ...] | None = None
     synthetic: bool = False
     synthetic_how: str | None = None
+    #: The same as `Text.as_table` has it, if it is one.
+    synthetic_says: dict[str, Any] | None = None
     #: Of a virtual bench, if its top only spins.
     world: Literal["spin"] | None = None
 
     def as_json(self) -> str:
         """Return the file's text."""
-        return as_json(self.model_dump(mode="json", by_alias=True)) + "\n"
+        unsaid = {"synthetic_says"} if self.synthetic_says is None else None
+        return as_json(self.model_dump(mode="json", by_alias=True, exclude=unsaid)) + "\n"
 
 
 def utc_now() -> str:

@@ -24,7 +24,9 @@ FOLDER = Path(__file__).parent
 ENGLISH = "en"
 #: A value in a template: its name, and how it is written, as in an f-string; ``n``: text of numbers, ``s``: a name.
 _FIELD = re.compile(r"\{(\w+)(?::([+,]?[0-9]{0,2}(?:\.[0-9]{1,2})?[a-z%]?))?\}")
-_POINT = re.compile(r"(?<=\d)\.(?=\d)")
+_POINT = re.compile(r"(?<![\d.])(\d+)\.(?=\d+(?![\d.]*\.\d))")
+#: A text that says a value, and not a word, such as "39.85(3) Hz": units have at most three letters.
+_VALUE = re.compile(r"(?!.*[^\W\d_]{4}).*\d\.\d", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -140,7 +142,13 @@ def in_language(text: str, code: str | None = None) -> str:
         return str.__str__(text)
     if isinstance(text, Text):
         return _fill(language_of(code).texts.get(text.template, text.template), text.values, code)
-    return language_of(code).texts.get(text, text)
+    language = language_of(code)
+    return language.texts.get(text) or (_with_decimals(text, language.decimal) if _VALUE.match(text) else text)
+
+
+def _with_decimals(text: str, decimal: str) -> str:
+    """Return a text with another decimal sign; versions, as 3.11.7, stay."""
+    return _POINT.sub(rf"\g<1>{decimal}", text)
 
 
 _of_process = ENGLISH
@@ -170,7 +178,7 @@ def _write(value: Any, how: str, code: str) -> str:
         return str(value)
     if isinstance(value, str):
         said = in_language(value, code)
-        return _POINT.sub(decimal, said) if how == "n" else said
+        return _with_decimals(said, decimal) if how == "n" else said
     return format(value, how).replace(".", decimal)
 
 

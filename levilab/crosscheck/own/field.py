@@ -11,6 +11,7 @@ from analysis.field.fit import PARAMETERS, Prior, fit_scan
 from analysis.field.ring import on_axis
 from levilab.crosscheck.own.model import Own
 from levilab.crosscheck.subject import Trial, pull_of
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from analysis.field.fit import FieldScan, Known
@@ -49,7 +50,10 @@ def trials_of(found: FieldAnalysis) -> Own:
 
     which = "the first scan" if len(found.runs) > 1 else "the scan"
     return Own(
-        about=f"{which} anew from the fitted base: calliper, zero, scale, heights and readings drawn by their u",
+        about=Text(
+            "{scan} again from the fitted base: calliper, zero, scale, heights and readings drawn by their u",
+            scan=which,
+        ),
         trial=trial,
         cost_s=_COST_S,
     )

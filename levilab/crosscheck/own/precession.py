@@ -10,6 +10,7 @@ from analysis.precession.sweep import EXCLUDED_P, Sweep, fit_sweep
 from levilab.crosscheck.own.model import Own
 from levilab.crosscheck.subject import Trial, pull_of
 from levilab.pipelines.precession.words import intercept_of, slope_of
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from levilab.pipelines.precession.analysis import PrecessionAnalysis
@@ -41,7 +42,9 @@ def trials_of(found: PrecessionAnalysis) -> Own:
         )
 
     return Own(
-        about=f"{drive.size} points on the fitted line, at these frequencies of the drive, with their scatter",
+        about=Text(
+            "{n} points on the fitted line, at these frequencies of the drive, with their scatter", n=drive.size
+        ),
         trial=trial,
         cost_s=_COST_S,
         hypothesis="the true line",

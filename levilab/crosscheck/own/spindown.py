@@ -16,7 +16,9 @@ from levilab.crosscheck.own.model import OF_ONE_RUN, Own
 from levilab.crosscheck.subject import Trial, pull_of
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.spindown.analysis import EXPERIMENT
+from levilab.present.numbers import how_many
 from levilab.simulator import laws
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -94,9 +96,12 @@ def trials_of(found: SpinDownAnalysis) -> Own:
     spread = _between(found, law, constants)
     several = len(runs) > 1
     return Own(
-        about=f"{len(runs)} spin-down{'s' * several} by the {law} law, "
-        + ("constants that differ from run to run as these do, " if several else "")
-        + "with the times, scatter, correlation, gate and digits of the readings",
+        about=Text(
+            "{runs} by the {law} law, {differ}with the times, scatter, correlation, gate and digits of the readings",
+            runs=how_many(len(runs), "spin-down"),
+            law=law,
+            differ="constants that differ from run to run as these do, " if several else "",
+        ),
         trial=lambda random: _trial(random, runs, law, constants, spread),
         cost_s=sum(run.cost_s for run in runs),
         law=law,

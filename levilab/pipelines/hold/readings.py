@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from analysis.numbers import how_many
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST
 from levilab.pipelines.sources import Readings
+from levilab.present.numbers import how_many
 from levilab.runs.events import RunEvent
 
 if TYPE_CHECKING:

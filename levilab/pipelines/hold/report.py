@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from analysis.numbers import how_many
 from levilab.pipelines.hold.analysis import QUANTITIES, text_of
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, points_of, title_of
 from levilab.pipelines.row import cells_of
 from levilab.pipelines.spindown.words import SYMBOLS
 from levilab.present.document.blocks import Paragraph, Tabular
-from levilab.present.numbers import plain, short_name, with_uncertainty, without_unit
+from levilab.present.numbers import how_many, plain, short_name, with_uncertainty, without_unit
 from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:

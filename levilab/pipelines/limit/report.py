@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.locked import Cause
-from analysis.numbers import digits, how_many
+from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import (
     VALUE_U,
@@ -22,7 +22,7 @@ from levilab.pipelines.part import (
     title_of,
 )
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
-from levilab.present.numbers import off, reading, share, short_name, with_uncertainty, without_unit
+from levilab.present.numbers import how_many, off, reading, share, short_name, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
 from levilab.stability.thesis import ISLANDS_HZ, MEASURED_HZ, MEASURED_U_HZ
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from analysis.numbers import digits, how_many
+from analysis.numbers import digits
 from analysis.precession.gates import rates_at_point, shared_scatter
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, read_table, refuse
 from levilab.pipelines.sources import SAME, Readings
-from levilab.present.numbers import pulses_too_many
+from levilab.present.numbers import how_many, pulses_too_many
 from levilab.runs.gates import gates_of
 from levilab.texts.note import of_file
 

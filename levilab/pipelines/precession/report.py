@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.numbers import digits, how_many
+from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import (
     VALUE_U,
@@ -26,6 +26,7 @@ from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Note, Paragraph, Tabular
 from levilab.present.numbers import (
     column,
+    how_many,
     off,
     plain,
     short_name,

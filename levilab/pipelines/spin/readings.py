@@ -8,7 +8,6 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from analysis.numbers import how_many
 from analysis.pulses import track_of_blocks, track_of_samples
 from analysis.rotation.record import FEWEST
 from levilab.errors import DataError, DoesNotSuit
@@ -16,6 +15,7 @@ from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
+from levilab.present.numbers import how_many
 from levilab.runs.traces import INDEX, undescribed_codes
 from levilab.runs.waveforms import run_waveforms
 from levilab.texts.note import Note, of_file

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.numbers import digits, how_many
+from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, title_of
 from levilab.pipelines.row import cells_of
 from levilab.pipelines.spin.analysis import MOST_DRAWN, OF_A_RUN, in_a_sentence
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
-from levilab.present.numbers import column, enumeration, plain, short_name, with_decimals, with_uncertainty
+from levilab.present.numbers import column, enumeration, how_many, plain, short_name, with_decimals, with_uncertainty
 from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:

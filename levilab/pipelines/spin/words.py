@@ -3,8 +3,9 @@
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from analysis.numbers import digits, how_many
+from analysis.numbers import digits
 from analysis.pulses import Finding
+from levilab.present.numbers import how_many
 
 
 def finding_text(found: Finding, part: str = "window") -> str:

@@ -27,6 +27,7 @@ from levilab.pipelines.spindown.report import (
     spindown_tables,
 )
 from levilab.pipelines.spindown.words import CORRELATION, QUANTITIES, SPINDOWN_ROW, SYMBOLS, remark, verdict_of_run
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -89,7 +90,7 @@ def _rows(
     yield from _of_model(parts, estimate)
     gate = gate_of(source, EXPERIMENT)
     if gate is not None and parts.gate is not None:
-        note = f"the mean over {gate:g} s is higher than the spin in the middle; not corrected"
+        note: str = Text("the mean over {gate:g} s is higher than the spin in the middle; not corrected", gate=gate)
         yield Component(
             "gate", "gate: a mean over a falling spin", "B", gate**2, "s²", parts.gate / gate**2,
             included=False, note=note, remedy="a shorter gate",
@@ -128,18 +129,19 @@ def _of_readings(
         within = "a part of what a reading scatters" if is_part else "more than the u of a reading"
         yield Component(
             "resolution", "last digit of the readings", "B", rounding, "Hz", sensitivity,
-            included=is_part, note=f"steps of {step:g} Hz, {within}", remedy="more digits",
+            included=is_part, remedy="more digits",
+            note=Text("steps of {step:g} Hz, {within}", step=step, within=within),
         )  # fmt: skip
     own = rest(each, rounding) if is_part else each
     remedy = _better_readings(source)
     yield Component("scatter", what, "B" if stated else "A", own, "Hz", sensitivity, note=note, remedy=remedy)
     if parts.excess > 0:
-        note = f"χ²/dof = {digits(fit.statistics.reduced_chi_square or 0.0)}"
+        note = Text("χ²/dof = {chi:n}", chi=digits(fit.statistics.reduced_chi_square or 0.0))
         remedy = "finding what the law, or the stated u, leaves out"
         yield direct_row("excess", "scatter beyond the stated u", parts.excess, unit, note, remedy, kind="A")
     if parts.correlation > 0:
         found = run.correlation
-        note = f"ρ = {found.value:.2f} ± {found.u:.2f} between neighbours" if found else ""
+        note = Text("ρ = {r:.2f} ± {u:.2f} between neighbours", r=found.value, u=found.u) if found else ""
         yield direct_row(
             "correlation", "correlation of neighbouring readings", parts.correlation, unit, note,
             "a calmer top, or more runs", kind="A",
@@ -176,8 +178,14 @@ def _better_readings(source: Source[SpinReadings]) -> str:
         return "more readings in the same time, or a longer gate"
     longer = min(_LONGER * gate, _MOST_OF_INTERVAL * interval)
     if longer < 2 * gate:
-        return f"more runs: their mean over N is better by √N (the gate, {gate:g} s, can hardly be longer)"
-    return f"a gate of {longer:g} s instead of {gate:g} s, where single pulses scatter, or by more runs"
+        return Text(
+            "more runs: their mean over N is better by √N (the gate, {gate:g} s, can hardly be longer)", gate=gate
+        )
+    return Text(
+        "a gate of {longer:g} s instead of {gate:g} s, where single pulses scatter, or by more runs",
+        longer=longer,
+        gate=gate,
+    )
 
 
 # --- several runs --------------------------------------------------------------------------------------
@@ -206,18 +214,22 @@ def _budget_of_mean(analysis: SpinDownAnalysis, law: str, name: str, mean: Mean)
     by_runs = rest(mean.u, shared)
     own = [rest(u, fit.shared_u.get(name, 0.0)) for fit in fits if (u := fit.parameters[name].u)]
     of_readings = float(np.linalg.norm(own)) / n
-    remedy = f"more runs: it takes {_TO_HALVE * n} instead of {n} to halve it"
+    remedy = Text("more runs: it takes {more} instead of {n} to halve it", more=_TO_HALVE * n, n=n)
     rows: list[Component] = []
     if of_readings >= by_runs * (1 - 1e-9):
-        note = f"the runs scatter by no more ({digits(mean.scatter)}) than their readings explain"
+        note: str = Text(
+            "the runs scatter by no more ({scatter:n}) than their readings explain", scatter=digits(mean.scatter)
+        )
         rows.append(
             Component("runs", "readings of the runs", "A", of_readings * math.sqrt(n), mean.unit, 1 / math.sqrt(n),
                       note=note, remedy=remedy)
         )  # fmt: skip
     else:
-        note = (
-            f"standard deviation of one run from another, {n} runs; the readings of each are part of it and alone "
-            f"would leave {digits(of_readings)} to the mean"
+        note = Text(
+            "standard deviation of one run from another, {n} runs; the readings of each are part of it "
+            "and alone would leave {rest:n} to the mean",
+            n=n,
+            rest=digits(of_readings),
         )
         rows.append(
             Component("runs", "scatter between the runs", "A", mean.scatter, mean.unit, by_runs / mean.scatter,

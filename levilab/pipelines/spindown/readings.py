@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from analysis.errors import AnalysisError, NotPositive, TimesNotIncreasing
-from analysis.numbers import digits, how_many
+from analysis.numbers import digits
 from analysis.pulses import phases, track_of_times
 from analysis.rotation import track_of_field
 from analysis.rotation.track import WINDOW_S as FIELD_WINDOW_S
@@ -25,6 +25,7 @@ from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import findings_of, read_field_record
 from levilab.pipelines.spin.readings import track_of_record
 from levilab.pipelines.spin.words import finding_text
+from levilab.present.numbers import how_many
 from levilab.runs.events import RunEvent
 from levilab.texts.note import Note, of_file
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.numbers import digits, how_many
+from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.tilt import count_of
@@ -32,6 +32,7 @@ from levilab.present.document.blocks import Details, Listing, Note, Paragraph, P
 from levilab.present.numbers import (
     column,
     enumeration,
+    how_many,
     off,
     plain,
     reading,
@@ -44,7 +45,7 @@ from levilab.present.numbers import (
 from levilab.present.tables import Row, Table, table
 from levilab.present.units import unit as unit_row
 from levilab.runs.events import RunEvent
-from levilab.texts.text import Text
+from levilab.texts.text import Sentences, Text, text_from
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -96,7 +97,7 @@ def _law(analysis: SpinDownAnalysis) -> Iterator[str]:
 
 def _torque(law: str) -> str:
     """Return what the drag's torque depends on, as a sentence."""
-    return f"The torque of the drag is proportional to {LAWS[law].torque}."
+    return Text("The torque of the drag is proportional to {torque}.", torque=LAWS[law].torque)
 
 
 def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
@@ -112,10 +113,12 @@ def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
     spins = np.array([float(run.frequency[0]), float(run.frequency[-1])])
     loss = LAWS[fit.name].slowing(spins / reference, fit.solution) * reference / duration
     first, last = (
-        f"{digits(float(each))} Hz a second at {spin:.3g} Hz" for each, spin in zip(loss, spins, strict=True)
+        Text("{loss:n} Hz a second at {spin:.3g} Hz", loss=digits(float(each)), spin=float(spin))
+        for each, spin in zip(loss, spins, strict=True)
     )
-    which = "In the first run the" if len(analysis.runs) > 1 else "The"
-    yield f"{which} top loses {first}, and {last}."
+    several = len(analysis.runs) > 1
+    loses = "In the first run the top loses {first}, and {last}." if several else "The top loses {first}, and {last}."
+    yield Text(loses, first=first, last=last)
 
 
 def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
@@ -128,19 +131,29 @@ def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
         return
     n = _POWERS[combined.best]
     if n == 1:
-        yield f"The spin halves in {plain(math.log(2) / value.value)} s, whatever it is."
+        yield Text("The spin halves in {time:n} s, whatever it is.", time=plain(math.log(2) / value.value))
     elif n == _LAMINAR:
         off = value.value / KARMAN - 1
         u = value.u / KARMAN
-        way = "above" if off > 0 else "below"
-        compared = f"{SYMBOLS[name]} lies {digits(100 * abs(off))} % {way}"
-        karman = "von Kármán's value for a bare disc as large as the thesis's top, 2.235×10⁻⁴"
+        way = "above the value" if off > 0 else "below the value"
+        compared = Text(
+            "{symbol} lies {percent:n} % {way}", symbol=SYMBOLS[name], percent=digits(100 * abs(off)), way=way
+        )
+        karman = "von Kármán for a bare disc as large as the thesis's top, 2.235×10⁻⁴"
         if abs(off) < _DIFFERS * u:
-            yield f"{SYMBOLS[name]} agrees with {karman}."
+            yield Text("{symbol} agrees with the value of {karman}.", symbol=SYMBOLS[name], karman=karman)
         elif off > 0:
-            yield f"{compared} {karman}: rim, stem and washers drag, too, if this top is as large."
+            yield Text(
+                "{lies} of {karman}: rim, stem and washers drag, too, if this top is as large.",
+                lies=compared,
+                karman=karman,
+            )
         else:
-            yield f"{compared} {karman}: this top is smaller or heavier, if nothing drives it."
+            yield Text(
+                "{lies} of {karman}: this top is smaller or heavier, if nothing drives it.",
+                lies=compared,
+                karman=karman,
+            )
 
 
 def _exponent(analysis: SpinDownAnalysis) -> Iterator[str]:
@@ -154,19 +167,33 @@ def _exponent(analysis: SpinDownAnalysis) -> Iterator[str]:
     if exponent.value is None or not exponent.u:
         return
     away = {name: abs(exponent.value - n) / exponent.u for name, n in _POWERS.items()}
-    near = [f"{law_names([name])} ({_POWERS[name]:g})" for name, far in away.items() if far < _DIFFERS]
-    far = [f"{law_names([name])} ({_POWERS[name]:g}) by {far:.0f} u" for name, far in away.items() if far >= _DIFFERS]
-    agrees = f"agrees with {enumeration(near)}" if near else "agrees with none of the laws of one power"
-    misses = f" and misses {enumeration(far)}" if far else ""
-    yield f"With a free exponent the readings choose n = {with_uncertainty(exponent)}: that {agrees}{misses}."
+    near = [
+        Text("{law} ({n:g})", law=law_names([name]), n=_POWERS[name]) for name, far in away.items() if far < _DIFFERS
+    ]
+    far = [
+        Text("{law} ({n:g}) by {far:.0f} u", law=law_names([name]), n=_POWERS[name], far=far)
+        for name, far in away.items()
+        if far >= _DIFFERS
+    ]
+    agrees = Text("agrees with {laws}", laws=enumeration(near)) if near else "agrees with none of the laws of one power"
+    misses = Text(" and misses {laws}", laws=enumeration(far)) if far else ""
+    yield Text(
+        "With a free exponent the readings choose n = {n:n}: that {agrees}{misses}.",
+        n=with_uncertainty(exponent),
+        agrees=agrees,
+        misses=misses,
+    )
 
 
 def _tilt(analysis: SpinDownAnalysis) -> Iterator[str]:
     tilt = analysis.combined.tilt
     if tilt and tilt.value and is_seen(tilt):
         yield (
-            f"The magnet's moment points {digits(math.degrees(tilt.value))}° off the axis of the top: it wobbles with "
-            "its spin, more and more towards the fall, and the counter counts a little more than the spin."
+            Text(
+                "The magnet's moment points {degrees:n}° off the axis of the top: it wobbles with its spin, "
+                "more and more towards the fall, and the counter counts a little more than the spin.",
+                degrees=digits(math.degrees(tilt.value)),
+            )
         )
 
 
@@ -186,14 +213,25 @@ def _runs(analysis: SpinDownAnalysis) -> Iterator[str]:
         if len(known) != len(own):
             continue
         ratio = scatter / math.sqrt(sum(u**2 for u in known) / len(known))
-        share = f"{digits(100 * scatter / abs(mean.value))} %"
+        percent = digits(100 * scatter / abs(mean.value))
         if ratio > _SCATTERS:
             yield (
-                f"From one run to the next {SYMBOLS[name]} differs by {share}, {digits(ratio)} times as much as the "
-                "readings of each explain: the runs differ, and the mean is as good as their scatter lets it be."
+                Text(
+                    "From one run to the next {symbol} differs by {percent:n} %, {times:n} times as much as the "
+                    "readings of each explain: the runs differ, and the mean is as good as their scatter lets it "
+                    "be.",
+                    symbol=SYMBOLS[name],
+                    percent=percent,
+                    times=digits(ratio),
+                )
             )
         else:
-            yield f"The {len(own)} runs agree: {SYMBOLS[name]} differs by {share}, no more than their readings explain."
+            yield Text(
+                "The {n} runs agree: {symbol} differs by {percent:n} %, no more than their readings explain.",
+                n=len(own),
+                symbol=SYMBOLS[name],
+                percent=percent,
+            )
 
 
 def _constants(analysis: SpinDownAnalysis) -> Mapping[str, Estimate]:
@@ -220,7 +258,7 @@ def spindown_tables(analysis: SpinDownAnalysis) -> tuple[Table, ...]:
     quality = quality_table(analysis, QUALITY)
     count = count_table(analysis, symbols=True)
     best, *lines = _of_laws(analysis)
-    title = f"Run by run: the fit of the {analysis.combined.best} law, and unweighted straight lines"
+    title = Text("Run by run: the fit of the {law} law, and unweighted straight lines", law=analysis.combined.best)
     by_run = _by_run_table(analysis, title, [best[0], *(one for columns in lines for one in columns)])
     return _runs_table(analysis), _constants_table(analysis), quality, *([count] if count else []), by_run
 
@@ -284,8 +322,8 @@ def _quality(statistics: Statistics, runs: int) -> list[str]:
 
 
 #: For the terminal, where nothing else explains them.
-_WOBBLE_SYMBOLS = "δ: tilt of the moment; ν_r: resonance, below the last reading"
-_NUTATION = "; K, with the laws: nutation"
+_WOBBLE_SYMBOLS = "δ: tilt of the moment; ν_r: resonance, below the last reading."
+_NUTATION = "K, with the laws: nutation."
 
 
 def count_table(analysis: SpinDownAnalysis, *, symbols: bool = False) -> Table | None:
@@ -308,14 +346,14 @@ def count_table(analysis: SpinDownAnalysis, *, symbols: bool = False) -> Table |
                     without_unit(resonance) if resonance else "—",
                     plain(float(added[-1]), 2) if tilt else "—",
                     f"{rho:.2f} ± {seen.u:.2f}" if seen else "none",
-                    f"{digits(n * (1 - rho) / (1 + rho))} of {n}" if seen else f"{n}",
+                    Text("{worth:n} of {n}", worth=digits(n * (1 - rho) / (1 + rho)), n=n) if seen else str(n),
                 )
             )
         )
     tilted = any(run.has_tilt for run in analysis.runs)
     title = "What the counter sees of the wobble, by the best law"
     if tilted and symbols:
-        title += f". {_WOBBLE_SYMBOLS}{_NUTATION if len(analysis.runs) == 1 else ''}"
+        title = Sentences(f"{title}.", _WOBBLE_SYMBOLS, _NUTATION if len(analysis.runs) == 1 else "")
     return table(title, heads, rows)
 
 
@@ -391,7 +429,7 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
     return ReportPart(
         subject="spin-down",
         heading="Spin-down of a levitated top",
-        lead=f"{how_many(n, 'reading')} used",
+        lead=Text("{readings} used", readings=how_many(n, "reading")),
         result=(*_meaning(analysis), *_falls(analysis), *_laws(analysis), *_count(analysis)),
         figure=FigureText(
             title="Spin-down.",
@@ -423,7 +461,7 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
 
 def _meaning(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
     """Return what takes the spin by the best law, how fast, and the meaning of the constants."""
-    return (Paragraph(" ".join(meaning(analysis)), "What it means."),)
+    return (Paragraph(Sentences(*meaning(analysis)), "What it means."),)
 
 
 def _falls(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
@@ -434,9 +472,11 @@ def _falls(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
         if (fall := _fall(source, run))
     ]
     if len(falls) > MOST_FALLS:
-        return (Paragraph(f"{_falls_in_short(analysis, len(falls))}.", "The falls."),)
+        return (Paragraph(_falls_in_short(analysis, len(falls)), "The falls."),)
     several = len(analysis.runs) > 1
-    return tuple(Paragraph(f"{text}.", f"The fall of {name}." if several else "The fall.") for name, text in falls)
+    return tuple(
+        Paragraph(text, Text("The fall of {name:s}.", name=name) if several else "The fall.") for name, text in falls
+    )
 
 
 # --- tables --------------------------------------------------------------------------------------------
@@ -448,15 +488,18 @@ def _laws(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
     n = analysis.combined.fit(analysis.combined.best).statistics.n
     low, high = max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)
     u = "Of a mean it comes from the scatter s of the runs, u = s/√N." if several else "ν₀: the spin at first."
-    constants = f"{VALUE_U} {u}"
-    quality = (
-        "constants: how many were fitted, beside the start of each run; the exponent is common to all runs. χ²/dof is "
-        "near 1 where a law leaves nothing but the readings' own uncertainty. ΔAICc counts against a law, more than 10 "
-        "excludes it; the constants of such a law are the likeliest where neighbouring residuals may resemble each "
-        "other, so that its rms and χ² may lie above those of least squares. Weight: the law's share of the evidence "
-        "(Akaike). Order test p (Wald–Wolfowitz): how probable it is that residuals in random order change their sign "
-        "so seldom, or so often; below 0.01 they have a shape. Durbin–Watson is near 2 for noise: chance alone gives "
-        f"{low:.2f} to {high:.2f} (2 ± 4/√n, 2σ); less means a shape."
+    constants = Sentences(VALUE_U, u)
+    quality = Text(
+        "constants: how many were fitted, beside the start of each run; the exponent is common to "
+        "all runs. χ²/dof is near 1 where a law leaves nothing but the readings' own uncertainty. "
+        "ΔAICc counts against a law, more than 10 excludes it; the constants of such a law are the "
+        "likeliest where neighbouring residuals may resemble each other, so that its rms and χ² may "
+        "lie above those of least squares. Weight: the law's share of the evidence (Akaike). Order "
+        "test p (Wald–Wolfowitz): how probable it is that residuals in random order change their "
+        "sign so seldom, or so often; below 0.01 they have a shape. Durbin–Watson is near 2 for "
+        "noise: chance alone gives {low:.2f} to {high:.2f} (2 ± 4/√n, 2σ); less means a shape.",
+        low=low,
+        high=high,
     )
     out = analysis.combined.verdict.excluded
     kept = [fit for fit in analysis.combined.fits if fit.name not in out]
@@ -494,16 +537,17 @@ def _count(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
 def _run_by_run(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
     """Return straight lines and the best law's fit, a row for each run."""
     combined = analysis.combined
-    best = combined.best + " law" + (", the best" if combined.verdict.decided else "")
-    paper = (
-        f"The fit of the {best}, and beside it unweighted straight lines as one draws them on paper (ln ω, 1/ω, ω^−½ "
-        "against time)."
+    paper = Text(
+        "The fit of the {law} law{decided}, and beside it unweighted straight lines as one draws them on paper "
+        "(ln ω, 1/ω, ω^−½ against time).",
+        law=law_names([combined.best]),
+        decided=", the best" if combined.verdict.decided else "",
     )
-    several = " s: standard deviation of one run's constant from another's; the uncertainty of the mean is s/√N."
-    note = f"ν₀: the spin at the first reading.{several if len(analysis.runs) > 1 else ''}"
+    several = "s: standard deviation of one run's constant from another's; the uncertainty of the mean is s/√N."
+    note = Sentences("ν₀: the spin at the first reading.", several if len(analysis.runs) > 1 else "")
     constants = [one for columns in _of_laws(analysis) for one in columns]
     starts = tuple(run.fit(combined.best).parameters["start_frequency"] for run in analysis.runs)
-    start = _Column(_head_of(f"{combined.best} fit", "start_frequency", starts[0].unit), starts)
+    start = _Column(_head_of(combined.best, "start_frequency", starts[0].unit), starts)
     times = [_Column(one.head, one.show_all(analysis.runs)) for one in OF_RUN]
     found = _by_run_table(analysis, "", [*constants, start, *times])
     blocks = (Paragraph(paper), Tabular("spindown-runs", found, note, first_column_wraps=True))
@@ -529,7 +573,7 @@ def _constants_table(
 
 
 def _law_cells(analysis: SpinDownAnalysis, law: CombinedLaw, *, short: bool) -> tuple[str, ...]:
-    name = law.name + (" (best)" if is_best(analysis, law.name) else "")
+    name = Text("{law} (best)", law=law.name) if is_best(analysis, law.name) else law.name
     constants = [
         f"{SYMBOLS[of]} = {with_uncertainty(value)}"
         for of, value in law_constants(analysis, law.name).items()
@@ -576,11 +620,8 @@ def _of_laws(analysis: SpinDownAnalysis) -> list[list[_Column]]:
         if law.linearised
     ]
     return [
-        _of_law(f"{best.name} fit", best.constants, fits),
-        *(
-            _of_law(f"{STRAIGHT_LINES[law.name].quantity} against t", law.linearised or {}, found)
-            for law, found in lines
-        ),
+        _of_law(best.name, best.constants, fits),
+        *(_of_law(STRAIGHT_LINES[law.name].quantity, law.linearised or {}, found) for law, found in lines),
     ]
 
 
@@ -592,7 +633,8 @@ def _of_law(of: str, means: Mapping[str, Mean], runs: Sequence[Mapping[str, Esti
 
 def _head_of(of: str, name: str, unit: str) -> str:
     shown = unit_row(unit).text
-    return f"{of}\n{SYMBOLS[name]}" + (f" [{shown}]" if shown else "")
+    head = "{law} fit\n{symbol}{unit}" if of in LAWS else "{line:s} against t\n{symbol}{unit}"
+    return Text(head, law=of, line=of, symbol=SYMBOLS[name], unit=f" [{shown}]" if shown else "")
 
 
 def scatter(mean: Mean) -> Estimate | None:
@@ -609,17 +651,30 @@ def _in_words(source: Source[SpinReadings], fit: SpinDown, options: SpinDownOpti
     count, outliers = len(source.readings), len(fit.outliers)
     text = how_many(count, "reading")
     if outliers:
-        text += f", {how_many(outliers, 'outlier')} among them, {'kept' if options.keep_outliers else 'left out'}"
+        text = Text(
+            "{readings}, {outliers} among them, {kept}",
+            readings=text,
+            outliers=how_many(outliers, "outlier"),
+            kept="kept" if options.keep_outliers else "left out",
+        )
     t, nu = fit.time, fit.frequency
-    span = f"{with_decimals(t[0], 1)} s to {with_decimals(t[-1], 1)} s, {nu[0]:.2f} Hz to {nu[-1]:.2f} Hz"
-    return f"{text}; {span}", _uncertainty(source, fit, options)
+    span = Text(
+        "{first:n} s to {last:n} s, {fast:.2f} Hz to {slow:.2f} Hz",
+        first=with_decimals(t[0], 1),
+        last=with_decimals(t[-1], 1),
+        fast=float(nu[0]),
+        slow=float(nu[-1]),
+    )
+    return Text("{text}; {span}", text=text, span=span), _uncertainty(source, fit, options)
 
 
 def _uncertainty(source: Source[SpinReadings], fit: SpinDown, options: SpinDownOptions) -> str:
     """Return how large u of a reading is, and where it comes from."""
     if fit.u is None:
         return "u of a reading: not known, taken from the scatter about each law"
-    return f"u of a reading: {size_of_u(fit.u)}, {origin_of_u(source, 'spin_frequency_u_hz', options)}"
+    return Text(
+        "u of a reading: {u}, {source}", u=size_of_u(fit.u), source=origin_of_u(source, "spin_frequency_u_hz", options)
+    )
 
 
 def _residuals(source: Source[SpinReadings], fit: SpinDown, law: str) -> dict[int, float]:
@@ -644,7 +699,8 @@ def _readings(source: Source[SpinReadings], fit: SpinDown, options: SpinDownOpti
         )
         for i, (t, nu, u_) in enumerate(zip(readings.time[:shown], readings.frequency[:shown], u, strict=True))
     ]
-    note = f"Residual: reading − {best} law. {first_of(shown, len(readings))}".rstrip()
+    residual = Text("Residual: reading − {law} law.", law=law_names([best]))
+    note = Sentences(residual, first_of(shown, len(readings)))
     return Listing("spindown-readings", table("Readings", heads, rows, numbers=heads), note)
 
 
@@ -666,7 +722,10 @@ def _points_of_run(k: int, name: str, run: SpinDown, analysis: SpinDownAnalysis)
     ]
     for law in run.fits:
         left = zip(heads, law.residuals.tolist(), u, strict=True)
-        texts = tuple(f"{head}\nν − {law.name} law = {off(r, u_)} Hz" for head, r, u_ in left)
+        name = law_names([law.name])
+        texts = tuple(
+            Text("{head:n}\nν − {law} law = {off:n} Hz", head=head, law=name, off=off(r, u_)) for head, r, u_ in left
+        )
         yield Points(f"residuals-{law.name}-{k}", texts)
         if law.name == analysis.combined.best:
             yield Points(f"readings-{k}", texts)
@@ -676,15 +735,26 @@ def _points_of_run(k: int, name: str, run: SpinDown, analysis: SpinDownAnalysis)
 def _fall(source: Source[SpinReadings], fit: SpinDown) -> str:
     """Return the facts of the fall."""
     events = source.run.events() if source.run else []
-    text = next((str(event["text"]) for event in reversed(events) if event["kind"] == RunEvent.FELL), None)
-    if text is None:
+    said = next((event for event in reversed(events) if event["kind"] == RunEvent.FELL), None)
+    if said is None:
         return ""
-    last = f"last reading that was fitted {fit.frequency[-1]:.2f} Hz at {fit.time[-1]:.1f} s"
-    return f"{text[:1].upper()}{text[1:]}; {last}"
+    return Text(
+        "The last reading that was fitted is {hz:.2f} Hz at {time:.1f} s; {said}.",
+        hz=float(fit.frequency[-1]),
+        time=float(fit.time[-1]),
+        said=text_from(said.get("says"), str(said["text"])),
+    )
 
 
 def _falls_in_short(analysis: SpinDownAnalysis, seen: int) -> str:
     """Return between which spins the tops fell."""
     last = sorted(float(run.frequency[-1]) for run in analysis.runs)
-    span = f"{last[0]:.2f} Hz to {last[-1]:.2f} Hz, {last[len(last) // 2]:.2f} Hz in the middle"
-    return f"Seen in {seen} of {len(last)} runs. The last reading that was fitted is {span}"
+    span = Text(
+        "{low:.2f} Hz to {high:.2f} Hz, {middle:.2f} Hz in the middle",
+        low=last[0],
+        high=last[-1],
+        middle=last[len(last) // 2],
+    )
+    return Text(
+        "Seen in {seen} of {n} runs. The last reading that was fitted is {span}.", seen=seen, n=len(last), span=span
+    )

@@ -323,7 +323,7 @@ def _exponent(exponent: Estimate | None) -> str:
     """Return an exponent as n = 1.507 ± 0.006."""
     if exponent is None or exponent.value is None or not exponent.u:
         return "of whatever exponent"
-    return f"n = {_value(exponent)}"
+    return Text("n = {n:n}", n=_value(exponent))
 
 
 def _value(estimate: Estimate) -> str:
@@ -362,7 +362,7 @@ _MOST_TIMES = 1000
 
 def _outlier(of: Remark) -> str:
     time, frequency, off, times, stated, kept, falling = of.values
-    many = f"more than {_MOST_TIMES}" if times >= _MOST_TIMES else digits(times)
+    many = Text("more than {most}", most=_MOST_TIMES) if times >= _MOST_TIMES else digits(times)
     return Text(
         "the reading of {hz:.6g} Hz at {time:.12g} s lies {off:n} Hz from the {law} law, {many:n} times {unit}, and "
         "was {kept}{falling}",
@@ -379,75 +379,106 @@ def _outlier(of: Remark) -> str:
 
 def _few_runs(of: Remark) -> str:
     n, width = of.values
-    return (
-        f"{n:.0f} runs give their scatter, and so u of the means, to {100 / (2 * (n - 1)) ** 0.5:.0f} % only: a 68 % "
-        f"interval is {digits(width)} u to each side (Student's t)"
+    return Text(
+        "{n:.0f} runs give their scatter, and so u of the means, to {percent:.0f} % only: a 68 % "
+        "interval is {width:n} u to each side (Student's t)",
+        n=n,
+        percent=100 / (2 * (n - 1)) ** 0.5,
+        width=digits(width),
     )
 
 
-_REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyType({
-    "not converged": "the fit did not converge, the numbers are those of the best point found",
-    "no freedom": lambda of: (
-        f"{of.values[0]:.0f} parameters pass through {of.values[0]:.0f} readings, so nothing shows their uncertainty: "
-        "record more readings, or state the uncertainty of each"
-    ),
-    "not separated": "the readings do not separate the parameters, so these have no uncertainty",
-    "out of range": lambda of: (
-        f"{of.name} is too large or too small for a number, as it depends exponentially on the exponent"
-    ),
-    "negative": lambda of: (
-        f"{of.name} is negative by {of.values[0]:.1f} standard uncertainties, which no drag can be"
-    ),
-    "undetermined": lambda of: f"{of.name} is not determined, as it depends exponentially on the exponent",
-    "factor": lambda of: (
-        f"{of.name} is known only to a factor of about {digits(of.values[0])}, as it depends exponentially on the "
-        "exponent"
-    ),
-    "outlier": _outlier,
-    "calculated": Doubting(lambda of: (
-        f"the readings lie on the {of.law} law to {digits(of.values[0], 1)} Hz, too good to be measured: were they "
-        "calculated? Then no uncertainty here says anything about a top"
-    )),
-    "no u": (
-        "the readings have no uncertainties of their own: their scatter about each law stands for them, so a law that "
-        "does not fit shows only beside a better one"
-    ),
-    "understated": lambda of: Text(
-        "even the best law, {law}, misses the readings by {times:n} times their stated uncertainties, more than chance "
-        "explains: all uncertainties are enlarged; check the readings' uncertainties",
-        law=law_names([of.law or ""]), times=digits(of.values[0]),
-    ),
-    "overstated": lambda of: Text(
-        "the readings scatter only {times:n} times as much about the best law as their stated uncertainties say: are "
-        "these too large?", times=digits(of.values[0]),
-    ),
-    "few readings": lambda of: (
-        f"{of.values[0]:.0f} readings are too few to compare {of.name} by AICc: record more readings"
-    ),
-    "correlated": lambda of: Text(
-        "neighbouring residuals resemble each other: their correlation is {r:.2f} ± {u:.2f}, so {n:.0f} readings are "
-        "worth as much as {worth:n} independent ones; it is in all uncertainties",
-        r=of.values[0], u=of.values[1], n=of.values[2],
-        worth=digits(of.values[2] * (1 - of.values[0]) / (1 + of.values[0])),
-    ),
-    "changed": Doubting(lambda of: (
-        f"no law describes run {of.values[0]:.0f} of {of.values[1]:.0f}: that noise makes a change as large in any of "
-        f"the runs has p = {digits(min(of.values[1] * of.values[2], 1.0))}; look at it"
-    )),
-    "mixed u": lambda of: (
-        f"{of.values[0]:.0f} of {of.values[1]:.0f} runs give no uncertainties of their readings: theirs come from the "
-        "scatter about each law"
-    ),
-    "one run": (
-        "this is one run: another of the same top may differ by more than its u (draught, temperature, the start): "
-        "record several"
-    ),
-    "few runs": _few_runs,
-    "missing": lambda of: (
-        f"{of.values[0]:.0f} of {of.values[1]:.0f} runs have no {of.name} and are not in its mean"
-    ),
-    "scatters": lambda of: (
-        f"{SYMBOLS.get(of.name, of.name)} scatters between the runs {digits(of.values[0])} times as much as each fit's "
-        "own uncertainty explains: the runs differ, so trust the scatter, not the fit of one run"
-    ),
-})  # fmt: skip
+_REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyType(
+    {
+        "not converged": "the fit did not converge, the numbers are those of the best point found",
+        "no freedom": lambda of: Text(
+            "{n:.0f} parameters pass through {n:.0f} readings, so nothing shows their uncertainty: "
+            "record more readings, or state the uncertainty of each",
+            n=of.values[0],
+        ),
+        "not separated": "the readings do not separate the parameters, so these have no uncertainty",
+        "out of range": lambda of: Text(
+            "{name} is too large or too small for a number, as it depends exponentially on the exponent", name=of.name
+        ),
+        "negative": lambda of: Text(
+            "{name} is negative by {times:.1f} standard uncertainties, which no drag can be",
+            name=of.name,
+            times=of.values[0],
+        ),
+        "undetermined": lambda of: Text(
+            "{name} is not determined, as it depends exponentially on the exponent", name=of.name
+        ),
+        "factor": lambda of: Text(
+            "{name} is known only to a factor of about {times:n}, as it depends exponentially on the exponent",
+            name=of.name,
+            times=digits(of.values[0]),
+        ),
+        "outlier": _outlier,
+        "calculated": Doubting(
+            lambda of: Text(
+                "the readings lie on the {law} law to {hz:n} Hz, too good to be measured: were they "
+                "calculated? Then no uncertainty here says anything about a top",
+                law=of.law,
+                hz=digits(of.values[0], 1),
+            )
+        ),
+        "no u": (
+            "the readings have no uncertainties of their own: their scatter about each law stands for them, so a law "
+            "that does not fit shows only beside a better one"
+        ),
+        "understated": lambda of: Text(
+            "even the best law, {law}, misses the readings by {times:n} times their stated uncertainties, more than "
+            "chance explains: all uncertainties are enlarged; check the readings' uncertainties",
+            law=law_names([of.law or ""]),
+            times=digits(of.values[0]),
+        ),
+        "overstated": lambda of: Text(
+            "the readings scatter only {times:n} times as much about the best law as their stated uncertainties say: "
+            "are these too large?",
+            times=digits(of.values[0]),
+        ),
+        "few readings": lambda of: Text(
+            "{n:.0f} readings are too few to compare {laws} by AICc: record more readings", n=of.values[0], laws=of.name
+        ),
+        "correlated": lambda of: Text(
+            "neighbouring residuals resemble each other: their correlation is {r:.2f} ± {u:.2f}, so {n:.0f} readings "
+            "are worth as much as {worth:n} independent ones; it is in all uncertainties",
+            r=of.values[0],
+            u=of.values[1],
+            n=of.values[2],
+            worth=digits(of.values[2] * (1 - of.values[0]) / (1 + of.values[0])),
+        ),
+        "changed": Doubting(
+            lambda of: Text(
+                "no law describes run {run:.0f} of {n:.0f}: that noise makes a change as large in any of the "
+                "runs has p = {p:n}; look at it",
+                run=of.values[0],
+                n=of.values[1],
+                p=digits(min(of.values[1] * of.values[2], 1.0)),
+            )
+        ),
+        "mixed u": lambda of: Text(
+            "{some:.0f} of {all:.0f} runs give no uncertainties of their readings: theirs come from the "
+            "scatter about each law",
+            some=of.values[0],
+            all=of.values[1],
+        ),
+        "one run": (
+            "this is one run: another of the same top may differ by more than its u (draught, temperature, the start): "
+            "record several"
+        ),
+        "few runs": _few_runs,
+        "missing": lambda of: Text(
+            "{some:.0f} of {all:.0f} runs have no {name} and are not in its mean",
+            some=of.values[0],
+            all=of.values[1],
+            name=of.name,
+        ),
+        "scatters": lambda of: Text(
+            "{symbol} scatters between the runs {times:n} times as much as each fit's own uncertainty "
+            "explains: the runs differ, so trust the scatter, not the fit of one run",
+            symbol=SYMBOLS.get(of.name, of.name),
+            times=digits(of.values[0]),
+        ),
+    }
+)

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from analysis.numbers import digits, how_many
+from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, points_of, title_of
 from levilab.pipelines.row import cells_of
 from levilab.pipelines.sway.analysis import QUANTITIES
 from levilab.present.document.blocks import Listing, Paragraph, Tabular
-from levilab.present.numbers import short_name, with_decimals, with_uncertainty, without_unit
+from levilab.present.numbers import how_many, short_name, with_decimals, with_uncertainty, without_unit
 from levilab.present.tables import Table, table
 
 if TYPE_CHECKING:

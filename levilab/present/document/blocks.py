@@ -320,8 +320,11 @@ def in_language_of_reader(part: T) -> T:
         return in_language(part)  # type: ignore[return-value]
     if isinstance(part, tuple | list):
         return type(part)(map(in_language_of_reader, part))
-    if not is_dataclass(part) or isinstance(part, type | Code) or (isinstance(part, Fact) and part.code):
+    if not is_dataclass(part) or isinstance(part, type | Code):
         return part
+    if isinstance(part, Fact):
+        texts = part.texts if part.code else in_language_of_reader(part.texts)
+        return replace(part, name=in_language(part.name), texts=texts)
     said = {field.name: getattr(part, field.name) for field in fields(part) if field.name not in _NOT_SAID}
     return replace(part, **{name: in_language_of_reader(value) for name, value in said.items()})
 

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.comparison import Comparison, compare
-from analysis.numbers import digits, how_many
+from analysis.numbers import digits
 from analysis.spindown.combine import mean
 from analysis.spindown.drag import LAWS
 from analysis.uncertainty import Estimate
 from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import unquote
-from levilab.present.numbers import enumeration, plain, with_sign, with_uncertainty
+from levilab.present.numbers import enumeration, how_many, plain, with_sign, with_uncertainty
 from levilab.present.units import unit
 from levilab.texts.note import is_doubt
 

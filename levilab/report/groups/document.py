@@ -8,7 +8,6 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from analysis.numbers import how_many
 from levilab.errors import unquote
 from levilab.files import check_writable, replace_atomically
 from levilab.pipelines.suits import recall_suiting
@@ -25,7 +24,7 @@ from levilab.present.document.blocks import (
     Verdict,
     Warnings,
 )
-from levilab.present.numbers import column, enumeration, plain, with_sign, without_unit
+from levilab.present.numbers import column, enumeration, how_many, plain, with_sign, without_unit
 from levilab.present.tables import Row, table
 from levilab.report.document import banner_of, count_inputs
 from levilab.report.groups.beside import (

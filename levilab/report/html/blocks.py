@@ -27,7 +27,7 @@ from levilab.present.document.blocks import (
     Warnings,
 )
 from levilab.present.document.typesetting import typeset
-from levilab.texts.text import in_language
+from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
@@ -179,7 +179,7 @@ def _question(_: Writer, block: Question, __: int) -> Html:
 
 def _warnings(_: Writer, block: Warnings, __: int) -> Html:
     if not block.groups:
-        return element("p", "None.", class_="none")
+        return element("p", in_language("None."), class_="none")
     return element("ul", [_alike(group) for group in block.groups], class_="warnings")
 
 
@@ -187,7 +187,7 @@ def _alike(group: tuple[str, ...]) -> Html:
     if len(group) <= MOST_ALIKE:
         return join(element("li", words(text)) for text in group)
     others = element("ul", [element("li", words(text)) for text in group[1:]])
-    summary = element("summary", f"and {len(group) - 1} more like this one")
+    summary = element("summary", in_language(Text("and {n} more like this one", n=len(group) - 1)))
     return element("li", words(group[0]), element("details", summary, others))
 
 

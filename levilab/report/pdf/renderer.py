@@ -13,7 +13,6 @@ from importlib.util import find_spec
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from analysis.numbers import how_many
 from levilab.errors import LevilabError
 from levilab.present.characters import printable
 from levilab.present.document.blocks import (
@@ -34,7 +33,10 @@ from levilab.present.document.blocks import (
     Warnings,
 )
 from levilab.present.document.typesetting import typeset
+from levilab.present.numbers import how_many
 from levilab.software import how_to_install
+from levilab.texts.text import Text as Said
+from levilab.texts.text import in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -346,7 +348,7 @@ def _warnings(block: Warnings, _: _Drawing) -> Drawn:
     groups: list[Drawn] = []
     for alike in block.groups:
         if len(alike) > FEW_ALIKE:
-            more = f"and {len(alike) - 1} more like this one"
+            more = in_language(Said("and {n} more like this one", n=len(alike) - 1))
             groups.append({"first": _text(alike[0]), "more": more, "others": [_text(text) for text in alike[1:]]})
         else:
             groups += [{"first": _text(text), "more": "", "others": []} for text in alike]

@@ -8,7 +8,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
-from analysis.numbers import how_many
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.errors import UsageError
@@ -24,7 +23,7 @@ from levilab.present.document.blocks import (
     Section,
     Tabular,
 )
-from levilab.present.numbers import column
+from levilab.present.numbers import column, how_many
 from levilab.present.progress import Display
 from levilab.present.tables import table
 from levilab.report.groups.beside import class_of

@@ -92,7 +92,7 @@ def test_the_table_and_the_notes_show_what_failed():
     (row,) = crosscheck_table(found).rows
     assert row.cells[0:3] == ("made-up", "five", "392")
     assert row.cells[-1] == "NO"
-    assert failures_as_text(found[0]) == ["8 of 400 trials came to no estimate: the top fell"]
+    assert failures_as_text(found[0]) == ["8 of 400 trials came to no estimate: the top fell."]
     assert as_png(crosscheck_figure(found)).startswith(b"\x89PNG")
 
 

@@ -126,6 +126,10 @@ def test_no_text_is_of_a_sentence_that_is_said_no_more(code: str) -> None:
         | {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
     )
     said |= {re.sub(r"(_frequency)?_(hz|v|t|m|s)$", "", text).replace("_", " ") for text in said}  # heads of columns
+    named = {node.arg or "" for tree in sources().values() for node in ast.walk(tree) if isinstance(node, ast.keyword)}
+    named |= {ast.unparse(node) for tree in sources().values() for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    said |= {re.sub("_(hz|v|t|m|s|ohm|vpp)$", "", name).replace("_", " ") for name in named}  # settings
+    said |= {f"{text}s" for text in said}  # as `how_many` makes them
     said |= {text.capitalize() for text in said}  # as figures have them
     said |= {text for module in PAGE.glob("*.js") for text in re.findall(_LITERAL, module.read_text("utf-8"))}
     assert sorted(text for text in language_of(code).texts if text not in said) == []
