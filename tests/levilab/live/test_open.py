@@ -238,7 +238,7 @@ def test_a_file_that_is_too_large_leaves_nothing(hall: Hall, monkeypatch: pytest
     "wanted",
     [{"do": "look at a file", "file": "none"}, {"do": "keep"}, {"do": "analyze a file", "file": ["x"]},
      {"do": "look at a file", "file": "KEY", "options": {"device": "/etc/passwd"}},
-     {"do": "look at a file", "file": "KEY", "options": {"columns": {"speed": "1"}}},
+     {"do": "look at a file", "file": "KEY", "options": {"columns": {"colour": "1"}}},
      {"do": "look at a file", "file": "KEY", "options": {"rate": "1; rm"}},
      {"do": "keep", "file": "KEY"}],
 )  # fmt: skip
