@@ -209,13 +209,17 @@ class Run:
     def events(self) -> list[dict[str, Any]]:
         """Return the events so far, each with time_s (or None), kind and text; damaged lines are left out.
 
-        Raises DataError where the disk fails.
+        A file that cannot be read is one warning: the readings are whole.
         """
         path = self.folder / EVENTS
         try:
             lines = path.read_text(encoding="utf-8", errors="replace").split("\n") if path.is_file() else []
         except OSError as error:
-            raise DataError(f"{path}: cannot be read ({error.strerror}): restore it from a copy") from error
+            text = (
+                f"{EVENTS} cannot be read ({error.strerror}), so warnings of the run, and when a drive ended, are not "
+                "known: restore it from a copy"
+            )
+            return [{"time_s": None, "kind": RunEvent.WARNING, "text": text}]
         return [event for line in lines if (event := _event(line))]
 
     def warnings(self) -> tuple[str, ...]:

@@ -216,6 +216,21 @@ def test_damaged_events_are_left_out(tmp_path):
     assert [(event["text"], event["time_s"]) for event in events] == [("drive off", 0.0), ("fine", None)]
 
 
+def test_events_that_the_disk_does_not_give_are_a_warning_and_the_readings_are_read(tmp_path, monkeypatch):
+    folder, read = written(tmp_path), Path.read_text
+    monkeypatch.setattr(
+        Path, "read_text", lambda self, *a, **k: fail_to_read() if self.name == "events.jsonl" else read(self, *a, **k)
+    )
+    run = Run.load(folder)
+    assert run.count() > 0
+    (warning,) = run.warnings()
+    assert "events.jsonl cannot be read (Input/output error)" in warning
+
+
+def fail_to_read():
+    raise OSError(errno.EIO, "Input/output error")
+
+
 def test_a_clock_that_was_set_back_is_found_before_a_run_is_gone_on_with(tmp_path):
     ahead = (datetime.now(UTC) + timedelta(hours=1)).isoformat()
     run = Run.load(written(tmp_path))
