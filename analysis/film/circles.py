@@ -70,22 +70,29 @@ def find_top(pictures: Array) -> Circle:
     Raises:
         NoTop: nothing changes, or what changes has no rim.
     """
-    from scipy.ndimage import find_objects, gaussian_filter, label
-
-    scatter = gaussian_filter(np.std(pictures, axis=0), 1.0)
-    changes = scatter > max(_CHANGES * float(np.median(scatter)), _LEAST_CHANGE)
-    parts, count = label(changes)
-    if count == 0:
+    part = changing_part(pictures)
+    if part is None:
         raise NoTop(moving=0.0)
-    largest = 1 + int(np.argmax(np.bincount(parts.ravel())[1:]))
-    rows, columns = find_objects(parts)[largest - 1]
+    rows, columns = part
     reach = max(rows.stop - rows.start, columns.stop - columns.start) / 2
     middle = ((columns.start + columns.stop - 1) / 2, (rows.start + rows.stop - 1) / 2)
     radii = np.arange(max(reach / _REACH[1], 4.0), min(reach / _REACH[0], min(pictures.shape[1:]) / 2), 0.5)
     found = circles(np.median(pictures, axis=0), radii, middle, reach) if radii.size else []
     if not found:
-        raise NoTop(moving=float(changes.mean()))
+        raise NoTop(moving=(rows.stop - rows.start) * (columns.stop - columns.start) / pictures[0].size)
     return found[0]
+
+
+def changing_part(pictures: Array) -> tuple[slice, slice] | None:
+    """Return rows and columns of the largest part of pictures, shape (n, h, w), that changes; None: there is none."""
+    from scipy.ndimage import find_objects, gaussian_filter, label
+
+    scatter = gaussian_filter(np.std(pictures, axis=0), 1.0)
+    parts, count = label(scatter > max(_CHANGES * float(np.median(scatter)), _LEAST_CHANGE))
+    if count == 0:
+        return None
+    rows, columns = find_objects(parts)[int(np.argmax(np.bincount(parts.ravel())[1:]))]
+    return rows, columns
 
 
 def find_base(picture: Array, top: Circle) -> Circle | None:

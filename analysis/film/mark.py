@@ -37,11 +37,13 @@ class Phases:
         phase: from x towards y, downwards, 0 to 1, shape (n,) [turns].
         u: standard uncertainty of each, shape (n,) [turns].
         angle: of the mark's middle at phase 0, at which a row of the picture is read [turns].
+        share: of what changes in each picture that the pattern describes, shape (n,): little where the mark is hidden.
     """
 
     phase: Array
     u: Array
     angle: float
+    share: Array
 
 
 def phases_of(profiles: Array) -> Phases:
@@ -60,11 +62,11 @@ def phases_of(profiles: Array) -> Phases:
         pattern = np.mean(waves * _turned(-phase, waves.shape[2]), axis=0)
         phase = _agreement(np.sum(waves * pattern.conj(), axis=1))
     found = [_compare(part, still, pattern) for part in np.array_split(profiles, -(-len(profiles) // _MOST))]
-    phases, u = (np.concatenate(columns) for columns in zip(*found, strict=True))
+    phases, u, share = (np.concatenate(columns) for columns in zip(*found, strict=True))
     rays = profiles.shape[2]
     shape = np.fft.irfft(pattern, rays, axis=1)[best]
     middle = np.sum(np.abs(shape) ** 3 * np.exp(2j * np.pi * np.arange(rays) / rays))
-    return Phases(phases % 1, u, float(np.angle(middle)) / (2 * np.pi))
+    return Phases(phases % 1, u, float(np.angle(middle)) / (2 * np.pi), share)
 
 
 def without_pull(places: Waves, phase: Array) -> Waves:
@@ -97,15 +99,19 @@ def _turned(phase: Array, count: int) -> Waves:
     return np.asarray(np.exp(-2j * np.pi * np.arange(count) * phase[:, None])[:, None])
 
 
-def _compare(profiles: Array, still: Array, pattern: Waves) -> tuple[Array, Array]:
-    """Return phases of pictures by the pattern, and their standard uncertainties [turns]."""
+def _compare(profiles: Array, still: Array, pattern: Waves) -> tuple[Array, Array, Array]:
+    """Return phases of pictures by the pattern, their standard uncertainties [turns], and the share it describes."""
     waves, changing = _changes(profiles, still)
     rays = profiles.shape[2]
     phase = _agreement(np.sum(waves * pattern.conj(), axis=1))
-    rest = changing - np.fft.irfft(pattern * _turned(phase, waves.shape[2]), rays, axis=2)
+    expected = np.fft.irfft(pattern * _turned(phase, waves.shape[2]), rays, axis=2)
+    contrast = np.sum(changing * expected, axis=(1, 2)) / np.maximum(np.sum(expected**2, axis=(1, 2)), 1e-30)
+    rest = changing - contrast[:, None, None] * expected
     slope = np.fft.irfft(2j * np.pi * np.arange(waves.shape[2]) * pattern, rays, axis=1)
-    noise = np.sum(rest**2, axis=(1, 2)) / (rest[0].size / _CORRELATED - 3)
-    return phase, np.sqrt(noise / max(float(np.sum(slope**2)), 1e-30))
+    left = np.sum(rest**2, axis=(1, 2))
+    signal = np.maximum(contrast, 1e-3) ** 2 * max(float(np.sum(slope**2)), 1e-30)
+    u = np.sqrt(left / (rest[0].size / _CORRELATED - 3) / signal)
+    return phase, u, 1 - left / np.maximum(np.sum(changing**2, axis=(1, 2)), 1e-30)
 
 
 def _agreement(waves: Waves) -> Array:

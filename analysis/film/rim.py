@@ -49,13 +49,13 @@ class Rim:
 
     Attributes:
         circle: of it.
-        u: standard uncertainty of each coordinate of the centre [pixels].
+        u: standard uncertainties of both coordinates of the centre [pixels].
         contrast: step of brightness at the edge.
         profiles: brightness along the bands of the top, shape (bands, rays).
     """
 
     circle: Circle
-    u: float
+    u: tuple[float, float]
     contrast: float
     profiles: Array
 
@@ -83,34 +83,41 @@ def fit_rim(picture: Picture, start: Circle, *, width: float = 1.0, rounds: int 
     circle, reach = start, width * max(_WIDTH * start.radius, _LEAST_WIDTH)
     across = np.linspace(-reach, reach, 2 * _STEPS + 1)
     for _ in range(rounds):
-        rays = _sample(picture, circle, circle.radius + across)
-        edge = _shifts(rays, across)
-        fit = _fit_shifts(*edge) if edge else None
+        rays = sample(picture, *_along(circle, circle.radius + across))
+        edge = shifts_of(rays, across)
+        fit = fit_shifts(_rays()[2], *edge) if edge else None
         if fit is None:
             return None
-        (grow, dx, dy), spread, kept = fit
+        (grow, dx, dy, *_), spread, used = fit
         if max(abs(dx), abs(dy), abs(grow)) > 1.5 * reach:
             return None
-        circle = Circle(circle.x + dx, circle.y + dy, circle.radius + grow)
+        circle = Circle(float(circle.x + dx), float(circle.y + dy), float(circle.radius + grow))
         if max(abs(dx), abs(dy)) < _CLOSE * reach:
             break
-    pixels = min(kept, 2 * np.pi * circle.radius / _CORRELATED)
+    pixels = min(float(used.sum()), 2 * np.pi * circle.radius / _CORRELATED)
     inner = np.concatenate([np.linspace(*band, _IN_BAND) for band in _BANDS]) * circle.radius
-    profiles = _sample(picture, circle, inner).reshape(RAYS, len(_BANDS), _IN_BAND).mean(axis=2, dtype=np.float32).T
+    profiles = (
+        sample(picture, *_along(circle, inner)).reshape(RAYS, len(_BANDS), _IN_BAND).mean(axis=2, dtype=np.float32).T
+    )
     contrast = float(np.ptp(np.median(rays, axis=0)))
-    return Rim(circle, spread * math.sqrt(2 / pixels), contrast, profiles)
+    u = spread * math.sqrt(2 / pixels)
+    return Rim(circle, (u, u), contrast, profiles)
 
 
-def _sample(picture: Picture, circle: Circle, radii: Array) -> Array:
-    """Return brightness along the rays at some radii, shape (RAYS, radii)."""
+def _along(circle: Circle, radii: Array) -> tuple[Array, Array]:
+    """Return rows and columns along the rays at some radii, shape (RAYS, radii)."""
+    cosine, sine, _ = _rays()
+    return circle.y + radii * sine, circle.x + radii * cosine
+
+
+def sample(picture: Picture, rows: Array, columns: Array) -> Array:
+    """Return brightness at places, in their shape."""
     from scipy.ndimage import map_coordinates
 
-    cosine, sine, _ = _rays()
-    places = np.stack([circle.y + radii * sine, circle.x + radii * cosine])
-    return np.asarray(map_coordinates(picture, places, np.float64, order=1, mode="nearest"))
+    return np.asarray(map_coordinates(picture, np.stack([rows, columns]), np.float64, order=1, mode="nearest"))
 
 
-def _shifts(rays: Array, across: Array) -> tuple[Array, Array] | None:
+def shifts_of(rays: Array, across: Array) -> tuple[Array, Array] | None:
     """Return how far the edge of each ray is shifted [pixels], and the weights; None without an edge."""
     mean = np.median(rays, axis=0)
     slope = np.gradient(mean, across[1] - across[0])
@@ -125,18 +132,25 @@ def _shifts(rays: Array, across: Array) -> tuple[Array, Array] | None:
     return shift, np.where(good, np.minimum(size, 1.0) ** 2, 0.0)
 
 
-def _fit_shifts(shift: Array, weight: Array) -> tuple[tuple[float, float, float], float, float] | None:
-    """Return change of radius, of x and of y, the scatter of the shifts, and the sum of the weights."""
-    design = _rays()[2]
+def fit_shifts(
+    design: Array, shift: Array, weight: Array, kept: Array | float = 0.0, least_off: float = 1e-6
+) -> tuple[Array, float, Array] | None:
+    """Return what explains the shifts, the scatter that is left, and the weights; None where too few rays see an edge.
+
+    Args:
+        design: shape (rays, n).
+        shift: of `shifts_of`, shape (rays,) [pixels].
+        weight: shape (rays,).
+        kept: weight of no change, in rays, shape (n,).
+        least_off: rays that are off by less see the edge [pixels].
+    """
     used = weight
     for _ in range(_ROUNDS):
-        if np.count_nonzero(used) < _LEAST_RAYS * RAYS:
+        if np.count_nonzero(used) < _LEAST_RAYS * shift.size:
             return None
         weighted = design.T * used
-        found = np.linalg.solve(weighted @ design, weighted @ shift)
+        found = np.linalg.solve(weighted @ design + np.diag(np.broadcast_to(kept, design.shape[1])), weighted @ shift)
         rest = shift - design @ found
-        limit = _OFF * float(np.median(np.abs(rest[weight > 0]))) + 1e-6
+        limit = _OFF * float(np.median(np.abs(rest[weight > 0]))) + least_off
         used = weight * np.maximum(1 - (rest / limit) ** 2, 0.0) ** 2
-    kept = float(used.sum())
-    spread = math.sqrt(float(used @ rest**2) / kept)
-    return (float(found[0]), float(found[1]), float(found[2])), spread, kept
+    return np.asarray(found), math.sqrt(float(used @ rest**2) / float(used.sum())), used

@@ -1,6 +1,7 @@
-"""A camera that films a simulated top from above: exposure, rolling shutter, blur, noise, codec, uneven times.
+"""A camera that films a simulated top, from above or from beside: exposure, rolling shutter, blur, noise, codec, times.
 
-It draws a dark base, and a lighter top with a light mark.  Errors of lenses are not modelled.
+It draws a dark base, and a lighter top with a light mark: a strip on its face for a camera above, and on its side for
+one beside.  Errors of lenses are not modelled.
 """
 
 from __future__ import annotations
@@ -26,12 +27,15 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Radius of the rim, of the base, and of a dot on the stem [m].
-RIM, BASE, DOT = 0.015, 0.046, 0.001
+#: Radius of the rim, of the base, and of a dot on the stem; thickness of the top, and its height above the base [m].
+RIM, BASE, DOT, THICK, HEIGHT = 0.015, 0.046, 0.001, 0.008, 0.07
 #: Brightness of table, base, top, its hub and its mark.
 TABLE, DARK, TOP, HUB, MARK = 190.0, 60.0, 140.0, 40.0, 235.0
 #: Angle of the mark, to either side [rad].
 MARK_HALF = 0.25
+#: Where a camera is: unit vectors to the right and upwards in its picture, and from the top to it.
+ABOVE = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+BESIDE = ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
 #: Clock of a film's file.
 CLOCK = Fraction(1, 90000)
 
@@ -51,6 +55,7 @@ class Camera:
         away: where the middle of the base is in the picture, from its middle [pixels].
         stem: height of a light dot on the stem above the rim; 0: there is none [m].
         distance: of the camera from the rim at its mean height; infinite: no perspective [m].
+        pose: ABOVE or BESIDE.
     """
 
     width: int = 224
@@ -64,10 +69,11 @@ class Camera:
     away: tuple[float, float] = (5.3, -3.7)
     stem: float = 0.0
     distance: float = math.inf
+    pose: tuple[tuple[float, float, float], ...] = ABOVE
 
     @property
     def middle(self) -> tuple[float, float]:
-        """Where the axis of the base is [pixels]."""
+        """Where the axis of the base is at the top's mean height [pixels]."""
         return (self.width - 1) / 2 + self.away[0], (self.height - 1) / 2 + self.away[1]
 
 
@@ -92,10 +98,17 @@ class Flight:
     rise: Array
     lean: Array
 
-    def stem_at(self, time: float) -> tuple[float, float, float]:
-        """Return the rise [m] and the lean at a time."""
-        rise, x, y = (float(np.interp(time, self.times, one)) for one in (self.rise, *self.lean.T))
-        return rise, x, y
+    def pose_at(self, times: Array) -> tuple[Array, Array]:
+        """Return the rim's centre, shape (n, 3) [m], and the body's axes as columns, shape (n, 3, 3), at times."""
+        x, y, yaw, tilt = self.at(times)
+        rise, *lean = (np.interp(times, self.times, one) for one in (self.rise, *self.lean.T))
+        axis = np.stack([*lean, np.sqrt(1 - lean[0] ** 2 - lean[1] ** 2)], axis=-1)
+        c, s = np.cos(yaw), np.sin(yaw)
+        body = np.empty((*times.shape, 3, 3))
+        body[..., :2, :2] = np.stack([c, -s, s, c], axis=-1).reshape(-1, 2, 2) @ tilt
+        body[..., 2, :2] = -np.einsum("ni,nij->nj", axis[:, :2], body[..., :2, :2]) / axis[:, 2:]
+        body[..., 2] = axis
+        return np.stack([x, y, rise], axis=-1), body
 
     def at(self, times: Array) -> tuple[Array, Array, Array, Array]:
         """Return x, y, yaw and tilt at times."""
@@ -139,17 +152,20 @@ class Pictures:
         self._noise = camera.noise * self._random.standard_normal(size, dtype=np.float32)
         x0, y0 = camera.middle
         rows, columns = np.ogrid[: camera.height, : camera.width]
+        beside = camera.pose == BESIDE
         away = np.hypot(columns - x0, rows - y0) - BASE / camera.scale
-        texture = 10 * np.sin(columns / 17.0) * np.cos(rows / 23.0)
+        if beside:
+            away = np.maximum(np.abs(columns - x0) - BASE / camera.scale, y0 + HEIGHT / camera.scale - rows)
+        texture = (2 if beside else 10) * np.sin(columns / 17.0) * np.cos(rows / 23.0)
         self.background = TABLE + texture + (DARK - TABLE - 0.7 * texture) * _edge(-away / camera.blur)
 
     def take(self, time: float) -> Array:
         """Return the picture whose first row is read at a time, without noise."""
         camera = self._camera
         x0, y0 = camera.middle
-        at = self._flight.at(np.array([time]))
+        centre = np.array(camera.pose)[:2] @ self._flight.pose_at(np.array([time]))[0][0] / camera.scale
         reach = RIM / camera.scale + 8
-        left, up = (round(v - reach) for v in (x0 + at[0][0] / camera.scale, y0 - at[1][0] / camera.scale))
+        left, up = round(x0 + centre[0] - reach), round(y0 - centre[1] - reach)
         size = round(2 * reach)
         columns, rows = np.arange(left, left + size), np.arange(up, up + size)
         picture = np.array(self.background)
@@ -162,31 +178,50 @@ class Pictures:
         return np.asarray(camera.exposure * ((np.arange(camera.parts) + 0.5) / camera.parts - 0.5))
 
     def _top(self, columns: Any, rows: Any, time: float, behind: Array) -> Array:
+        """Return the top in front of some pixels: each looks along a line o + s d, in the axes of the body."""
         camera = self._camera
         x0, y0 = camera.middle
-        x, y, yaw, tilt = self._flight.at(time + rows * camera.line_time)
-        rise, lean_x, lean_y = self._flight.stem_at(time + float(np.mean(rows)) * camera.line_time)
-        scale, above = camera.scale * (1 - rise / camera.distance), camera.stem
-        c, s = np.cos(yaw), np.sin(yaw)
-        body = np.stack([c, -s, s, c], axis=-1).reshape(-1, 2, 2) @ tilt
-        inverse = np.linalg.inv(body).astype(np.float32)
-        right = ((columns - x0) * scale - x[:, None]).astype(np.float32)
-        forth = ((y0 - rows) * scale - y)[:, None].astype(np.float32)
-        a = inverse[:, 0, 0, None] * right + inverse[:, 0, 1, None] * forth
-        b = inverse[:, 1, 0, None] * right + inverse[:, 1, 1, None] * forth
-        away = np.hypot(a, b)
+        right, up, back = (np.array(one) for one in camera.pose)
+        centre, body = self._flight.pose_at(time + rows * camera.line_time)
+        across, along = np.broadcast_arrays((columns - x0) * camera.scale, (y0 - rows)[:, None] * camera.scale)
+        o = across[..., None] * right + along[..., None] * up
+        d = o / camera.distance - back
+        o = (o - centre[:, None]) @ body
+        d = d @ body
         soft = camera.blur * camera.scale
+        inside, top = (self._side if camera.pose == BESIDE else self._face)(o, d, soft)
+        if camera.stem:
+            nearest = o - (0, 0, camera.stem)
+            nearest = nearest - np.sum(nearest * d, axis=2, keepdims=True) / np.sum(d * d, axis=2, keepdims=True) * d
+            top += (MARK - top) * _edge((DOT - np.linalg.norm(nearest, axis=2)) / soft)
+        return np.asarray(behind + (top - behind) * _edge(inside / soft))
+
+    @staticmethod
+    def _face(o: Array, d: Array, soft: float) -> tuple[Array, Array]:
+        """Return how far inside its rim lines meet the face of the top [m], and its brightness there."""
+        place = o[..., :2] - (o[..., 2:] / d[..., 2:]) * d[..., :2]
+        a, b = place[..., 0], place[..., 1]
+        away = np.hypot(a, b)
         mark = _edge((a * np.sin(MARK_HALF) - np.abs(b) * np.cos(MARK_HALF)) / soft) * _edge((away - 0.35 * RIM) / soft)
         mark *= _edge((0.93 * RIM - away) / soft)
-        hub = _edge((0.2 * RIM - away) / soft)
         top = TOP + (MARK - TOP) * mark
-        top += (HUB - top) * hub
-        if above:
-            nearer = 1 - above / camera.distance
-            across = nearer * (columns - x0) * scale - x[:, None] - above * lean_x
-            along = (nearer * (y0 - rows) * scale - y)[:, None] - above * lean_y
-            top += (MARK - top) * _edge((DOT - np.hypot(across, along)) / soft)
-        return np.asarray(behind + (top - behind) * _edge((RIM - away) / soft))
+        return RIM - away, top + (HUB - top) * _edge((0.2 * RIM - away) / soft)
+
+    @staticmethod
+    def _side(o: Array, d: Array, soft: float) -> tuple[Array, Array]:
+        """Return how far inside its outline lines meet the side of the top [m], and its brightness there."""
+        level = np.hypot(d[..., 0], d[..., 1])
+        aside = (o[..., 0] * d[..., 1] - o[..., 1] * d[..., 0]) / level
+        nearest = -(o[..., 0] * d[..., 0] + o[..., 1] * d[..., 1]) / level**2  # to the axis
+        half = np.sqrt(np.maximum(RIM**2 - aside**2, 0.0))  # of the chord
+        slope = d[..., 2] / level
+        middle = o[..., 2] + nearest * d[..., 2] + THICK / 2
+        inside = np.minimum(RIM - np.abs(aside), THICK / 2 + np.abs(slope) * half - np.abs(middle))
+        hit = nearest - half / level
+        angle = np.arctan2(o[..., 1] + hit * d[..., 1], o[..., 0] + hit * d[..., 0])
+        of_side = THICK / 2 - np.abs(middle - slope * half)
+        mark = _edge((MARK_HALF - np.abs(angle)) * np.maximum(half, soft) / soft) * _edge(of_side / soft)
+        return inside, TOP + (MARK - TOP) * mark
 
     def noisy(self, picture: Array) -> NDArray[np.uint8]:
         """Return a picture as a sensor has it."""

@@ -307,6 +307,9 @@ class VideoOptions(InputOptions):
         "Scale: metres in a pixel, at the top.", kind=float, metavar="M", typed="scale", unit="m", above=0.0,
     ))  # fmt: skip
     camera_m: float | None = _length("With --height: distance of the camera from the base.", "camera")
+    beside: bool = field(default=False, metadata=_about(
+        "The camera is beside the top, at its height: it shows one coordinate, the height and the lean.", kind=bool,
+    ))  # fmt: skip
     stem_m: float | None = _length("Height above the rim of a light dot on the stem, which shows the tilt.", "stem")
     height_m: float | None = field(default=None, metadata=_HEIGHT)
     start_s: float | None = field(default=None, metadata=_about(

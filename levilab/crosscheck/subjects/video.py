@@ -1,13 +1,14 @@
-"""A top in full motion that a phone films from above: its spin and its place."""
+"""A top in full motion that phones film from above and from beside: its spin and its place."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.uncertainty import Estimate
-from levilab.animation.camera import RIM, Camera, film, flight_of, phone_times
+from levilab.animation.camera import BESIDE, RIM, THICK, Camera, film, flight_of, phone_times
 from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.crosscheck.subjects.sway import draw_scene
@@ -70,7 +71,31 @@ def trial(seed: int, folder: Path) -> list[Pull]:
         pull_of("spin of a second", Estimate(second, u, "Hz"), _slope(flight.times, turns, time + late, _HALF_S)),
         *_places(found, picture, flight.at(found.time[picture : picture + 1] + late), camera),
         *_precession(found, flight, late),
+        *_beside(flight, seconds, by, seed, folder),
     ]
+
+
+def _beside(flight: Flight, seconds: float, by: np.random.Generator, seed: int, folder: Path) -> Iterator[Pull]:
+    """Yield the pulls of spin, place and height in a film of the same top from beside."""
+    camera = draw_camera(by)
+    low = (camera.away[0], camera.away[1] - 45)  # the top above the middle of the picture, so that the base is seen
+    camera = replace(camera, pose=BESIDE, stem=0.0, height=224, away=low)
+    path = film(folder / "side.mp4", camera, flight, phone_times(seconds), seed=seed)
+    analysis = ANALYSES["video"]
+    seen = {"rim_m": 2 * RIM, "beside": True, "line_time_s": camera.line_time}
+    (found,) = analysis.analyze([path], analysis.options_from(seen)).runs
+    if found.turning is None or found.scale.value is None:
+        raise TrialFailed("no spin is found from beside")
+    turns = np.abs(flight.yaw) / (2 * np.pi)
+    yield pull_of("spin from beside", found.spin, _slope(flight.times, turns, found.turning.middle, seconds / 2))
+    picture = int(by.integers(found.time.size))
+    centre, body = flight.pose_at(found.time)
+    middle = centre - THICK / 2 * body[:, :, 2]  # of the side
+    factor = camera.scale / found.scale.value
+    for name, place, of, true in (("place from beside", found.x, 0, 0), ("height from beside", found.y, 1, 2)):
+        off = middle[:, true] - middle[:, true].mean()
+        u = factor * float(found.u[picture, of])
+        yield pull_of(name, Estimate(factor * float(place[picture]), u, "m"), float(off[picture]))
 
 
 def _precession(found: Video, flight: Flight, late: float) -> Iterator[Pull]:
@@ -100,8 +125,10 @@ def _places(found: Video, picture: int, true: Sequence[Array], camera: Camera) -
     factor = camera.scale / (found.scale.value or 1.0)
     (left, up), (x0, y0) = found.origin, camera.middle
     for middle, seen, at in zip((left - x0, y0 - up), (found.x, found.y), true, strict=False):
-        place = Estimate(middle * camera.scale + factor * float(seen[picture]), factor * float(found.u[picture]), "m")
+        place = Estimate(
+            middle * camera.scale + factor * float(seen[picture]), factor * float(found.u[picture].mean()), "m"
+        )
         yield pull_of("place", place, float(at[0]))
 
 
-SUBJECT = Subject("video", "a film of a top in full motion from above: spin and place", trial, trials=24)
+SUBJECT = Subject("video", "films of a top in full motion from above and from beside: spin and place", trial, trials=24)

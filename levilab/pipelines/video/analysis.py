@@ -1,4 +1,4 @@
-"""Rim and mark in the pictures of a film → place and spin in SI, with a scale and notes on doubts."""
+"""Rim or side, and mark, in the pictures of a film → place and spin in SI, with a scale and notes on doubts."""
 
 from __future__ import annotations
 
@@ -46,7 +46,8 @@ QUANTITIES = (
     Quantity("reference_time", "s", "time of the spin", "middle of the film", of="turning.middle", has_u=False,
              optional=True),
     Quantity("precession", "Hz", "precession in the middle of the film", optional=True),
-    Quantity("stem_precession", "Hz", "precession by the dot on the stem", of="leaning.middle", optional=True),
+    Quantity("stem_precession", "Hz", "precession by the lean: a dot on the stem, or the side", of="leaning.middle",
+             optional=True),
     Quantity("tilt", "rad", "amplitude of the precession", "tilt", of="leaning.tilt", optional=True),
     Quantity("vertical_swing", "Hz", "swing up and down", of="rising.swing", optional=True),
     Quantity("vertical_amplitude", "m", "amplitude of the swing up and down", of="rising.amplitude", optional=True,
@@ -73,6 +74,11 @@ _SLOWER = 1.2
 _EDGE_U = 0.3
 #: Radius of the middle of the mark, in radii of the rim.
 _MARK = 0.65
+#: From beside: the mark is in front within this angle [turns], and describes this share of what changes there; nearer
+#: than this to an end of the side it hides it [turns].
+_FRONT, _SHOWS_MARK, _END = 0.15, 0.5, 0.13
+#: A mark that turns more slowly would be seen in front in all pictures [Hz].
+_STANDS = 1.0
 #: The nearest choice is the one that was meant if it is nearer than the next one by this factor.
 _NEARER = 0.5
 #: A slope of the spin counts from this number of standard uncertainties on.
@@ -117,6 +123,8 @@ def read_film(path: Path, options: VideoOptions) -> FilmReadings:
     camera, height = options.camera_m, options.height_m
     if (camera is None) != (height is None):
         raise UsageError("camera", "goes with `height`: the top is nearer to the camera than the base")
+    if options.beside and (base := [name for name in ("base", "camera", "stem") if getattr(options, f"{name}_m")]):
+        raise UsageError(base[0], "goes with a camera above the top: for one beside it give `rim` or `scale`")
     if camera is not None and (options.scale_m is not None or not 0 < (height or 0) < camera):
         raise UsageError("camera", "goes with `base` or `rim`, and is greater than `height`")
     if options.stop_s is not None and (options.start_s or 0.0) >= options.stop_s:
@@ -129,11 +137,12 @@ class Video:
     """Place and spin of a top in a film.
 
     Attributes:
+        beside: the camera is beside the top; else above.
         start: of the first picture, by the file [s].
         time: of the place, shape (n,) [s].
         x: to the right, from `origin`, shape (n,) [m].
-        y: upwards in the picture, shape (n,) [m].
-        u: standard uncertainty of each place, without that of the scale, shape (n,) [m].
+        y: upwards in the picture, which is the height from beside, shape (n,) [m].
+        u: standard uncertainties of x and y, without that of the scale, shape (n, 2) [m].
         scale: at the top [m a pixel].
         origin: middle of the base where it gives the scale, else the mean place [pixels].
         radius: of the rim [pixels].
@@ -149,6 +158,7 @@ class Video:
         warnings: doubts about the numbers, and parts of the film that are left out.
     """
 
+    beside: bool
     start: float
     time: Array
     x: Array
@@ -190,7 +200,8 @@ class Video:
     @property
     def text(self) -> str:
         """Place, spin, precession and fall, in a few sentences."""
-        place = f"x stays within {1e3 * np.ptp(self.x):.2f} mm and y within {1e3 * np.ptp(self.y):.2f} mm"
+        wide, high = (1e3 * np.ptp(one) for one in (self.x, self.y))
+        place = f"x stays within {wide:.2f} mm and {'z' if self.beside else 'y'} within {high:.2f} mm"
         text = f"{self.pictures}: {place}, u of a place is {1e3 * np.median(self.u):.3f} mm."
         if self.spin and self.turning:
             sense = "clockwise" if self.turning.frequency > 0 else "counter-clockwise"
@@ -199,7 +210,7 @@ class Video:
             text += f" The precession is {with_uncertainty(self.precession)}."
         if self.leaning and self.leaning.middle and self.leaning.tilt:
             about = f"{with_uncertainty(self.leaning.middle)}, with a tilt of {with_uncertainty(self.leaning.tilt)}"
-            text += f" By the dot on the stem it is {about}."
+            text += f" The precession by the lean is {about}."
         if self.rising and self.rising.swing:
             text += f" The top swings up and down at {with_uncertainty(self.rising.swing)}."
         if self.fall:
@@ -218,7 +229,8 @@ def analyze_source(source: Source[FilmReadings], options: VideoOptions) -> Video
     bar = ShareBar("following the top", line_every=30.0)
     try:
         start, stop = options.start_s or 0.0, np.inf if options.stop_s is None else options.stop_s
-        return _video(film, options, follow(film, start, stop, bar, with_dot=bool(options.stem_m)))
+        followed = follow(film, start, stop, bar, with_dot=bool(options.stem_m), beside=options.beside)
+        return _video(film, options, followed)
     except AnalysisError as error:
         raise DataError(f"{film.path}: {error}") from error
     finally:
@@ -235,30 +247,69 @@ def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:
         raise SlowMotion(rate=followed.rate, captured=film.captured, spin=None)
     factor = 1.0 if options.rate is None else followed.rate / options.rate
     line_time = options.line_time_s or 0.0
-    times = factor * followed.times
+    times, rate = factor * followed.times, followed.rate / factor
     phases = phases_of(followed.profiles)
     angles = 2 * np.pi * (phases.phase + phases.angle)
-    places = without_pull(followed.x + 1j * followed.y, phases.phase)
-    followed = replace(followed, x=places.real, y=places.imag)
-    rows = followed.y + _MARK * followed.radius * np.sin(angles)
-    late = np.zeros_like(rows) if line_time else rows
-    rate = followed.rate / factor
-    turning, choices, problem = _turn(times + line_time * rows, phases, late, options, rate)
+    if options.beside:  # the mark is seen in front, and its row stays
+        front = np.abs((phases.phase + phases.angle + 0.5) % 1 - 0.5) < _FRONT
+        marked = (phases.share > _SHOWS_MARK) & front
+        rows = followed.y
+    else:
+        marked = np.ones(times.size, dtype=bool)
+        places = without_pull(followed.x + 1j * followed.y, phases.phase)
+        followed = replace(followed, x=places.real, y=places.imag)
+        rows = followed.y + _MARK * followed.radius * np.sin(angles)
+    # from beside the phase swings with the place, too: the line of sight turns by 2 mrad each mm, 0.4 m away
+    late = np.zeros_like(rows) if line_time and not options.beside else rows
+    seen = times + line_time * rows
+    turning, choices, problem = _turn(seen[marked], _part(phases, marked), late[marked], options, rate)
     scale, base = _scale(film, options, followed), followed.base
     assert scale.value is not None
     size = scale.value
+    if options.beside and turning is not None:
+        clear = _mark_is_off_the_ends(seen, phases, marked, turning)
+        followed, times = _of_pictures(followed, clear), times[clear]
+        turning = replace(turning, smooth=np.interp(times, seen[marked], turning.smooth))
     centred = options.base_m is not None and base is not None
     left, up = (base.x, base.y) if centred and base else (float(followed.x.mean()), float(followed.y.mean()))
     times, x, y = times + line_time * followed.y, size * (followed.x - left), size * (up - followed.y)
     away = _distance(options)
-    leaning = leaning_of(times, _lean(film, options, followed, phases, size)) if options.stem_m else None
-    rising = rising_of(times, followed.radius, away) if away else None
+    leaning, rising = None, None
+    if options.beside:
+        leaning, rising = leaning_of(times, np.sin(followed.turn)), rising_of(times, y)
+    elif options.stem_m:
+        leaning = leaning_of(times, _lean(film, options, followed, phases, size))
+    if away:
+        rising = rising_of(times, away * (1 - followed.radius.mean() / followed.radius))
     fall, at_fall = _fall(times, x, y, turning, 1 / rate) if followed.ended == "lost" else (None, None)
     return Video(
-        float(followed.times[0]), times, x, y, size * followed.u, scale, (left, up), float(np.median(followed.radius)),
-        base, float(angles[0]) if choices else None, turning, choices, _precession(times, x + 1j * y), leaning, rising,
-        fall, at_fall, (*_notes(options, followed, leaning), *_notes_on_spin(turning, choices, problem, rate, options)),
+        options.beside, float(followed.times[0]), times, x, y, size * followed.u, scale, (left, up),
+        float(np.median(followed.radius)), base, float(angles[0]) if choices and not options.beside else None, turning,
+        choices, None if options.beside else _precession(times, x + 1j * y), leaning, rising, fall, at_fall,
+        (*_notes(options, followed, leaning), *_notes_on_spin(turning, choices, problem, rate, options)),
     )  # fmt: skip
+
+
+def _part(phases: Phases, chosen: NDArray[np.bool_]) -> Phases:
+    return replace(phases, phase=phases.phase[chosen], u=phases.u[chosen], share=phases.share[chosen])
+
+
+def _of_pictures(followed: Followed, chosen: NDArray[np.bool_]) -> Followed:
+    """Return the top in some of the pictures."""
+    count = followed.times.size
+    columns = {name: value for name, value in vars(followed).items() if np.shape(value)[:1] == (count,)}
+    return replace(followed, **{name: value[chosen] for name, value in columns.items()})
+
+
+def _mark_is_off_the_ends(
+    times: Array, phases: Phases, marked: NDArray[np.bool_], turning: Turning
+) -> NDArray[np.bool_]:
+    """Return in which pictures the mark does not hide an end of the side, which shifts the place by a pixel."""
+    speed = np.interp(times, times[marked], turning.smooth)
+    turns = np.concatenate([[0.0], np.cumsum(np.diff(times) * (speed[1:] + speed[:-1]) / 2)])
+    start = np.exp(2j * np.pi * (phases.phase + phases.angle - turns)[marked]).mean()
+    angle = turns + np.angle(start) / (2 * np.pi)
+    return np.asarray(np.abs(angle % 0.5 - 0.25) > _END)
 
 
 def _distance(options: VideoOptions) -> float | None:
@@ -309,6 +360,8 @@ def _turn(
         found = spins_of_start(times, phases.phase, phases.u)
     except NoMark as error:
         return None, (), str(error)
+    if options.beside:
+        found = [(f, chi) for f, chi in found if abs(f) > _STANDS]
     choices, slow = choices_of(found, options.near)
     if not choices:
         if slow:

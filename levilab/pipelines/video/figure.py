@@ -47,7 +47,10 @@ def _draw(axes: Axes, source: Source[FilmReadings], run: Video) -> None:
     x, y = left + run.x / size, up - run.y / size
     if run.base is not None:
         axes.add_patch(Ring((run.base.x, run.base.y), run.base.radius, fill=False, color=GREEN, label="base"))
-    axes.add_patch(Ring((x[0], y[0]), run.radius, fill=False, color=VERMILION, label="rim"))
+    if run.beside:
+        axes.plot(x[0] + run.radius * np.array([-1, 1]), [y[0], y[0]], color=VERMILION, marker="|", label="width")
+    else:
+        axes.add_patch(Ring((x[0], y[0]), run.radius, fill=False, color=VERMILION, label="rim"))
     if run.mark is not None:
         reach = run.radius * np.array([0.35, 1.0])
         axes.plot(x[0] + reach * np.cos(run.mark), y[0] + reach * np.sin(run.mark), color=YELLOW, label="mark")

@@ -1,4 +1,4 @@
-"""The dot on the stem, and the size of the rim → how the top leans, precesses and rises."""
+"""The dot on the stem or the turn of the side, and the height → how the top leans, precesses and rises."""
 
 from __future__ import annotations
 
@@ -63,21 +63,25 @@ class Rising:
     amplitude: Estimate | None
 
 
-def leaning_of(times: Array, offsets: NDArray[np.complex128]) -> Leaning | None:
+def leaning_of(times: Array, offsets: NDArray[np.complex128] | Array) -> Leaning | None:
     """Return how a top leans; None where its dot is not seen.
 
     Args:
         times: shape (n,) [s].
-        offsets: of the dot from the middle of the rim over its height, NaN where it is not seen, shape (n,).
+        offsets: of the dot from the middle of the rim over its height, NaN where it is not seen, shape (n,); real
+            numbers from beside, where the sense of the precession is not seen.
     """
     seen = np.isfinite(offsets.real)
     if seen.mean() < _SEEN:
         return None
     lean = np.interp(times, times[seen], offsets[seen].real) + 1j * np.interp(times, times[seen], offsets[seen].imag)
     lean -= lean.mean()
+    # a real swing is two lines of half its amplitude
+    lines = 1 if np.iscomplexobj(offsets) else 2
     seconds = [(times[part].mean(), swing_of(times[part], lean[part], PRECESSION_HZ)) for part in windows_of(times)]
-    rows = [(t, one.frequency, one.u, one.amplitude, one.u_amplitude) for t, one in seconds if one is not None]
+    rows = [(t, one.frequency, one.u, lines * one.amplitude, lines * one.u_amplitude) for t, one in seconds if one]
     time, frequency, u, size, u_size = np.array(rows).reshape(-1, 5).T
+    frequency = frequency if lines == 1 else np.abs(frequency)
     middle = _in_the_middle(time - (times[0] + times[-1]) / 2, frequency, u) if time.size else None
     tilt = Estimate(float(size.mean()), float(np.sqrt(np.sum(u_size**2))) / size.size, "rad") if time.size else None
     return Leaning(lean.real, lean.imag, time, frequency, np.hypot(u, _MODULATED * frequency), middle, tilt)
@@ -95,15 +99,13 @@ def _in_the_middle(late: Array, frequency: Array, u: Array) -> Estimate:
     return Estimate(value, float(np.sqrt(inverse[0, 0] * max(worse, 1.0))), "Hz")
 
 
-def rising_of(times: Array, radius: Array, distance: float) -> Rising:
-    """Return how a top rises, by the size of its rim.
+def rising_of(times: Array, z: Array) -> Rising:
+    """Return how a top rises.
 
     Args:
         times: shape (n,) [s].
-        radius: of the rim, shape (n,) [pixels].
-        distance: of the camera from the rim [m].
+        z: height above its mean, shape (n,) [m].
     """
-    z = distance * (1 - radius.mean() / radius)
     one: Swing | None = swing_of(times, z.astype(np.complex128), VERTICAL_HZ)
     if one is None:
         return Rising(z, None, None)

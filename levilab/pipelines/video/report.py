@@ -28,16 +28,21 @@ def video_tables(analysis: VideoAnalysis) -> tuple[Table, ...]:
     found = [any(one.find(run) for run in analysis.runs) for one in QUANTITIES]
     rows = [(one.head, *row) for one, row, any_ in zip(QUANTITIES, cells, found, strict=True) if any_]
     heads = ("", *(short_name(source.name) for source in analysis.sources))
-    return (table(title_of("Top from above", analysis.sources, "film"), heads, rows, numbers=heads[1:]),)
+    return (table(title_of("Top in a film", analysis.sources, "film"), heads, rows, numbers=heads[1:]),)
 
 
 def video_columns(analysis: VideoAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
     """Yield place and smooth spin in the pictures of each film."""
     for run in analysis.runs:
+        lasting = {"time_s": run.time, "x_m": run.x, "x_u_m": run.u[:, 0]}
         spin = {"spin_frequency_hz": np.abs(run.turning.smooth)} if run.turning else {}
         lean = {"axis_x": run.leaning.x, "axis_y": run.leaning.y} if run.leaning else {}
+        if run.beside:
+            lean.pop("axis_y", None)
+            yield {**lasting, "z_m": run.y, "z_u_m": run.u[:, 1], **lean, **spin}
+            continue
         rise = {"z_m": run.rising.z} if run.rising else {}
-        yield {"time_s": run.time, "x_m": run.x, "x_u_m": run.u, "y_m": run.y, "y_u_m": run.u, **rise, **lean, **spin}
+        yield {**lasting, "y_m": run.y, "y_u_m": run.u[:, 1], **rise, **lean, **spin}
 
 
 def video_files(analysis: VideoAnalysis) -> dict[str, str]:
@@ -68,7 +73,7 @@ def video_part(analysis: VideoAnalysis) -> ReportPart:
     (values,) = video_tables(analysis)
     return ReportPart(
         subject="film of a top",
-        heading="A floating top, filmed from above",
+        heading="A floating top, filmed",
         lead=f"{sum(run.time.size for run in analysis.runs)} pictures",
         result=(Tabular("video-values", values, f"{VALUE_U} The scale is common to all places, and not in their u."),),
         figure=FigureText(

@@ -1,9 +1,9 @@
-"""A film → where the rim is in each picture, and the light along the bands of the top."""
+"""A film → where the rim or the side is in each picture, and the light along the bands of the top."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from analysis.film.circles import Circle, coarse, find_base, find_top
 from analysis.film.dot import find_dot
 from analysis.film.errors import CameraMoved, HandInView
 from analysis.film.rim import Rim, fit_rim
+from analysis.film.side import Side, find_side, fit_side
 from analysis.film.view import compare_views
 from levilab.errors import DataError
 from levilab.formats.film import pictures
@@ -38,6 +39,8 @@ _SHIFT, _SHIFT_U = 0.5, 6.0
 _AROUND, _LEAST_BACKGROUND = 1.8, 0.05
 #: A rim has the same radius, but for its height, to this part.
 _SAME_RADIUS = 0.15
+#: Part of a change of the width of the side that is believed from one picture to the next.
+_SLOWLY = 0.05
 #: Its edge has the same contrast, but for light and focus, at least to this part.
 _SAME_CONTRAST = 0.4
 #: A top that is not seen for longer is lost [s].
@@ -59,10 +62,11 @@ class Followed:
         times: of the pictures with a rim, by the file, shape (n,) [s].
         x: of the centre, from the left, shape (n,) [pixels].
         y: from above, shape (n,) [pixels].
-        u: standard uncertainty of each, shape (n,) [pixels].
+        u: standard uncertainties of both, shape (n, 2) [pixels].
         radius: of the rim, shape (n,) [pixels].
         profiles: shape (n, bands, rays).
         dots: x + iy of the dot on the stem, NaN where it is not seen; zeros: not looked for, shape (n,) [pixels].
+        turn: of the side, clockwise in the picture; zeros: seen from above, shape (n,) [rad].
         base: the circle of the base; None: not seen.
         rate: pictures in a second, by their times.
         missed: pictures in between in which no rim was seen.
@@ -76,6 +80,7 @@ class Followed:
     radius: Array
     profiles: Array
     dots: NDArray[np.complex128]
+    turn: Array
     base: Circle | None
     rate: float
     missed: int
@@ -83,7 +88,7 @@ class Followed:
 
 
 def follow(
-    film: Film, start: float, stop: float, progress: Callable[[float], None], *, with_dot: bool = False
+    film: Film, start: float, stop: float, progress: Callable[[float], None], *, with_dot: bool, beside: bool
 ) -> Followed:
     """Follow the top through a film.
 
@@ -93,6 +98,7 @@ def follow(
         stop: until when [s].
         progress: called with the share that is done.
         with_dot: a dot on the stem is followed, too.
+        beside: the camera is beside the top.
 
     Raises:
         NoFilm: it cannot be read.
@@ -100,9 +106,9 @@ def follow(
         AnalysisError: no top, a hand, a moving camera.
     """
     first, still, factor = _beginning(film, start, stop)
-    top = find_top(first)
+    top = find_side(first) if beside else find_top(first)
     background = np.median(first, axis=0)
-    base = _fit_base(still, background, top, factor)
+    base = None if isinstance(top, Side) else _fit_base(still, background, top, factor)
     watch = _Watch(background, top, factor)
     if watch.share_of_background < _LEAST_BACKGROUND:
         raise DataError(f"{film.path}: the top fills the picture: film it from farther away, with the base round it")
@@ -151,9 +157,9 @@ def _fit_base(still: Picture, background: Array, top: Circle, factor: int) -> Ci
 class _Watch:
     """Compares the view with that of the beginning."""
 
-    def __init__(self, background: Array, top: Circle, factor: int) -> None:
+    def __init__(self, background: Array, top: Circle | Side, factor: int) -> None:
         self._before, self._factor = background, factor
-        self._outside = top.distance(background.shape) > _AROUND * top.radius
+        self._outside = Circle(top.x, top.y, top.radius).distance(background.shape) > _AROUND * top.radius
         self.share_of_background = float(self._outside.mean())
         self.clean = -np.inf
         self.share = 0.0
@@ -174,49 +180,61 @@ class _Watch:
 
 
 class _Track:
-    """The rim from picture to picture."""
+    """The rim, or the side, from picture to picture."""
 
-    def __init__(self, circle: Circle, *, with_dot: bool) -> None:
+    def __init__(self, top: Circle | Side, *, with_dot: bool) -> None:
         self._with_dot = with_dot
-        self._radius, self._contrast = circle.radius, 0.0
-        self._now, self._speed = circle, (0.0, 0.0)
+        self._radius, self._contrast = top.radius, 0.0
+        self._now, self._speed = top, (0.0, 0.0)
         self.last = np.nan
         self.times: list[float] = []
         self.rims: list[Rim] = []
         self.dots: list[complex] = []
+        self.turns: list[float] = []
         self.ended = ""
         self.missed: list[float] = []
 
     def add(self, time: float, picture: Picture) -> Rim | None:
-        """Find the rim in the next picture, where it should be by its speed."""
+        """Find rim or side in the next picture, where it should be by its speed."""
         step = 0.0 if np.isnan(self.last) else time - self.last
         self.last = time if np.isnan(self.last) else self.last
-        expected = Circle(self._now.x + step * self._speed[0], self._now.y + step * self._speed[1], self._now.radius)
-        rim = self._same(fit_rim(picture, expected)) or self._same(fit_rim(picture, self._now, width=3.0, rounds=6))
-        if rim is None:
+        expected = replace(self._now, x=self._now.x + step * self._speed[0], y=self._now.y + step * self._speed[1])
+        seen = self._same(_fit(picture, expected)) or self._same(_fit(picture, self._now, width=3.0, rounds=6))
+        if seen is None:
             self.missed.append(time)
             return None
+        rim, top = seen
         if step > 0:
-            self._speed = (rim.circle.x - self._now.x) / step, (rim.circle.y - self._now.y) / step
+            self._speed = (top.x - self._now.x) / step, (top.y - self._now.y) / step
         if not self.times:
             self._radius, self._contrast = rim.circle.radius, rim.contrast
-        self._now, self.last = rim.circle, time
+        if isinstance(top, Side):  # it hardly changes, but where the mark hides an end of it
+            top = replace(top, radius=self._now.radius + _SLOWLY * (top.radius - self._now.radius))
+        self._now, self.last = top, time
         self.times.append(time)
         self.rims.append(rim)
         dot = find_dot(picture, rim.circle) if self._with_dot else 0.0
         self.dots.append(complex(np.nan) if dot is None else dot)
+        self.turns.append(top.turn if isinstance(top, Side) else 0.0)
         return rim
 
-    def _same(self, rim: Rim | None) -> Rim | None:
+    def _same(self, seen: tuple[Rim, Circle | Side] | None) -> tuple[Rim, Circle | Side] | None:
         limit = _SAME_RADIUS if self.times else 2 * _SAME_RADIUS
-        if rim is None or abs(rim.circle.radius / self._radius - 1) >= limit:
+        if seen is None or abs(seen[1].radius / self._radius - 1) >= limit:
             return None
-        return rim if rim.contrast > _SAME_CONTRAST * self._contrast else None
+        return seen if seen[0].contrast > _SAME_CONTRAST * self._contrast else None
 
     def forget_after(self, time: float) -> None:
         """Leave out the pictures after a time."""
         count = int(np.searchsorted(self.times, time, side="right"))
-        del self.times[count:], self.rims[count:], self.dots[count:]
+        del self.times[count:], self.rims[count:], self.dots[count:], self.turns[count:]
+
+
+def _fit(picture: Picture, start: Circle | Side, **how: Any) -> tuple[Rim, Circle | Side] | None:
+    if isinstance(start, Side):
+        return fit_side(picture, start, **how)
+    rim = fit_rim(picture, start, **how)
+    return (rim, rim.circle) if rim else None
 
 
 def _followed(film: Film, track: _Track, watch: _Watch, base: Circle | None) -> Followed:
@@ -240,6 +258,7 @@ def _followed(film: Film, track: _Track, watch: _Watch, base: Circle | None) -> 
         u=ALONE_FACTOR * u_of_fit if film.codec in ALONE else np.hypot(u_of_fit, CODEC_U),
         profiles=np.stack([rim.profiles for rim in track.rims]),
         dots=np.array(track.dots, dtype=np.complex128),
+        turn=np.array(track.turns),
         base=base,
         rate=(times.size - 1 + missed) / span,
         missed=missed,

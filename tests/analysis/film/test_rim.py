@@ -32,7 +32,7 @@ def test_the_rim_is_found_within_a_tenth_of_a_pixel_and_u_says_so(shown):
         x, y = centre(time)
         rim = fit_rim(shown.noisy(shown.take(time)), Circle(x + 0.8, y - 0.6, RADIUS))
         errors += [(rim.circle.x - x, rim.circle.y - y)]
-        u += [rim.u]
+        u += [rim.u[0]]
     assert np.abs(errors).max() < 0.1
     pulls = np.array(errors) / np.array(u)[:, None]
     assert np.abs(pulls.mean()) < 0.5  # 4 standard errors of a mean of 120 are 0.37; pixels pull by 0.1 u

@@ -132,7 +132,10 @@ def test_a_trial_films_a_top_and_finds_spin_and_place(tmp_path, monkeypatch):
     pytest.importorskip("av")
     monkeypatch.setitem(PRIORS["video"], "length", replace(PRIORS["video"]["length"], b=0.9))
     pulls = SUBJECTS["video"].trial(1, tmp_path)
-    assert [pull.quantity for pull in pulls] == ["spin", "spin of a second", "place", "place", "precession"]
+    assert [pull.quantity for pull in pulls] == [
+        "spin", "spin of a second", "place", "place", "precession", "spin from beside", "place from beside",
+        "height from beside",
+    ]  # fmt: skip
     # a slip in a sign or a unit would be thousands of u away, another picture's place tens
     assert max(abs(pull.value) for pull in pulls) < 5
 
