@@ -134,7 +134,7 @@ def exact_end(scene: Scene, duration: float) -> np.ndarray | None:
 
     start = start_of(scene)
     problem = Problem(scene, model_of(scene, start[R]), start, SCHEMES["kahan-li-8"])
-    states, fell, _ = integrate(problem, stops_between(0.0, duration, REFERENCE_STEP, scene.drive))
+    states, fell, *_ = integrate(problem, stops_between(0.0, duration, REFERENCE_STEP, scene.drive))
     return states[-1] if fell is None else None
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from levilab.simulator.accuracy import SAFETY_FACTOR
 from levilab.simulator.kernels.motion import TIME, N, R
+from levilab.simulator.problem import Stretch
 
 if TYPE_CHECKING:
     from levilab.simulator.problem import Problem
@@ -97,14 +98,15 @@ def _trend(problem: Problem, duration: float, step: float) -> tuple[float, float
     """Return offset and rate of the error, from runs at a step [s] and at twice that; None if the top falls."""
     begin, order = float(problem.start[TIME]), problem.scheme.order
     elapsed: Array = duration / COMPARISONS * np.arange(1, COMPARISONS + 1, dtype=np.float64)
-    runs, powers = [], []
-    for length in (step, 2 * step):
-        stops = problem.stops(begin + duration, length, begin + elapsed, escape=problem.escape)
-        states, through = problem.advance_to_stops(problem.start, stops, problem.escape)
+    every = [
+        problem.stops(begin + duration, length, begin + elapsed, escape=problem.escape) for length in (step, 2 * step)
+    ]
+    runs, powers = [], [step_power(stops, order) for stops in every]
+    stretches = [Stretch(problem.start, stops, problem.escape) for stops in every]
+    for stops, (states, through) in zip(every, problem.advance_together(stretches), strict=True):
         if not through:
             return None
         runs.append(states[np.searchsorted(np.abs(stops.times - begin), np.abs(elapsed) * (1 - 1e-9))])
-        powers.append(step_power(stops, order))
     if powers[1] == powers[0]:
         return None
     apart = (runs[1] - runs[0]) / (powers[1] - powers[0])

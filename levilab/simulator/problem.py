@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +15,15 @@ from levilab.simulator.energy import spin_of
 from levilab.simulator.escape import locate_escape
 from levilab.simulator.kernels.braking import DragFlow, WasherDragFlow
 from levilab.simulator.kernels.bursts import NO_BURST, Trigger, advance_triggered
-from levilab.simulator.kernels.loads import Bursts
+from levilab.simulator.kernels.loads import Bursts, Disc
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
-from levilab.simulator.kernels.splitting import advance
+from levilab.simulator.kernels.splitting import RunStops, advance
 from levilab.simulator.model import model_of
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.stops import Stops, check_count, stop_after_each_step, stops_between
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Event
@@ -39,6 +39,32 @@ STEPS_IN_A_CALL = 100_000
 SLOWEST_HZ = 5.0
 #: Pieces of a triggered drive in one call, of some five steps each.
 PIECES_IN_A_CALL = 20_000
+
+
+#: A number for each run that a call of the kernel may hold: a register of four doubles takes the time of one run.
+LANES_OF_RUNS: tuple[float, ...] = (0.0,) * 4
+
+
+class Stretch(NamedTuple):
+    """A part of a run: its state at the first of its stops, shape (18,), and the limits of the escape [m]."""
+
+    start: Array
+    stops: Stops
+    escape: tuple[float, float] = NO_LIMITS
+
+
+def _run_stops(stretches: Sequence[Stretch]) -> RunStops:
+    """Return the stops of these stretches as the kernel takes them."""
+    every = [one.stops for one in stretches]
+    sizes = [stops.times.size for stops in every]
+    times, counts = np.concatenate([stops.times for stops in every]), np.zeros(sum(sizes), dtype=np.int64)
+    levels, slopes = np.zeros(counts.size), np.zeros(counts.size)
+    firsts = np.cumsum([0, *sizes[:-1]])
+    for first, stops in zip(firsts.tolist(), every, strict=True):
+        to_next = slice(first, first + stops.counts.size)
+        counts[to_next], levels[to_next], slopes[to_next] = stops.counts, stops.levels, stops.slopes
+    radii, heights = np.array([one.escape for one in stretches], dtype=np.float64).T.copy()
+    return RunStops(firsts, times, counts, levels, slopes, radii, heights)
 
 
 @dataclass(frozen=True)
@@ -118,14 +144,30 @@ class Problem:
         Returns:
             The states at the stops that were reached, shape (n, 18), the start first; and whether all were reached.
         """
-        if stops.states is not None:
-            return stops.states, len(stops.states) == stops.times.size
-        states = np.empty((stops.times.size, STATE_SIZE))
-        a, b = self.coefficients
-        reached = advance(
-            self.model, start, stops.times, stops.counts, stops.levels, stops.slopes, a, b, escape, states
-        )
-        return states[: reached + 1], reached == stops.counts.size
+        return self.advance_together([Stretch(start, stops, escape)])[0]
+
+    def advance_together(self, stretches: Sequence[Stretch]) -> list[tuple[Array, bool]]:
+        """Integrate stretches of this motion at different steps, by one call of the kernel where it has lanes for them.
+
+        Returns:
+            As `advance_to_stops`, of each; when the first one escapes, the others end where they are.
+        """
+        followed = [(one.stops.states, one.stops.times.size) for one in stretches]
+        if any(states is not None for states, _ in followed):  # all of them: the drive is one that the top triggers
+            return [(states, len(states) == size) for states, size in followed if states is not None]
+        width = LANES_OF_RUNS
+        if isinstance(self.model.magnet, Disc):  # a loop over nodes is no code for lanes
+            width = LANES_OF_RUNS[:1]
+            if len(stretches) > 1:
+                return [self.advance_together([one])[0] for one in stretches]
+        stops = _run_stops(stretches)
+        starts, states = np.array([one.start for one in stretches]), np.empty((stops.times.size, STATE_SIZE))
+        reached = advance(self.model, width, starts, stops, *self.coefficients, states)
+        ends = np.append(stops.firsts[1:], stops.times.size) - 1
+        return [
+            (states[first : at + 1], at == end)
+            for first, at, end in zip(stops.firsts.tolist(), reached.tolist(), ends.tolist(), strict=False)
+        ]
 
 
 def scheme_for(name: str | None, model: Any) -> Scheme:
@@ -220,43 +262,76 @@ def fall_after(problem: Problem, states: Array, stops: Stops) -> Event | None:
 
 
 def integrate(
-    problem: Problem, stops: Stops, progress: Callable[[float], None] | None = None
-) -> tuple[Array, Event | None, int]:
+    problem: Problem,
+    stops: Stops,
+    progress: Callable[[float], None] | None = None,
+    beside: Stops | None = None,
+) -> tuple[Array, Event | None, int, Array | None]:
     """Integrate a problem up to the last stop or an escape, in calls short enough to be interrupted.
 
     Args:
         problem: where it starts, and what moves it.
         stops: shape (n + 1,), the first at the start.
         progress: called with the share of the steps that are done.
+        beside: of a second run at other steps and without an escape, which takes hardly any time of its own.
 
     Returns:
-        The states at the stops, shape (up to n + 1, 18); the escape, None where there was none; the steps taken.
+        The states at the stops, shape (up to n + 1, 18); the escape, None where there was none; the steps taken; the
+        second run's last state, NaN where its numbers left their range, None where the first one escaped.
 
     Raises:
         LeftRange: the numbers leave their range, as at the base's edges.
     """
-    if int(stops.counts.sum()) <= STEPS_IN_A_CALL:
-        states, through = problem.advance_to_stops(problem.start, stops, problem.escape)
-        if through:
-            if progress is not None:
-                progress(1.0)
-            return states, None, int(stops.counts.sum())
     done = np.cumsum(stops.counts)
     pieces, state, at = [problem.start[None]], problem.start, 0
+    other = None if beside is None else _Course(problem.start, beside)
     while at < stops.counts.size:
         first, last = next(stops.part(at, stops.counts.size).pieces(STEPS_IN_A_CALL))
-        states, through = problem.advance_to_stops(state, stops.part(at + first, at + last), problem.escape)
+        run = Stretch(state, stops.part(at + first, at + last), problem.escape)
+        second = other and other.until(float(run.stops.times[-1]))
+        (states, through), *rest = problem.advance_together([run, second] if second else [run])
         pieces.append(states[1:])
         state, at = states[-1], at + len(states) - 1
+        if other and rest:
+            other.go_on(*rest[0], broken_off=not through)
         if not through:
             passed, fell = _escape(problem, state, stops.part(at, at + 1))
             if fell is not None:
-                return np.concatenate(pieces), fell, int(done[at])
+                return np.concatenate(pieces), fell, int(done[at]), None
             pieces.append(passed[None])
             state, at = passed, at + 1
         if progress is not None:
             progress(float(done[at - 1] / done[-1]))
-    return np.concatenate(pieces), None, int(done[-1])
+    return np.concatenate(pieces), None, int(done[-1]), None if other is None else other.end(problem)
+
+
+class _Course:
+    """A run beside another one: the state at the stop that it has reached, None once its numbers left their range."""
+
+    def __init__(self, start: Array, stops: Stops) -> None:
+        self._state: Array | None = start
+        self._stops, self._at = stops, 0
+
+    def until(self, time: float) -> Stretch | None:
+        """Return what lies ahead up to the first stop at this time [s] or after it; None if nothing does."""
+        times = self._stops.times
+        forwards = 1.0 if times[-1] > times[0] else -1.0
+        last = min(int(np.searchsorted(forwards * times, forwards * time)), self._stops.counts.size)
+        if self._state is None or last <= self._at:
+            return None
+        return Stretch(self._state, self._stops.part(self._at, last))
+
+    def go_on(self, states: Array, through: bool, *, broken_off: bool) -> None:  # noqa: FBT001
+        """Take the states of a stretch, all of it unless the run beside was broken off."""
+        self._at += len(states) - 1
+        self._state = states[-1] if through or broken_off else None
+
+    def end(self, problem: Problem) -> Array:
+        """Return the last state, shape (18,), integrated as far as it is not yet; NaN beyond the numbers' range."""
+        if self._state is None:
+            return np.full(STATE_SIZE, math.nan)
+        left = self._stops.part(self._at, self._stops.counts.size)
+        return integrate_to_end(replace(problem, start=self._state), left)
 
 
 def integrate_to_end(problem: Problem, stops: Stops) -> Array:

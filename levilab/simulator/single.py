@@ -88,6 +88,14 @@ class _Wanted:
 
 
 @dataclass(frozen=True)
+class Beside:
+    """A second run, to estimate the error of the first one from: its last state, shape (18,), and its step_power."""
+
+    end: Array
+    step_power: float
+
+
+@dataclass(frozen=True)
 class Run:
     """A motion integrated once.
 
@@ -98,6 +106,7 @@ class Run:
         steps: how many were taken.
         step_power: mean of stepᵖ over the time [sᵖ], p the scheme's order.
         stops: that it was integrated between.
+        beside: the end of a second run at other steps, if there was one.
     """
 
     states: Array
@@ -106,6 +115,7 @@ class Run:
     steps: int
     step_power: float
     stops: Stops
+    beside: Beside | None = None
 
 
 def simulate(
@@ -206,13 +216,13 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
     longest, order = longest_step(problem.scene, problem.model, problem.start, problem.scheme), problem.scheme.order
     pilot = None if step else pilot_of(problem, wanted.duration, tolerance, longest / ROOM)
     h = step or min(pilot.step if pilot else longest / ROOM, abs(wanted.duration) / 2)
-    with_three = step is not None
+    with_three, is_disc = step is not None, isinstance(problem.model.magnet, Disc)
     best: tuple[Run, Accuracy] | None = None
     smallest, failed, tries = math.inf, 0, 0
     while True:
         tries += 1
-        run = _run(problem, wanted, h)
-        found = None if with_three else _errors_by_two(problem, run, h, pilot, longest)
+        run = _run(problem, wanted, h, None if with_three or is_disc else longest)
+        found = None if with_three else _errors_by_two(problem, run, h, pilot)
         if found is None:
             if not with_three and h > longest * LONGEST_SHARE_OF_THREE:
                 with_three, h = True, longest * LONGEST_SHARE_OF_THREE
@@ -235,32 +245,40 @@ def _to_tolerance(problem: Problem, wanted: _Wanted, tolerance: float, step: flo
         h *= min(max(0.9 * (tolerance / worst) ** (1 / order), 0.1), 0.7)
 
 
-def _errors_by_two(
-    problem: Problem, run: Run, step: float, pilot: Pilot | None, longest: float
-) -> tuple[Array, Array] | None:
-    """Estimate the error of the last state from a second run, with longer steps where these are short enough.
+def _errors_by_two(problem: Problem, run: Run, step: float, pilot: Pilot | None) -> tuple[Array, Array] | None:
+    """Estimate the error of the last state from the run beside it.
 
     Returns:
         As `_errors`; None where the scheme's order may not be reached.
     """
-    if run.fell is not None or isinstance(problem.model.magnet, Disc):
+    if run.beside is None:
         return None
-    begin, end, order = float(problem.start[TIME]), run.states[-1], problem.scheme.order
-    # the steps that a triggered drive takes are shorter than the one that they are made from
-    mean_step = step if problem.triggered else run.step_power ** (1 / order)
-    if _crosses_kink(problem, run, mean_step):
+    begin, end = float(problem.start[TIME]), run.states[-1]
+    if _crosses_kink(problem, run, _mean_step(problem, run.step_power, step)):
         return None
-    for length in (min(2 * mean_step, longest), mean_step / 2):
-        stops = problem.stops(end[TIME], length)
-        ratio = step_power(stops, order) / run.step_power
-        if ratio >= LEAST_RATIO:
-            break
-    other = integrate_to_end(problem, stops)
-    errors = np.array([np.linalg.norm(end[part] - other[part]) for part in (R, N)]) / abs(ratio - 1)
+    apart = abs(run.beside.step_power / run.step_power - 1)
+    errors = np.array([np.linalg.norm(end[part] - run.beside.end[part]) for part in (R, N)]) / apart
     expected = pilot.error_at(end[TIME] - begin) * run.step_power if pilot else math.inf
     if not max(errors) <= MOST_GROWTH * expected:  # neither where it is no number
         return None
     return SAFETY_FACTOR * errors + rounding_error(problem.scheme, run.steps, end), np.zeros(2)
+
+
+def _mean_step(problem: Problem, power: float, step: float) -> float:
+    """Return the mean step of a run [s]; that of a triggered drive is shorter than the one that it is made from."""
+    return step if problem.triggered else power ** (1 / problem.scheme.order)
+
+
+def _stops_beside(
+    problem: Problem, until: float, mean_step: float, power: float, longest: float
+) -> tuple[Stops, float]:
+    """Return the stops of a second run, with longer steps where these are short enough, and its step_power."""
+    for length in (min(2 * mean_step, longest), mean_step / 2):
+        stops = problem.stops(until, length)
+        its_power = step_power(stops, problem.scheme.order)
+        if its_power >= LEAST_RATIO * power:
+            break
+    return stops, its_power
 
 
 def _errors(problem: Problem, run: Run, step: float) -> tuple[Array, Array]:
@@ -331,22 +349,29 @@ def _state_with_steps(problem: Problem, until: float, step: float) -> Array:
 # --- one run at one step ---
 
 
-def _run(problem: Problem, wanted: _Wanted, step: float) -> Run:
-    """Integrate once, with steps no longer than `step` [s]."""
+def _run(problem: Problem, wanted: _Wanted, step: float, longest: float | None = None) -> Run:
+    """Integrate once, with steps up to `step` [s]; beside it a second time, if the longest of its steps is given."""
     begin = float(problem.start[TIME])
-    samples = _samples(begin, wanted.duration, wanted.rate)
-    stops = problem.stops(begin + wanted.duration, step, samples, escape=problem.escape, progress=wanted.progress)
+    samples, until = _samples(begin, wanted.duration, wanted.rate), begin + wanted.duration
+    stops = problem.stops(until, step, samples, escape=problem.escape, progress=wanted.progress)
     if wanted.events:
         stops = stop_after_each_step(stops)
-    if stops.states is None:
-        states, fell, steps = integrate(problem, stops, wanted.progress)
-    else:  # found by following the motion
-        states, fell, steps = stops.states, fall_after(problem, stops.states, stops), int(stops.counts.sum())
+    power = step_power(stops, problem.scheme.order)
+    states = stops.states  # found by following the motion, or None
+    fell = None if states is None else fall_after(problem, states, stops)
+    other, its_power = None, math.nan
+    if longest is not None and fell is None:
+        other, its_power = _stops_beside(problem, until, _mean_step(problem, power, step), power, longest)
+    if states is None:
+        states, fell, steps, end = integrate(problem, stops, wanted.progress, other)
+    else:
+        steps, end = int(stops.counts.sum()), integrate_to_end(problem, other) if other else None
     if fell is not None:
         states = np.concatenate([states, fell.state[None]])
     found = _events(problem, states, stops, wanted.events) if wanted.events else ()
     kept = states[_are_wanted(states[:, TIME], samples, abs(wanted.duration) * 1e-11)]
-    return Run(kept, fell, found, steps, step_power(stops, problem.scheme.order), replace(stops, states=None))
+    beside = None if end is None else Beside(end, its_power)
+    return Run(kept, fell, found, steps, power, replace(stops, states=None), beside)
 
 
 def _are_wanted(times: Array, samples: Array, apart: float) -> NDArray[np.bool_]:

@@ -65,13 +65,13 @@ def test_the_estimate_bounds_the_error_where_the_motion_changes_on_the_way(chang
 def test_no_step_is_beyond_the_longest_that_the_kernels_hold_for(kind, monkeypatch):
     scene = KINDS_OF_SCENES[kind]
     longest = longest_step(scene, model_of(scene), start_of(scene), scheme_for(None, model_of(scene)))
-    taken, real = [], Problem.advance_to_stops
+    taken, real = [], Problem.advance_together
 
-    def watch(problem, start, stops, escape):
-        taken.append(float(np.max(np.abs(np.diff(stops.times)) / stops.counts)))
-        return real(problem, start, stops, escape)
+    def watch(problem, stretches):
+        taken.extend(float(np.max(np.abs(np.diff(one.stops.times)) / one.stops.counts)) for one in stretches)
+        return real(problem, stretches)
 
-    monkeypatch.setattr(Problem, "advance_to_stops", watch)
+    monkeypatch.setattr(Problem, "advance_together", watch)
     for duration in (0.3, 3.0, 12.0):
         for tolerance in (1.0, 1e-4, 1e-9):
             for rate in (None, 30.0):
