@@ -59,8 +59,8 @@ class Pilot:
 
 def step_power(stops: Stops, order: int) -> float:
     """Return the mean of stepᵖ over the time [sᵖ]: the error of a run is in proportion to it."""
-    lengths = np.abs(np.diff(stops.times))
-    return float(np.sum(lengths * (lengths / stops.counts) ** order) / np.sum(lengths))
+    lengths = abs(stops.times[1:] - stops.times[:-1])
+    return float(lengths @ (lengths / stops.counts) ** order / lengths.sum())
 
 
 def pilot_of(problem: Problem, duration: float, tolerance: float, longest: float) -> Pilot | None:
@@ -98,19 +98,23 @@ def _trend(problem: Problem, duration: float, step: float) -> tuple[float, float
     """Return offset and rate of the error, from runs at a step [s] and at twice that; None if the top falls."""
     begin, order = float(problem.start[TIME]), problem.scheme.order
     elapsed: Array = duration / COMPARISONS * np.arange(1, COMPARISONS + 1, dtype=np.float64)
-    every = [
-        problem.stops(begin + duration, length, begin + elapsed, escape=problem.escape) for length in (step, 2 * step)
-    ]
-    runs, powers = [], [step_power(stops, order) for stops in every]
-    stretches = [Stretch(problem.start, stops, problem.escape) for stops in every]
-    for stops, (states, through) in zip(every, problem.advance_together(stretches), strict=True):
+    stops = problem.stops(begin + duration, step, begin + elapsed, escape=problem.escape)
+    twice = (
+        problem.stops(begin + duration, 2 * step, begin + elapsed, escape=problem.escape)
+        if problem.triggered
+        else replace(stops, counts=(stops.counts + 1) // 2)
+    )
+    both = [stops, twice]
+    runs, powers = [], [step_power(one, order) for one in both]
+    stretches = [Stretch(problem.start, one, problem.escape) for one in both]
+    for one, (states, through) in zip(both, problem.advance_together(stretches), strict=True):
         if not through:
             return None
-        runs.append(states[np.searchsorted(np.abs(stops.times - begin), np.abs(elapsed) * (1 - 1e-9))])
+        runs.append(states[np.searchsorted(abs(one.times - begin), abs(elapsed) * (1 - 1e-9))])
     if powers[1] == powers[0]:
         return None
     apart = (runs[1] - runs[0]) / (powers[1] - powers[0])
-    squares = np.max([np.sum(apart[:, part] ** 2, axis=1) for part in (R, N)], axis=0)
+    squares = np.maximum(*((apart[:, part] ** 2).sum(axis=1) for part in (R, N)))
     early, late = squares.reshape(2, -1).mean(axis=1).tolist()
     t2_early, t2_late = (elapsed**2).reshape(2, -1).mean(axis=1).tolist()
     if not 0 < late < math.inf:

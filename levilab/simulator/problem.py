@@ -310,28 +310,29 @@ class _Course:
 
     def __init__(self, start: Array, stops: Stops) -> None:
         self._state: Array | None = start
-        self._stops, self._at = stops, 0
+        self._left = stops
 
     def until(self, time: float) -> Stretch | None:
-        """Return what lies ahead up to the first stop at this time [s] or after it; None if nothing does."""
-        times = self._stops.times
-        forwards = 1.0 if times[-1] > times[0] else -1.0
-        last = min(int(np.searchsorted(forwards * times, forwards * time)), self._stops.counts.size)
-        if self._state is None or last <= self._at:
+        """Return the part ahead, up to the first stop at this time [s] or after it; None if there is none."""
+        if self._state is None or self._left.counts.size == 0:
             return None
-        return Stretch(self._state, self._stops.part(self._at, last))
+        ahead, last = abs(time - self._left.times[0]), self._left.counts.size
+        if ahead < abs(self._left.times[-1] - self._left.times[0]):
+            last = int(np.searchsorted(abs(self._left.times - self._left.times[0]), ahead))
+        return Stretch(self._state, self._left.part(0, last)) if last > 0 else None
 
     def go_on(self, states: Array, through: bool, *, broken_off: bool) -> None:  # noqa: FBT001
         """Take the states of a stretch, all of it unless the run beside was broken off."""
-        self._at += len(states) - 1
+        self._left = self._left.part(len(states) - 1, self._left.counts.size)
         self._state = states[-1] if through or broken_off else None
 
     def end(self, problem: Problem) -> Array:
         """Return the last state, shape (18,), integrated as far as it is not yet; NaN beyond the numbers' range."""
         if self._state is None:
             return np.full(STATE_SIZE, math.nan)
-        left = self._stops.part(self._at, self._stops.counts.size)
-        return integrate_to_end(replace(problem, start=self._state), left)
+        return (
+            integrate_to_end(replace(problem, start=self._state), self._left) if self._left.counts.size else self._state
+        )
 
 
 def integrate_to_end(problem: Problem, stops: Stops) -> Array:

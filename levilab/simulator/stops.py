@@ -111,24 +111,23 @@ def stops_between(start: float, end: float, step: float, drive: Drive, samples: 
     if samples is not None:
         wanted.append(samples[(samples > low) & (samples < high)])
     times = _distinct(np.concatenate(wanted), (high - low) * 1e-12)
-    pieces = np.ceil(np.diff(times) / (step * STEPS_BETWEEN_STOPS)).astype(np.int64)
-    times = np.concatenate(
-        [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(times, times[1:], pieces, strict=False)] + [times[-1:]]
-        if np.any(pieces > 1)
-        else [times]
-    )
+    lengths = times[1:] - times[:-1]
+    if lengths.max() > step * STEPS_BETWEEN_STOPS:
+        pieces = np.ceil(lengths / (step * STEPS_BETWEEN_STOPS)).astype(np.int64)
+        cut = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(times, times[1:], pieces, strict=False)]
+        times = np.concatenate([*cut, times[-1:]])
+        lengths = times[1:] - times[:-1]
     if end < start:
-        times = times[::-1].copy()
-    counts = np.maximum(np.ceil(np.abs(np.diff(times)) / step * (1 - 1e-12)), 1).astype(np.int64)
+        times, lengths = times[::-1].copy(), lengths[::-1]
+    counts = np.maximum(np.ceil(lengths / step * (1 - 1e-12)), 1).astype(np.int64)
     levels, slopes = _shape(drive, (times[1:] + times[:-1]) / 2)
     return Stops(times, counts, levels, slopes)
 
 
 def _distinct(times: Array, apart: float) -> Array:
     """Return the times sorted, without those less than `apart` [s] after another; the last one stays."""
-    times = np.unique(times)
-    keep = np.concatenate([[True], np.diff(times) > apart])
-    kept = times[keep]
+    times = np.sort(times)
+    kept = times[np.append(np.True_, times[1:] - times[:-1] > apart)]
     kept[-1] = times[-1]
     return np.asarray(kept)
 
@@ -170,17 +169,17 @@ def corners(drive: Drive, low: float, high: float) -> tuple[float, int, int]:
 
 def _shape(drive: Drive, middles: Array) -> tuple[Array, Array]:
     """Return level and slope of the drive in each interval, given the intervals' middles [s]; shape (n,) each."""
-    on = np.ones_like(middles) if drive.off_s is None else (middles < drive.off_s).astype(np.float64)
+    on = np.ones(middles.size) if drive.off_s is None else (middles < drive.off_s).astype(np.float64)
+    if drive.waveform in {"off", "sine"}:
+        return on, np.zeros(on.size)
     turns = drive.frequency_hz * middles + drive.phase_rad / (2 * math.pi)
     first_half = turns - np.floor(turns) < 0.5
     if drive.waveform == "square":
         return on * np.where(first_half, 1.0, -1.0), np.zeros_like(on)
     if drive.waveform == "unipolar":
         return on * first_half, np.zeros_like(on)
-    if drive.waveform == "triangle":
-        rising = (turns + 0.25) - np.floor(turns + 0.25) < 0.5
-        slope = np.where(rising, 4.0, -4.0) * drive.frequency_hz
-        # the value at the middle: 0 at whole turns, ±1 at the quarters
-        value = 1 - 4 * np.abs((turns + 0.25) - np.floor(turns + 0.25) - 0.5)
-        return on * (value - slope * middles), on * slope
-    return on, np.zeros_like(on)
+    rising = (turns + 0.25) - np.floor(turns + 0.25) < 0.5  # of the triangle
+    slope = np.where(rising, 4.0, -4.0) * drive.frequency_hz
+    # the value at the middle: 0 at whole turns, ±1 at the quarters
+    value = 1 - 4 * np.abs((turns + 0.25) - np.floor(turns + 0.25) - 0.5)
+    return on * (value - slope * middles), on * slope

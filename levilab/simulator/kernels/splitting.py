@@ -137,11 +137,8 @@ def advance(  # noqa: C901
     first run escapes, the others end, too.
     """
     lanes, stages, first = len(width), kicks.size, drifts[0]
-    block, at = np.empty(_ROWS * lanes), np.empty(lanes, dtype=np.int64)
-    for i in range(block.size):
-        block[i] = 0.0
+    block, at = np.zeros(_ROWS * lanes), np.zeros(lanes, dtype=np.int64)
     for j in range(lanes):
-        at[j] = 0
         block[_COUNT * lanes + j], block[_HALT * lanes + j] = 1.0, 1.0
     for j in range(stops.firsts.size):
         at[j] = stops.firsts[j]
