@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,10 +36,19 @@ def turning_rate(model: Model, start: Array) -> Any:
     return length(start[..., L].T) * inverse + sqrt(stiffness * inverse)
 
 
-def rounding_error(scheme: Scheme, steps: int, end: Array) -> tuple[float, float]:
-    """Return the error by rounding of place [m] and axis at the end: a random walk of half a unit, twice a stage."""
-    floor = 2.2e-16 * math.sqrt(2 * steps * scheme.stages)
-    return floor * math.hypot(*end[R].tolist()), floor
+def rounding_error(scheme: Scheme, steps: Any, ends: Array) -> Array:
+    """Return the error by rounding: a random walk of half a unit, twice a stage.
+
+    Args:
+        scheme: of the steps.
+        steps: how many were taken, a number or shape (…).
+        ends: last states, shape (…, 18).
+
+    Returns:
+        Of place [m] and axis, shape (2, …).
+    """
+    floor = 2.2e-16 * np.sqrt(2.0 * steps * scheme.stages)
+    return np.array([floor * np.linalg.norm(ends[..., R], axis=-1), floor * np.ones(ends.shape[:-1])])
 
 
 def longest_step(scene: Scene, model: Model, start: Array, scheme: Scheme) -> Any:
@@ -110,30 +118,33 @@ SAFETY_FACTOR = 6.0
 NODES_ORDER = 6
 
 
-def estimate(fine: Array, twice: Array, four: Array, order: int | None) -> Any:
-    """Estimate the error of results at step h from those at 2h and 4h.
+def estimate(fine: Array, twice: Array, coarse: Array, order: int | None, longer: Any = 4.0) -> Any:
+    """Estimate the error of results at step h from those at 2h and 4h, or another length above 2h.
 
     From 4h to 2h to h the differences shrink by a factor q; the error at h is the sum of those that would follow, about
     q times the last difference.  A scheme that reaches its order p has q = 2^−p.  If rounding or chaos rules, the
-    differences do not shrink, and the estimate is as large as the last one.
+    differences do not shrink, and the estimate is as large as the last one.  From s·h to 2h to h they shrink by
+    (2^p − 1)/(s^p − 2^p) in the former case, and not at all in the latter.
 
     The error of a magnet's nodes is estimated alike, from results with fewer and still fewer nodes.
 
     Args:
         fine: results at step h, shape (…, 3).
         twice: at 2h, shape (…, 3).
-        four: at 4h, shape (…, 3).
+        coarse: at s·h, shape (…, 3).
         order: of the scheme; None if the motion has passed a point where the equations are not smooth.  Each step
             length then makes an error of low order that depends on where in a step the point lies.  Two differences
             that happen to be small prove nothing, so both are added up.
+        longer: s, above 2, a number or shape (…).
 
     Returns:
         The error, shape (…), in the results' unit.
     """
     last = np.linalg.norm(fine - twice, axis=-1)
-    before = np.linalg.norm(twice - four, axis=-1)
+    before = np.linalg.norm(twice - coarse, axis=-1)
     if order is None:
         return SAFETY_FACTOR * (last + before)
     with np.errstate(invalid="ignore", divide="ignore"):
-        shrink = np.clip(np.nan_to_num(last / before, nan=1.0, posinf=1.0), 2.0**-order, 1.0)
-    return SAFETY_FACTOR * last * shrink
+        least = (2.0**order - 1) / (longer**order - 2.0**order)
+        shrink = np.clip(np.nan_to_num(last / before, nan=1.0, posinf=1.0), least, 1.0)
+    return SAFETY_FACTOR * last * shrink ** (np.log(2.0**-order) / np.log(least))

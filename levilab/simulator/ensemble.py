@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from levilab.errors import LeftRange, SimulationError
-from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink
+from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink, rounding_error
 from levilab.simulator.energy import both_spins, core_spin
 from levilab.simulator.escape import at_the_crossing, crossed_height, exit_speeds
 from levilab.simulator.kernels.columns import LANES
@@ -39,8 +39,10 @@ PILOTS = 6
 MORE_PILOTS, PILOTS_IN_A_GROUP = 60, 12
 #: How long these are simulated [s]; errors grow with the time, so they get this share of the tolerance.
 PILOT_DURATION = 3.0
-#: The largest part of its longest step that a top takes: runs at four times as much are compared with.
-LARGEST_SHARE = 0.25
+#: A top's run is compared with one at twice its step, and one at four times; or at less, where four are too long.
+LEAST_LONGER, MOST_LONGER = 2.5, 4.0
+#: The largest part of its longest step that a top takes.
+LARGEST_SHARE = 1 / LEAST_LONGER
 #: A spin below this [rad/s] may be turned through zero by the field; a top that floats is never as slow.
 SLOW_RAD_S = 2 * math.pi * 5.0
 
@@ -440,18 +442,21 @@ def _estimates(some: Batch, states: Array, steps: Array) -> tuple[Array, Array]:
     pieces = 1 + np.floor(2 * some.runs[:, RATE] * np.minimum(lasted, off)) + (off < lasted)
     # if a fall or the next kink of the drive leaves no room for longer steps, half of the step shows the error as well
     room = lasted / pieces > MIN_STEPS_FOR_DOUBLING * steps
-    lengths = [np.where(room, times * steps, np.minimum(steps, lasted) / 2) for times in (2, 4)]
+    longer = np.clip(some.longest / steps, LEAST_LONGER, MOST_LONGER)
+    lengths = [np.where(room, times * steps, np.minimum(steps, lasted) / 2) for times in (2, longer)]
     twice = _integrate_coarsely(some, lasted, lengths[0])
-    four = _integrate_coarsely(some, lasted, lengths[1]) if np.any(room) else twice
-    found = [estimate(states[:, part], twice[:, part], four[:, part], some.scheme.order) for part in (R, N)]
+    coarse = _integrate_coarsely(some, lasted, lengths[1]) if np.any(room) else twice
+    order = some.scheme.order
+    found = np.array([estimate(states[:, part], twice[:, part], coarse[:, part], order, longer) for part in (R, N)])
+    found += rounding_error(some.scheme, lasted / steps, states)
     if has_kink(some.model.drag):
         lost = _may_have_stopped(some, states)
         for error, part in zip(found, (R, N), strict=True):
-            error[lost] = estimate(states[lost][:, part], twice[lost][:, part], four[lost][:, part], None)
+            error[lost] = estimate(states[lost][:, part], twice[lost][:, part], coarse[lost][:, part], None)
     if some.fewer:
         fewer, fewest = (_integrate_coarsely(replace(some, model=less), lasted, lengths[0]) for less in some.fewer)
         of_nodes = [estimate(twice[:, part], fewer[:, part], fewest[:, part], NODES_ORDER) for part in (R, N)]
-        found = [a + b for a, b in zip(found, of_nodes, strict=True)]
+        found += of_nodes
     return found[0], found[1]
 
 

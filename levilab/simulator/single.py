@@ -290,7 +290,7 @@ def _errors(problem: Problem, run: Run, step: float) -> tuple[Array, Array]:
     """
     end = run.states[-1]
     twice, four, length = _coarser_ends(problem, end[TIME], step)
-    rounding = np.array(rounding_error(problem.scheme, run.steps, end))
+    rounding = rounding_error(problem.scheme, run.steps, end)
     order = None if _crosses_kink(problem, run, length) else problem.scheme.order
     of_steps = rounding + [estimate(end[part], twice[part], four[part], order) for part in (R, N)]
     of_nodes = np.zeros(2)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from levilab.simulator import SceneError, SimulationError
+from levilab.simulator.accuracy import SAFETY_FACTOR, estimate
 from levilab.simulator.ensemble import _pilots, grid, simulate_many, step_share_of
 from levilab.simulator.kernels.motion import TIME, R
 from levilab.simulator.scene import preset
@@ -34,6 +35,25 @@ def test_every_top_moves_as_it_does_alone(kind):
         bound = many.position_error[i, j] + alone.accuracy.position
         assert np.linalg.norm(many.position[i, j] - alone.position[-1]) <= bound
         assert many.spin_hz[i, j] == pytest.approx(alone.spin_hz[-1], abs=1e-7)
+
+
+@pytest.mark.parametrize("order", [4, 6, 8])
+@pytest.mark.parametrize("longer", [2.5, 3.1, 4.0])
+def test_an_error_of_the_schemes_order_is_known_from_runs_at_any_length(order, longer):
+    # results c·lengthᵖ: the error at length 1 is c, and the estimate that times the factor of safety, 64/63 for p = 6
+    ends = [np.array([2e-9 * length**order, 0.0, 0.0]) for length in (1.0, 2.0, longer)]
+    found = estimate(*ends, order, longer)
+    assert found == pytest.approx(SAFETY_FACTOR * 2e-9 * (1 - 2.0**-order))
+    unsettled = estimate(ends[0], ends[1], ends[1] + ends[1] - ends[0], order, longer)  # the differences do not shrink
+    assert unsettled == pytest.approx(SAFETY_FACTOR * np.linalg.norm(ends[1] - ends[0]))
+
+
+def test_where_rounding_is_the_error_the_estimate_is_no_smaller():
+    over = {"start.spin_hz": np.linspace(26, 34, 32)}
+    tight, other = (simulate_many(UNDRIVEN, over, 2.0, step_share=share) for share in (0.02, 0.025))
+    apart = np.linalg.norm(tight.axis - other.axis, axis=-1)
+    assert np.median(apart) < 1e-12  # the composition's own error is below 1e-15
+    assert np.mean(apart <= np.hypot(tight.axis_error, other.axis_error)) >= 0.9
 
 
 def test_errors_are_within_the_tolerance_and_bound_the_true_ones():
