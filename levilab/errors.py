@@ -74,6 +74,10 @@ class DoesNotSuit(DataError):
     """The data are sound, but not what an analysis needs: they are of another experiment, or have other columns."""
 
 
+class DoubtWarning(UserWarning):
+    """Numbers that are worthless where a doubt about them is right; see `doubts` of a result."""
+
+
 class NoneUsable(DataError):
     """A folder without anything that an analysis can use.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
+import warnings
 import weakref
 from dataclasses import fields, replace
 from functools import partial
@@ -13,7 +14,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import DataError, DoesNotSuit, LevilabError, UsageError
+from levilab.errors import DataError, DoesNotSuit, DoubtWarning, LevilabError, UsageError, unquote
 from levilab.notebook.frame import (
     FRAME,
     are_arrays,
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
 
 
 def analyze_data(data: Any, kind: Any, given: Mapping[str, Any]) -> AnalysisResult:
-    """Analyze data by one analysis.
+    """Analyze data by one analysis; what makes the numbers doubtful is a warning of Python, too.
 
     Args:
         data: a run, a path, a DataFrame, or several of them; or arrays, see `frame_of_arrays`; or a dictionary of
@@ -54,6 +55,17 @@ def analyze_data(data: Any, kind: Any, given: Mapping[str, Any]) -> AnalysisResu
         UsageError: an option or `kind` is wrong, or the data suit several analyses equally.
         DataError: the data suit none, or cannot be used.
     """
+    result = _analyze_any(data, kind, given)
+    for text in result.found.doubts:
+        warnings.warn(unquote(text), DoubtWarning, stacklevel=_CALLER)
+    return result
+
+
+#: Frames from a warning to the line of a person: it, the function of the front door, and `bare`.
+_CALLER = 4
+
+
+def _analyze_any(data: Any, kind: Any, given: Mapping[str, Any]) -> AnalysisResult:
     if kind is not None and not isinstance(kind, str) and are_arrays(kind):  # analyze(t, f)
         data, kind = (data, kind), None
     _check_kind(kind)

@@ -61,6 +61,11 @@ def _covariance(of: FittedModel) -> Array | None:
     return None if of.covariance is None else np.array(of.covariance, dtype=float)
 
 
+def _correlation(of: FittedModel) -> Array | None:
+    table = _covariance(of)
+    return None if table is None else table / np.sqrt(np.outer(np.diagonal(table), np.diagonal(table)))
+
+
 #: lmfit's name → its meaning here, and how it is found.  docs/notebook.md has this table.
 FIT: Mapping[str, tuple[str, Callable[[FittedModel], Any]]] = MappingProxyType({
     "redchi": ("χ² per degree of freedom; None where no u is stated", _statistic("reduced_chi_square")),
@@ -71,7 +76,9 @@ FIT: Mapping[str, tuple[str, Callable[[FittedModel], Any]]] = MappingProxyType({
     "ndata": ("readings in the fit", _statistic("n")),
     "nvarys": ("parameters of the law; priors take away as readings do", _count),
     "nfree": ("ndata less nvarys", _statistic("degrees_of_freedom")),
+    "dof": ("the same", _statistic("degrees_of_freedom")),
     "covar": ("covariance of `var_names`, an array", _covariance),
+    "correl": ("their correlations, an array", _correlation),
     "var_names": ("names of the parameters", lambda of: [*of]),
     "params": ("parameter → quantity", lambda of: of),
     "best_values": ("parameter → number", lambda of: {name: one.n for name, one in of.items()}),

@@ -25,8 +25,12 @@ _ALIKE = 0.55
 _OTHERS = {
     **dict.fromkeys(("sigma", "yerr", "dy", "u"), ("reading_u",)),
     "t": ("time", "x"),
-    "f": ("frequency",),
+    "x": ("time",),
+    **dict.fromkeys(("f", "y"), ("frequency",)),
+    **dict.fromkeys(("model", "law"), ("laws",)),
 }
+#: The same, where the value is another one.
+_OTHER_VALUES = {"weights": ("reading_u", "the standard uncertainty, 1/weights, or a third array")}
 #: Names that a message lists.
 _MOST_NAMES = 15
 
@@ -42,6 +46,9 @@ def meant(name: str, known: Iterable[str]) -> str:
     ('known are model, input', 'did you mean model?')
     """
     names = [*known]
+    other, how = _OTHER_VALUES.get(name, ("", ""))
+    if other in names:
+        return f"take {other}, {how}"
     others = [one for one in _OTHERS.get(name, ()) if one in names]
     near = (
         others or [one for one in names if name in one.split("_")] or get_close_matches(name, names, n=3, cutoff=_ALIKE)

@@ -30,9 +30,16 @@ ALSO: Mapping[str, str] = MappingProxyType({
     "error": "s",
     "uncertainty": "s",
     "std": "s",
+    "sigma": "s",
     "magnitude": "n",
     "units": "unit",
 })  # fmt: skip
+#: Name in lmfit → where it stands.
+_INSTEAD = {
+    "correl": "correl of its model, as result.correl, or result.fit_report()",
+    "init_value": "value: the fit finds its own start",
+    "vary": "result.var_names, the parameters that were fitted",
+}
 #: Functions of numpy that are taken of a quantity, as a number without a unit.
 _FUNCTIONS = frozenset({"sqrt", "exp", "log", "log10", "sin", "cos", "tan"})
 
@@ -169,8 +176,9 @@ class Quantity(Estimate):
             return getattr(self, ALSO[name])
         if name not in _FUNCTIONS:
             known = [*(one for one in dir(self) if not one.startswith("_")), *ALSO]
+            advice = f"take {_INSTEAD[name]}" if name in _INSTEAD else meant(name, known)
             with border:
-                raise NoSuchAttribute(f"a Quantity has no {name!r}: {meant(name, known)}")
+                raise NoSuchAttribute(f"a Quantity has no {name!r}: {advice}")
         from uncertainties import umath
 
         return partial(getattr(umath, name), self.to_ufloat())
@@ -273,9 +281,10 @@ class Named(Helpful, dict[str, V]):
         elsewhere: name → where it is found.
     """
 
-    def __init__(self, values: Mapping[str, V], what: str, elsewhere: Mapping[str, str] | None = None) -> None:
+    def __init__(self, values: Mapping[str, V], what: str, elsewhere: Mapping[Any, str] | None = None) -> None:
         super().__init__(values)
-        self.what, self.elsewhere = what, dict(elsewhere or {})
+        self.what: str = what
+        self.elsewhere: dict[Any, str] = dict(elsewhere or {})
 
     def __call__(self) -> ValuesView[V]:
         """Return the values, for who takes `result.values` for a dictionary's."""

@@ -99,6 +99,17 @@ class AnalysisResult(Exportable):
         "plot_residuals": "plot('residuals')",
         "rsquared": "redchi",
         "success": "warnings, which has it where a fit did not converge",
+        "pretty_print": "print(….fit_report())",
+        "ci_out": "conf_interval()",
+        "errorbars": "covar, which is None where u is not determined",
+        "flatchain": "conf_interval(): no chain is sampled",
+        "uvars": "params, which calculate as numbers of uncertainties do",
+        "userkws": "document['settings']",
+        **dict.fromkeys(("dump", "dumps"), "to_json(), or save(folder)"),
+        **dict.fromkeys(("init_fit", "init_values", "init_params"), "best_fit: the fit finds its own start"),
+        **dict.fromkeys(("pull", "pulls"), "data, which has residuals and u of each reading"),
+        **dict.fromkeys(("x", "y"), "time, or data, which has all readings"),
+        **dict.fromkeys(("sel", "isel", "coords", "dims", "data_vars", "attrs"), "to_xarray(), which has it"),
     }
 
     @property
@@ -217,6 +228,8 @@ class AnalysisResult(Exportable):
         values = self._values_of(self._written, self.models, "models", "the values of this result")
         of_fit: Mapping[str, Quantity] = self.models.get(self.best_model, {}) if len(self.inputs) == 1 else {}
         values.update({name: one for name, one in of_fit.items() if name not in values})  # as the start
+        places = {key: f"by_input[{name!r}]" for k, name in enumerate(self.inputs) for key in (name, k)}
+        values.elsewhere = {**places, **values.elsewhere}
         return values
 
     @cached_property
@@ -240,6 +253,7 @@ class AnalysisResult(Exportable):
         elsewhere = {
             name: f"{where}[{model!r}][{name!r}]" for model, of in reversed(models.items()) for name in of
         }  # the first law that has it
+        elsewhere |= {model: f"{where}[{model!r}]" for model in models}
         return Named(values, f"{what}{law}", elsewhere)
 
     @bare

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import levilab
 from analysis.numbers import how_many
+from levilab.errors import UsageError
 from levilab.notebook.analysis import analyze_data
 from levilab.notebook.labels import dataset_of_contents
-from levilab.notebook.names import Exportable, bare, meant
+from levilab.notebook.names import Exportable, Helpful, bare, meant
 from levilab.notebook.quantity import NoSuchName
 from levilab.present.html import facts_as_html, table_as_html
 from levilab.report.export.contents import contents_of_results
@@ -43,6 +44,7 @@ class RecordedRun(Exportable, Run):
         "experiment": "record.experiment",
         "note": "record.note",
         "name": "folder.name",
+        **{name: lambda run, name=name: getattr(run.to_xarray(), name) for name in ("sel", "isel")},
     }
 
     @property
@@ -68,6 +70,7 @@ class RecordedRun(Exportable, Run):
     instead: ClassVar[Mapping[str, str]] = {
         "to_csv": "df.to_csv(path), or export('run.csv')",
         "to_netcdf": "export('run.nc')",
+        "values": "df.to_numpy(), or analyze().values",
     }
 
     @bare
@@ -149,8 +152,8 @@ class RecordedRun(Exportable, Run):
 _SHOWN = ("path", "group", "experiment", "status", "readings", "note")
 
 
-class RunList(list[RecordedRun]):
-    """Runs, oldest first, with the table that `levilab runs` prints.
+class RunList(Helpful, list[RecordedRun]):
+    """Runs, oldest first, each by its number or its name, with the table that `levilab runs` prints.
 
     Attributes:
         listed: a row for each, those that cannot be read included.
@@ -159,6 +162,26 @@ class RunList(list[RecordedRun]):
     def __init__(self, listed: Sequence[Listed]) -> None:
         self.listed = tuple(listed)
         super().__init__(RecordedRun.load(Path(one.path)) for one in listed if not one.problem)
+
+    instead: ClassVar[Mapping[str, str]] = {
+        **dict.fromkeys(("filter", "query", "sel"), "[run for run in runs if run.experiment == 'spin']"),
+        **dict.fromkeys(("names", "paths", "index_of"), "[run.name for run in runs], or df"),
+        **dict.fromkeys(("groupby", "experiment", "status"), "df, a table with a row for each"),
+        "analyze": "levilab.analyze(runs, kind)",
+    }
+
+    @bare
+    def __getitem__(self, which: Any) -> Any:
+        if not isinstance(which, str):
+            try:
+                return super().__getitem__(which)
+            except TypeError:
+                advice = "a number or a name is expected: [run for run in runs if …] chooses"
+                raise UsageError("runs", advice, value=type(which).__name__) from None
+        for run in self:
+            if which in {run.folder.name, str(run.folder)}:
+                return run
+        raise NoSuchName(which, f"is none of these runs; {meant(which, [run.folder.name for run in self])}")
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return the table."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from analysis.numbers import how_many
 from levilab.errors import UsageError
@@ -123,14 +123,21 @@ class SimulatedMap(Exportable):
         return data
 
     def plot(self, column: str | None = None) -> Figure:
-        """Draw a map of an observable, by default of the first one, over two axes or more.  Raises UsageError."""
+        """Draw an observable, by default the first one: a curve over one axis, a map over more.  Raises UsageError."""
+        from levilab.notebook.figure import draw_column, drawn  # with matplotlib
         from levilab.present.style import for_notebooks  # with matplotlib
         from levilab.sweeps.figure import has_figure, map_figure
 
         names = [*self.values]
         if column is not None and column not in names:
             raise UsageError("column", f"known are {', '.join(names)}", value=column)
-        if not has_figure(self.store.plan):
+        plan = self.store.plan
+        if len(plan.axes) == 1 and not plan.is_table:
+            frame, y = self.to_dataframe(), column or names[0]
+            title = headline(summarise(self.store))
+            figure = drawn(lambda axes: draw_column(axes, plan.axes[0].key, y, frame, ".-"), None, title=title)
+            return cast("Figure", figure)
+        if not has_figure(plan):
             raise UsageError("plot", "a table of points is no map: draw columns of to_dataframe()")
         return for_notebooks(map_figure(self.store.load(), column or names[0]))
 

@@ -370,6 +370,9 @@ def read_options(given: Mapping[str, Any], *, typed: bool = False) -> dict[str, 
     found: dict[str, Any] = {}
     for shown, value in given.items():
         one = OPTIONS[names[shown]]
+        if value is None and not typed and "none" in one.choices:  # which reads as if it were this choice
+            others = " or ".join(repr(choice) for choice in one.choices if choice != "none")
+            raise UsageError(shown, f"'none' in quotation marks is expected, or {others}", value="None")
         if value is None:
             continue
         if one.needs and given.get(typed_name(one.needs) if typed else one.needs) is None:

@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from uncertainties import unumpy
 
 import levilab
+from levilab.errors import DoubtWarning
 from support.paths import SAMPLE_DATA
 
 if TYPE_CHECKING:
@@ -208,6 +209,16 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     ),
     "np.sqrt(result['c32']) ** 2 / result['c32'] - 1": lambda number: abs(number.n) + number.s < 1e-12,
     "2 ** result['c32']": lambda number: 1 < number.n < 1.001 and number.s > 0,
+    "levilab.runs(folder)['spin-down-1'].name": lambda name: name == "spin-down-1",
+    "levilab.analyze(pd.DataFrame({'a': t, 'b': f}), columns={'time': 'a', 'frequency': 'b'}).ndata": lambda n: n == 20,
+    "result.correl[0, 1] * result.params['c32'].sigma * result.params['start_frequency'].u / result.covar[0, 1]": (
+        lambda ratio: ratio == pytest.approx(1)
+    ),
+    "result.dof == result.nfree == 18": bool,
+    "run.sel(time_s=190.0).spin_frequency_hz.item()": lambda spin: spin == 21.75,
+    "levilab.sweep('undriven', spin_hz=[18, 30], duration=0.5).plot().axes[0].lines[0].get_ydata().tolist()": (
+        lambda survived: survived == [0, 1]
+    ),
     "round(result['c32'], 5)": lambda number: number == 0.00024,
     "levilab.report(result, new / 'r.html', crosscheck=False)": lambda path: path.stat().st_size > 50_000,
 }
@@ -226,6 +237,24 @@ REFUSED = {
     "levilab.sweep('undriven', mass_kg=[24.9, 25.0, 25.3])": "Were grams meant?",
     "levilab.report(5)": "runs, results or paths are expected",
     "levilab.runs(folder / 'none')": "there is no such folder",
+    "levilab.analyze((t, f), tilt=None)": "tilt = None: 'none' in quotation marks is expected, or 'auto' or 'fitted'",
+    "levilab.analyze(frame, columns=['a', 'b'])": 'as {"t": "Zeit", "f": 3}',
+    "levilab.analyze((t, f), weights=1 / 0.03)": "take reading_u, the standard uncertainty, 1/weights",
+    "levilab.analyze(x=t, y=f)": "did you mean time?",
+    "levilab.runs(folder)['spin-down-9']": "did you mean spin-down-",
+    "levilab.runs(folder).filter(experiment='spin')": "[run for run in runs if run.experiment == 'spin']",
+    "levilab.runs(folder)[levilab.runs(folder).df.experiment == 'spin']": "[run for run in runs if …] chooses",
+    "result.stokes": "take result.models['stokes']",
+    "result['stokes']": "take result.models['stokes']",
+    "result[0]": "take result.by_input['spin-down-1']",
+    "result['spin-down-1']": "take result.by_input['spin-down-1']",
+    "result.params['c32'].correl": "result.correl",
+    "result.init_fit": "the fit finds its own start",
+    "result.flatchain": "no chain is sampled",
+    "result.dumps()": "to_json()",
+    "result.uvars": "take params",
+    "result.pull": "take data",
+    "result.sel(time_s=0)": "take to_xarray()",
     "levilab.analyze(time=t)": "`time` and `frequency` together",
     "result['c1']": "not among the values of this result (its best law is disc): take result.models['stokes']['c1']",
     "result.models['disk']": "did you mean disc?",
@@ -304,6 +333,7 @@ def names() -> dict[str, Any]:
     }
 
 
+@pytest.mark.filterwarnings("ignore::levilab.errors.DoubtWarning")
 @pytest.mark.parametrize("typed", GUESSES)
 def test_a_natural_guess_works(typed: str, names: dict[str, Any], tmp_path: Path) -> None:
     assert GUESSES[typed](eval(typed, names | {"new": tmp_path, "ax": Figure().subplots()}))
@@ -314,6 +344,12 @@ def test_a_wrong_guess_is_told_the_right_one(typed: str, names: dict[str, Any]) 
     with pytest.raises(levilab.LevilabError) as raised:
         eval(typed, names | {"ax": Figure().subplots()})
     assert REFUSED[typed] in str(raised.value)
+
+
+def test_a_doubt_is_a_warning_at_the_line_that_asked_so_that_a_loop_notices_it(names: dict[str, Any]) -> None:
+    with pytest.warns(DoubtWarning, match=r"the spin is about .* Hz, a Levitron spins at 20 to 60 Hz") as seen:
+        levilab.analyze((T, 60 * names["f"]))
+    assert [Path(one.filename).name for one in seen] == [Path(__file__).name]
 
 
 def test_a_curve_goes_on_beyond_the_readings_as_its_law_says(names: dict[str, Any]) -> None:
