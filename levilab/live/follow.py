@@ -173,10 +173,10 @@ def _event(line: bytes, number: int) -> dict[str, Any]:
         event = json.loads(line)
         time_s, kind, text = event["time_s"], str(event["kind"]), str(event["text"])
         time_s = float(time_s) if time_s is not None else None
-        utc, top = str(event.get("utc", "")), event.get("top")
+        utc, top, frequency = str(event.get("utc", "")), event.get("top"), event.get("frequency_hz")
         text = text_from(event.get("says"), text)
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
-        time_s, kind, text, utc, top = None, "damaged", "a line of events.jsonl is damaged", "", None
+        time_s, kind, text, utc, top, frequency = None, "damaged", "a line of events.jsonl is damaged", "", None, None
     if time_s is not None and not np.isfinite(time_s):
         time_s = None
     shown = {
@@ -185,4 +185,10 @@ def _event(line: bytes, number: int) -> dict[str, Any]:
         "kind": kind[:60],
         "text": text if len(text) <= _MOST_CHARACTERS else text[:_MOST_CHARACTERS],
     }
-    return {"n": number, **shown, "top": top if isinstance(top, int) else None}
+    known = isinstance(frequency, float) and np.isfinite(frequency)
+    return {
+        "n": number,
+        **shown,
+        "top": top if isinstance(top, int) else None,
+        "frequency_hz": frequency if known else None,
+    }

@@ -460,7 +460,7 @@ async def _do(hall: Hall, wanted: dict[str, Any], language: str) -> tuple[dict[s
     number = hall.desk.carry_out(wanted)
     answer = await hall.wait_for_answer(hall.desk, number)
     if answer is not None and answer.kind == "refused":
-        return {"error": answer.text}, 409
+        return {"error": answer.text}, 200  # the request was right, and a browser lists no failure of it
     return {"number": number}, 202 if answer is None else 200
 
 

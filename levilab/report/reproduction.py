@@ -82,9 +82,13 @@ class Asked:
         options = [word for name in OF_REPORT for word in _option(name, self.given.get(name))]
         no_crosscheck = [] if self.crosscheck else ["--no-crosscheck"]
         short = ["--short"] if self.short else []
-        language = [] if spoken() == ENGLISH else ["--language", spoken()]
-        words = [*paths, *options, *no_crosscheck, *short, *language, *self.heading.typed]
+        words = [*paths, *options, *no_crosscheck, *short, *language_option(), *self.heading.typed]
         return " ".join(["levilab", "report", *words, "-o", shlex.quote(self.name)])
+
+
+def language_option() -> list[str]:
+    """Return the option of the language that is spoken, as one types it; nothing for English."""
+    return [] if spoken() == ENGLISH else ["--language", spoken()]
 
 
 def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked) -> Block:

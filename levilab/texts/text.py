@@ -103,10 +103,10 @@ class Sentences(Text):
 
     __slots__ = ()
 
-    def __new__(cls, *texts: str) -> Self:
+    def __new__(cls, *texts: str, between: str = " ") -> Self:
         """Put them one after the other."""
         kept = {f"s{k}": text for k, text in enumerate(texts) if text}
-        return super().__new__(cls, " ".join(f"{{{name}}}" for name in kept), **kept)
+        return super().__new__(cls, between.join(f"{{{name}}}" for name in kept), **kept)
 
     @property
     def each(self) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ const SLIP_HZ = 0.2, SWINGS_HZ = 0.5;  // a top that follows is counted this nea
 
 const token = takeToken();
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, source: null, records: {}};
-const data = {readings: null, fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
+const data = {readings: null, found: null, hidden: null, fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
 const history = openHistory(), sound = openSound();
 let fellAt = NaN;  // a fall whose poses are not kept yet
@@ -90,7 +90,7 @@ function take(head) {
 
 function turnTo(run) {
   Object.assign(seen, {run, readings: -1, events: 0, fit: -1});
-  Object.assign(data, {readings: null, fit: null, about: null, ended: "", end: null, last: {}, count: 0, trend: NaN});
+  Object.assign(data, {readings: null, found: null, hidden: null, fit: null, about: null, ended: "", end: null, last: {}, count: 0, trend: NaN});
   by("event-list").replaceChildren();
   put(by("events-key"), {hidden: true});
   if (by("drawn").value === "minutes") by("drawn").value = "all";
@@ -110,8 +110,17 @@ function takeReadings(about) {
 
 function takeFit(about) {
   seen.fit = about.version;
+  data.found = about;
+  data.hidden = null;
+}
+
+/** Draw the running fit, unless a task asks for what it says. */
+function showFit() {
+  const hidden = Boolean(practice?.hidesFit?.()), about = hidden ? {} : data.found ?? {};
+  if (data.hidden === hidden) return;
+  data.hidden = hidden;
   data.fit = about.curve ? {...about, ...about.curve, solid_to: about.curve.solid_to ?? Infinity} : null;
-  typeset(by("fit-head"), about.head || "");
+  typeset(by("fit-head"), hidden ? phrase("The fit is shown once the run is analyzed: the task asks for what it says.") : about.head || "");
   typeset(by("fit-lines"), (about.lines || []).join(" · "));
   data.end = about.end_s || null;
   dirty.plot = true;
@@ -277,6 +286,7 @@ function show() {
   }[state] || (about?.status === "running" ? phrase("No reading yet: the top is being driven up.") : phrase("This run has no readings.")));
   put(document, {title: `${state === "running" && data.count ? `${phrase("{count} readings", {count: data.count})} · ` : ""}levilab live`});
   if (isReady) practice?.show(bench, about, data.count, down);
+  showFit();
   put(by("own"), {hidden: !practice || wanted === OWN_BENCH || !seen.run || (isOwn(seen.run) ?? !wanted)});  // a run that begins is listed in a moment
   space?.setSpeed?.(bench?.speed, bench?.paused || bench?.silent);
   showTop(bench);

@@ -177,8 +177,8 @@ export function openPractice(about, command, run, isOwn, allowed) {
   // tasks
   const tasks = Object.fromEntries(about.tasks.map((row) => {
     const item = make("li"), button = make("button", phrase(row.title));
-    button.title = phrase(row.does);
     button.addEventListener("click", () => send("begin a task", {task: row.name}));
+    for (const kind of ["focusin", "pointerenter"]) item.addEventListener(kind, () => write("goal", phrase(row.does)));
     item.append(button);
     by("task-list").append(item);
     return [row.name, {...row, item}];
@@ -199,6 +199,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     put(by("task-share"), {value: bench.task_share});
     write("tasks-done", bench.tasks_done.length ? `${bench.tasks_done.length}/${about.tasks.length}` : "");
     for (const [name, {item}] of Object.entries(tasks)) put(item, {className: bench.tasks_done.includes(name) ? "done" : ""});
+    if (!by("goal").textContent) write("goal", phrase((next ?? about.tasks[0]).does));
     if (bench.task === shownTask) return;
     shownTask = bench.task;
     if (!row) return;
@@ -302,8 +303,11 @@ export function openPractice(about, command, run, isOwn, allowed) {
     if (is() && !isThere) now.asked = "";
   }
 
+  /** Whether the running fit would give away what the task under way asks for: until the run is analyzed. */
+  const hidesFit = () => now.analyzed !== run() && Object.keys(tasks[now.bench?.task]?.answers ?? {}).length > 0;
+
   return {
-    show, step, hear, get ended() { return now.ended; },
+    show, step, hear, hidesFit, get ended() { return now.ended; },
     act: (id) => by(id).click(),
   };
 }

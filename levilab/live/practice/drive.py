@@ -242,7 +242,10 @@ class PracticeDrive:
         self._switch_on(spin)
         limits = self.generator.limits
         self._hold = Hold(self._set.frequency_hz, Grip(spin, limits.drive_lowest_hz, limits.drive_frequency_hz))
-        self._voice.say("drive on at the top's spin; it takes hold within 20 s")
+        self._voice.say(
+            "drive on at the top's spin: at first its frequency goes after the top, and from within 20 s on the top "
+            "follows it"
+        )
 
     def _yield(self, hold: Hold, spin: float | None) -> None:
         grip = hold.grip

@@ -27,7 +27,7 @@ from levilab.live.practice.drive import GATE_S, TRIGGER_V, PracticeDrive
 from levilab.live.practice.experiments import PRACTICE, PracticeExperiment, settings_for
 from levilab.live.practice.fall import cause_of_fall
 from levilab.live.practice.seeds import keys_of_seed, seed_of_group
-from levilab.live.practice.tasks import Look, Tasks
+from levilab.live.practice.tasks import TASKS, Look, Tasks
 from levilab.live.practice.top import PracticeTop
 from levilab.simulator.scene import read_scene
 from levilab.telemetry.messages import State
@@ -371,10 +371,9 @@ class PracticeProcess:
         if self.tasks.is_right(command.value):
             self._look_at_task(command.value)
             return
-        self._begin_task(ask.BeginTask(task=self.tasks.name))  # else the third guess would be right
-        raise CommandRefused(
-            Text("n = {value:g} is not it: now a top floats in other air, so record once more", value=command.value)
-        )
+        task = self.tasks.name
+        self._begin_task(ask.BeginTask(task=task))  # else the third guess would be right
+        raise CommandRefused(TASKS[task].wrong(command.value))
 
     # --- runs ---
 

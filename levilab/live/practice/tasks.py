@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -59,6 +60,9 @@ class Task:
         found: said of the top that reached it; empty: nothing.
         hidden: what the bench changes, and does not say: keys of a scene by a random number from 0 to 1.
         answers: to choose from; none: no answer is asked.
+        measures: the experiment that is recorded before an answer.
+        right: the answer, from the random number of what is hidden.
+        wrong: said of another answer, its value.
     """
 
     title: str
@@ -70,6 +74,9 @@ class Task:
     found: Callable[[Scene], str] = lambda _: ""
     hidden: Callable[[float], dict[str, Any]] = lambda _: {}
     answers: Mapping[str, float] = field(default_factory=dict)
+    measures: str = ""
+    right: Callable[[float], float] = lambda _: math.nan
+    wrong: Callable[[float], str] = lambda _: ""
 
 
 def _mass(chance: float) -> dict[str, Any]:
@@ -93,6 +100,14 @@ def exponent_of(chance: float) -> float:
 def _law(chance: float) -> dict[str, Any]:
     law, coefficient = _LAWS[exponent_of(chance)]
     return {"drag.law": law, "drag.coefficient": coefficient}
+
+
+def _say_exponent(n: float) -> str:
+    return Text("n = {value:g} is not it: now a top floats in other air, so record once more", value=n)
+
+
+def _say_slope(b: float) -> str:
+    return Text("b = {value:g} is not it: look at the line of the result once more, and record another", value=b)
 
 
 TASKS: dict[str, Task] = {
@@ -122,6 +137,15 @@ TASKS: dict[str, Task] = {
         "with n = 1 the spin halves in equal times; the higher n, the more the curve flattens; a fit tells best",
         "record", lambda look: look.answer is not None, hidden=_law,
         answers={"n = 1": 1.0, "n = 3/2": 1.5, "n = 2": 2.0},
+        measures="spin", right=exponent_of, wrong=_say_exponent,
+    ),
+    "stem": Task(
+        "Count the stem", "How often does the stem of a held top go round in a turn of the drive? Record the "
+        "precession, analyze it, and say the slope b of its line.",
+        "a top that follows its drive leans to a side that turns with it, so its stem goes round once a turn at every "
+        "frequency: b = 1, and the line begins at 0",
+        "experiment", lambda look: look.answer is not None, answers={"b = 1/2": 0.5, "b = 1": 1.0, "b = 2": 2.0},
+        measures="precession", right=lambda _: 1.0, wrong=_say_slope,
     ),
 }  # fmt: skip
 
@@ -133,7 +157,7 @@ class Tasks:
         name: of the task under way, in TASKS; empty: none.
         share: the part of the way to its goal, from 0 to 1.
         done: names of those that were reached, in order.
-        is_measured: whether a spin-down was recorded since it began.
+        is_measured: whether its experiment was recorded since it began.
 
     Args:
         seed: of the random numbers that hide what is hidden.
@@ -160,15 +184,15 @@ class Tasks:
 
     def take_run(self, experiment: str) -> None:
         """Note that a run of an experiment was recorded."""
-        self.is_measured |= experiment == "spin"
+        self.is_measured |= bool(self.name) and experiment == TASKS[self.name].measures
 
     def is_right(self, answer: float) -> bool:
         """Return whether an answer is right.  Raises CommandRefused where none is asked, or it would be a guess."""
         if not self.name or not TASKS[self.name].answers:
             raise CommandRefused("no task asks for an answer: begin one that does")
         if not self.is_measured:
-            raise CommandRefused("that would be a guess: first record a spin-down of this top, and analyze it")
-        return answer == exponent_of(self._chance)
+            raise CommandRefused("that would be a guess: first record what the task names, and analyze it")
+        return answer == TASKS[self.name].right(self._chance)
 
     def look(self, look: Look) -> Task | None:
         """Return the task under way if its goal is reached at a moment."""

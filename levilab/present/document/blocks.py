@@ -314,19 +314,19 @@ T = TypeVar("T")
 _NOT_SAID = frozenset({"name", "anchor", "narrow", "on_paper", "gid", "code", "byline", "kind"})
 
 
-def in_language_of_reader(part: T) -> T:
-    """Return a document, or a part of one, with its texts in the language of this process; commands stay."""
+def in_language_of_reader(part: T, code: str | None = None) -> T:
+    """Return a document, or a part of one, in a language, by default that of this process; commands stay."""
     if isinstance(part, str):
-        return in_language(part)  # type: ignore[return-value]
+        return in_language(part, code)  # type: ignore[return-value]
     if isinstance(part, tuple | list):
-        return type(part)(map(in_language_of_reader, part))
+        return type(part)(in_language_of_reader(one, code) for one in part)
     if not is_dataclass(part) or isinstance(part, type | Code):
         return part
     if isinstance(part, Fact):
-        texts = part.texts if part.code else in_language_of_reader(part.texts)
-        return replace(part, name=in_language(part.name), texts=texts)
+        texts = part.texts if part.code else in_language_of_reader(part.texts, code)
+        return replace(part, name=in_language(part.name, code), texts=texts)
     said = {field.name: getattr(part, field.name) for field in fields(part) if field.name not in _NOT_SAID}
-    return replace(part, **{name: in_language_of_reader(value) for name, value in said.items()})
+    return replace(part, **{name: in_language_of_reader(value, code) for name, value in said.items()})
 
 
 B = TypeVar("B", bound="Block")

@@ -22,6 +22,7 @@ from levilab.errors import unquote
 from levilab.present.numbers import enumeration, how_many, plain, with_sign, with_uncertainty
 from levilab.present.units import unit
 from levilab.texts.note import is_doubt
+from levilab.texts.text import Sentences, Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -198,7 +199,7 @@ def _common(parts: Sequence[Mapping[str, Any]]) -> list[str]:
 
 def _plain(text: str) -> str:
     """Return a message without backquotes, which stand for a terminal's bold letters."""
-    return unquote(text).replace("`", "")
+    return unquote(in_language(text)).replace("`", "")
 
 
 def _has_u(value: Mapping[str, Any]) -> bool:
@@ -272,16 +273,23 @@ class Mark:
 
 
 def _mark(of: Class, k: int) -> Mark:
-    group, wrong, odd = of.groups[k], [], []
+    group, wrong, odd = of.groups[k], list[str](), list[str]()
     for one in of.quantities:
         truth, others = one.from_truth[k], one.from_class[k]
         if one.estimates[k] is None:
-            wrong.append(f"{one.symbol}: no value with u")
+            wrong.append(Text("{symbol}: no value with u", symbol=one.symbol))
         elif truth is not None and abs(truth) > FAR:
             cause = "of another seed, cut short, or changed?"
-            wrong.append(f"{one.symbol}: {with_sign(truth, 1)} u from its truth: are the readings {cause}")
+            wrong.append(
+                Text(
+                    "{symbol}: {times:n} u from its truth: are the readings {cause}",
+                    symbol=one.symbol,
+                    times=with_sign(truth, 1),
+                    cause=cause,
+                )
+            )
         elif truth is None and others is not None and abs(others) > FAR:
-            odd.append(f"{one.symbol}: {with_sign(others, 1)} u from the others")
+            odd.append(Text("{symbol}: {times:n} u from the others", symbol=one.symbol, times=with_sign(others, 1)))
     wrong += group.doubts
     remarks = tuple(text for text in group.warnings if text not in group.doubts)
     if few := _few_readings(of, k):
@@ -294,7 +302,11 @@ def _few_readings(of: Class, k: int) -> str:
     """Return that a group has less than half as many readings as the others have; else an empty text."""
     counts = [count_readings(group) for group in of.groups]
     usual = statistics.median(counts[:k] + counts[k + 1 :] or [0])
-    return f"{how_many(counts[k], 'reading')} instead of {usual:.0f}: measure longer" if counts[k] < usual / 2 else ""
+    return (
+        Text("{readings} instead of {usual:.0f}: measure longer", readings=how_many(counts[k], "reading"), usual=usual)
+        if counts[k] < usual / 2
+        else ""
+    )
 
 
 def count_readings(group: Group) -> int:
@@ -307,9 +319,11 @@ def _count_marks(of: Class) -> str:
     named: dict[str, list[str]] = {GOOD: [], LOOK: [], REPEAT: []}
     for group, one in zip(of.groups, of.marks, strict=True):
         named[one.word].append(group.source.name)
-    texts = [f"{len(named[GOOD])} of {len(of.groups)} results {'is' if len(named[GOOD]) == 1 else 'are'} good."]
-    texts += [f"To repeat: {enumeration(named[REPEAT])}."] if named[REPEAT] else []
-    return " ".join([*texts, *([f"To look at: {enumeration(named[LOOK])}."] if named[LOOK] else [])])
+    good = len(named[GOOD])
+    said = "{n} of {all} results is good." if good == 1 else "{n} of {all} results are good."
+    texts: list[str] = [Text(said, n=good, all=len(of.groups))]
+    texts += [Text("To repeat: {names}.", names=enumeration(named[REPEAT]))] if named[REPEAT] else []
+    return Sentences(*texts, *([Text("To look at: {names}.", names=enumeration(named[LOOK]))] if named[LOOK] else []))
 
 
 #: Below it chance does not make groups differ so much.
@@ -325,33 +339,45 @@ _WITHIN_2_U = 0.954
 def finding(of: Class) -> str:
     """Return the mean of the class and whether its groups agree, in one sentence."""
     if not of.quantities:
-        return f"{how_many(len(of.groups), 'group')}: no quantity has a value with u"
+        return Text("{groups}: no quantity has a value with u", groups=how_many(len(of.groups), "group"))
     first = of.quantities[0]
-    return f"{_mean(first)}, mean of {_count(of, first)}: {_agreement(first)}"
+    return Text(
+        "{mean}, mean of {groups}: {agreement}",
+        mean=_mean(first),
+        groups=_count(of, first),
+        agreement=_agreement(first),
+    )
 
 
 def verdict(of: Class) -> str:
     """Return whose results are good, and the mean of each quantity beside the truth."""
     if len(of.groups) == 1:
         (group,), (mark,) = of.groups, of.marks
-        return f"{group.source.name} alone measured this: {mark.word}."
-    texts = [f"{_mean(one)} is the mean of {_count(of, one)}{_beside_truth(one)}." for one in of.quantities]
-    return "  ".join([_count_marks(of), *_scenes(of), *texts])
+        return Text("{name:s} alone measured this: {mark}.", name=group.source.name, mark=mark.word)
+    texts = [
+        Text(
+            "{mean} is the mean of {groups}{truth}.", mean=_mean(one), groups=_count(of, one), truth=_beside_truth(one)
+        )
+        for one in of.quantities
+    ]
+    return Sentences(_count_marks(of), *_scenes(of), *texts)
 
 
 def _beside_truth(of: Compared) -> str:
     if of.truth is None:
         return ""
     agrees = "agrees with" if abs(of.truth[1]) <= _AGREES else "disagrees with"
-    return f", and {agrees} the truth, which is {with_sign(-of.truth[1], 1)} u from it"
+    return Text(
+        ", and {agrees} the truth, which is {times:n} u from it", agrees=agrees, times=with_sign(-of.truth[1], 1)
+    )
 
 
 def agreement(of: Class) -> str:
     """Return how far the groups agree, quantity by quantity, and how well they met the truth; empty for one group."""
     if len(of.groups) == 1:
         return ""
-    texts = [f"{one.symbol}: {_agreement(one)}." for one in of.quantities]
-    return "  ".join([*texts, *([_truth(of)] if of.knows_truth else [])])
+    texts = [Text("{symbol}: {agreement}.", symbol=one.symbol, agreement=_agreement(one)) for one in of.quantities]
+    return Sentences(*texts, _truth(of) if of.knows_truth else "")
 
 
 def statistics_of_agreement(of: Class) -> str:
@@ -359,7 +385,7 @@ def statistics_of_agreement(of: Class) -> str:
     compared = [(one, one.together) for one in of.quantities if one.together and one.together.freedom]
     rule = "The mean is unweighted, as in levilab report; its u comes from the standard deviation of the values."
     meaning = [rule] if compared else []
-    return "  ".join([*meaning, *(_chi_square(one, together) for one, together in compared)])
+    return Sentences(*meaning, *(_chi_square(one, together) for one, together in compared))
 
 
 def _scenes(of: Class) -> list[str]:
@@ -369,12 +395,17 @@ def _scenes(of: Class) -> list[str]:
     if len(scenes) < 2:
         return []
     named = enumeration(sorted(name or "a spin alone" for name in scenes))
-    return [f"Compare these runs apart: they are of several scenes of the virtual bench ({named}), whose tops differ."]
+    return [
+        Text(
+            "Compare these runs apart: they are of several scenes of the virtual bench ({names}), whose tops differ.",
+            names=named,
+        )
+    ]
 
 
 def _mean(of: Compared) -> str:
     shown = of.show(of.mean.value, of.mean.u) if of.mean else None
-    return f"{of.symbol} = {with_uncertainty(shown)}" if shown else of.symbol
+    return Text("{symbol} = {value:n}", symbol=of.symbol, value=with_uncertainty(shown)) if shown else of.symbol
 
 
 def _count(of: Class, one: Compared) -> str:
@@ -382,7 +413,7 @@ def _count(of: Class, one: Compared) -> str:
     found = [group.source for group, use in zip(of.groups, one.used, strict=True) if use]
     n = len({source.group or source.name for source in found})
     groups = how_many(n, "group")
-    return groups if len(found) == n else f"{how_many(len(found), 'run')} of {groups}"
+    return groups if len(found) == n else Text("{runs} of {groups}", runs=how_many(len(found), "run"), groups=groups)
 
 
 def _agreement(of: Compared) -> str:
@@ -390,22 +421,31 @@ def _agreement(of: Compared) -> str:
     if together is None or together.scatter is None:
         return "there is no other group to compare it with"
     if together.p < DIFFER:
-        return f"the groups differ by {_scatter(of, together)}, more than their u, as different tops do"
-    return f"the groups agree within their u: they differ by {_scatter(of, together)}"
+        return Text(
+            "the groups differ by {scatter}, more than their u, as different tops do", scatter=_scatter(of, together)
+        )
+    return Text("the groups agree within their u: they differ by {scatter}", scatter=_scatter(of, together))
 
 
 def _scatter(of: Compared, together: Comparison) -> str:
     """Return by how much the groups differ: in per cent of the mean, unless that is near zero."""
     scatter, average = together.scatter or 0.0, abs(of.mean.value or 0.0) if of.mean else 0.0
     if scatter < average:
-        return f"{digits(100 * scatter / average, 2)} %"
-    return f"{digits(scatter * unit(of.unit).shown.factor, 2)} {of.shown_unit}".rstrip()
+        return Text("{percent:n} %", percent=digits(100 * scatter / average, 2))
+    return Text("{scatter:n} {unit:s}", scatter=digits(scatter * unit(of.unit).shown.factor, 2), unit=of.shown_unit)
 
 
 def _chi_square(one: Compared, together: Comparison) -> str:
-    p = "p < 10⁻⁶" if together.p < 1e-6 else f"p = {plain(together.p, 2)}"
-    freedom = f"{how_many(together.freedom, 'degree')} of freedom"
-    return f"{one.symbol}: χ² = {plain(together.chi_square)} for {freedom}, {p}{_known_to(together.freedom)}."
+    p = "p < 10⁻⁶" if together.p < 1e-6 else Text("p = {p:n}", p=plain(together.p, 2))
+    freedom = Text("{degrees} of freedom", degrees=how_many(together.freedom, "degree"))
+    return Text(
+        "{symbol}: χ² = {chi:n} for {freedom}, {p}{known}.",
+        symbol=one.symbol,
+        chi=plain(together.chi_square),
+        freedom=freedom,
+        p=p,
+        known=_known_to(together.freedom),
+    )
 
 
 def _known_to(freedom: int) -> str:
@@ -415,14 +455,21 @@ def _known_to(freedom: int) -> str:
     if freedom >= _FEW:
         return ""
     known, factor = 100 / math.sqrt(2 * freedom), float(stdtrit(freedom, 0.5 + 0.6827 / 2))
-    return f"; {freedom + 1} values give their scatter to {known:.0f} % only: a 68 % interval is {digits(factor, 2)} u"
+    return Text(
+        "; {n} values give their scatter to {percent:.0f} % only: a 68 % interval is {factor:n} u",
+        n=freedom + 1,
+        percent=known,
+        factor=digits(factor, 2),
+    )
 
 
 def _truth(of: Class) -> str:
     distances = [one for quantity in of.quantities for one in quantity.from_truth if one is not None]
     near = sum(abs(one) <= 2 for one in distances)
-    return (
-        f"On the virtual bench the truth is known: {near} of {how_many(len(distances), 'value')} "
-        f"lie{'s' * (len(distances) == 1)} within 2 u of it, "
-        f"{100 * _WITHIN_2_U:.0f} % are expected."
+    return Text(
+        "On the virtual bench the truth is known: within 2 u of it are {near} of {values}, {percent:.0f} % are "
+        "expected.",
+        near=near,
+        values=how_many(len(distances), "value"),
+        percent=100 * _WITHIN_2_U,
     )

@@ -23,6 +23,7 @@ from levilab.present.document.blocks import (
     Tabular,
     Verdict,
     Warnings,
+    in_language_of_reader,
 )
 from levilab.present.numbers import column, enumeration, how_many, plain, with_sign, without_unit
 from levilab.present.tables import Row, table
@@ -41,8 +42,9 @@ from levilab.report.groups.beside import (
 )
 from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, writing_report
-from levilab.report.reproduction import Heading
+from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
+from levilab.texts.text import Sentences, Text, in_language, spoken
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -70,7 +72,9 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str) -
     sources = list({source.path.resolve(): source for of in classes for source in of.found.sources}.values())
     classes = sorted(classes, key=lambda of: -len(of.groups))  # what one group alone measured comes last
     alone = len(classes) == 1
-    warnings = dict.fromkeys(unquote(text).replace("`", "") for of in classes for text in of.found.warnings)
+    warnings = dict.fromkeys(
+        unquote(in_language(text)).replace("`", "") for of in classes for text in of.found.warnings
+    )
     of_all = [Warnings(tuple((text,) for text in warnings))] if warnings else []
     chapters: list[Block] = []
     for k, of in enumerate(classes):
@@ -78,8 +82,8 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str) -
         chapters += own if alone else [Section(_subject(of), own, anchor=of.analysis.name, new_page=k > 0)]
     names = {source.group or source.name for source in sources}
     return Document(
-        title=f"Class of {how_many(len(names), 'group')}",
-        lead=f"{count_inputs(sources)}: {', '.join(map(_subject, classes))}",
+        title=Text("Class of {groups}", groups=how_many(len(names), "group")),
+        lead=Text("{inputs}: {subjects}", inputs=count_inputs(sources), subjects=tuple(map(_subject, classes))),
         blocks=(*of_all, *chapters, _made_by(paths, name)),
         banner=banner_of(sources),
         contents=True,
@@ -111,13 +115,15 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
 def _marks(of: Class) -> Iterator[Tabular]:
     """Yield a row for each group whose result is not good, and why; nothing where all are."""
     rows = [
-        Row((group.source.name, mark.word, "\n".join(mark.why)), _ROWS[mark.word])
+        Row((group.source.name, mark.word, Sentences(*mark.why, between="\n")), _ROWS[mark.word])
         for group, mark in zip(of.groups, of.marks, strict=True)
         if mark.word != GOOD
     ]
-    note = (
-        f"repeat: no value, or one more than {FAR:.0f} u from its truth, or a doubt about the readings; look: a "
-        f"remark, or, where no truth is known, more than {FAR:.0f} u from the others."
+    note = Text(
+        "repeat: no value, or one more than {far:.0f} u from its truth, or a doubt about the "
+        "readings; look: a remark, or, where no truth is known, more than {far:.0f} u from the "
+        "others.",
+        far=FAR,
     )
     if rows:
         shown = table("", ["group", "result", "why"], rows)
@@ -145,7 +151,7 @@ def _values(of: Class, quantity: Compared) -> Tabular:
     rows = rows if len(of.groups) > 1 else rows[:1]
     note = "value(u): the digits in parentheses are u of the last digits."
     if any(one and not use for one, use in zip(quantity.estimates, quantity.used, strict=True)):
-        note += " The mean is without results to repeat."
+        note = Sentences(note, "The mean is without results to repeat.")
     name = f"{of.analysis.name}-{quantity.name.replace('_', '-')}"
     return Tabular(name, table("", heads, rows, numbers=numbers), note, first_column_wraps=True, narrow="turn")
 
@@ -164,7 +170,7 @@ def _distance(distance: float | None) -> str:
 def _groups(of: Class) -> Tabular:
     """Return a row for each group: its seed, its readings, how well the law fits them, its folder."""
     shown = f" [{unit}]" if (unit := unit_of_residuals(of.analysis)) else ""
-    heads = ["group", "seed", "readings", f"rms residual{shown}", "χ²/dof", "best law", "run"]
+    heads = ["group", "seed", "readings", Text("rms residual{unit:s}", unit=shown), "χ²/dof", "best law", "run"]
     rows = [
         (
             group.source.name,
@@ -179,10 +185,11 @@ def _groups(of: Class) -> Tabular:
     ]
     full = [k for k in range(len(heads)) if any(row[k] not in {"", "—"} for row in rows)]
     heads, rows = [heads[k] for k in full], [tuple(row[k] for k in full) for row in rows]  # type: ignore[misc]
-    note = f"Residuals are those of the law {of.model}, whose constants are compared." if of.model else ""
+    note = Text("Residuals are those of the law {law}, whose constants are compared.", law=of.model) if of.model else ""
     if of.others:
-        laws = enumeration([f"{name} ({law})" for name, law in of.others.items()])
-        note += f" The seeds of these groups have another law, and so no truth to compare with: {laws}."
+        laws = enumeration([Text("{name:s} ({law})", name=name, law=law) for name, law in of.others.items()])
+        other = Text("The seeds of these groups have another law, and so no truth to compare with: {laws}.", laws=laws)
+        note = Sentences(note, other)
     numbers = [head for head in heads if head not in {"group", "run", "best law"}]
     return Tabular(f"{of.analysis.name}-groups", table("", heads, rows, numbers=numbers), note, first_column_wraps=True)
 
@@ -192,7 +199,7 @@ def _picture(of: Class) -> Picture:
     return Picture(
         name=f"{of.analysis.name}-class",
         title="The class.",
-        caption=f"Each group's value with its u, and the mean of the class{truth}.",
+        caption=Text("Each group's value with its u, and the mean of the class{truth}.", truth=truth),
         alt=finding(of),
         draw=partial(_draw, of),
     )
@@ -205,9 +212,11 @@ def _draw(of: Class) -> Figure:
 
 
 def _made_by(paths: Sequence[Path], name: str) -> Note:
-    typed = " ".join(shlex.quote(str(path)) for path in paths)
+    typed = " ".join([*(shlex.quote(str(path)) for path in paths), *language_option()])
     each = "each group's readings, figure and budget of uncertainties are in that of levilab report"
-    return Note(f"Made by: levilab class {typed} -o {shlex.quote(name)}; {each}.")
+    return Note(
+        Text("Made by: levilab class {paths:s} -o {out:s}; {each}.", paths=typed, out=shlex.quote(name), each=each)
+    )
 
 
 SPREADSHEET = ".xlsx"
@@ -251,7 +260,7 @@ def write_class(
     date = newest_of(results)
     if form:
         document = (heading or Heading()).above(class_document(classes, paths, output.name))
-        content = form.content(replace(document, date=date))
+        content = form.content(in_language_of_reader(replace(document, date=date, language=spoken())))
     else:
         content = class_workbook(classes, date)
     with writing_report(output):

@@ -13,6 +13,7 @@ from levilab.present.looks import BLUE, GREEN, VERMILION
 from levilab.present.style import STYLE, WIDE, label_of_run
 from levilab.present.units import unit
 from levilab.report.groups.beside import finding
+from levilab.texts.text import in_language
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,10 +39,15 @@ def class_figure(of: Class) -> Figure:
     width = (_RIGHT - _LEFT - (panels - 1) * _GAP) / panels
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, _HEAD + height + _FOOT))
-        headline(figure, in_mathtext(finding(of)), synthetic_mark([group.source.synthetic for group in of.groups]))
-        about = "point and bar: value ± u of a group; line: mean of the class"
+        headline(
+            figure,
+            in_mathtext(in_language(finding(of))),
+            synthetic_mark([group.source.synthetic for group in of.groups]),
+        )
+        about = in_language("point and bar: value ± u of a group; line: mean of the class")
+        diamond = in_language("; diamond: truth of the virtual bench") if of.knows_truth else ""
         write(
-            figure, 0.08, 0.52, f"{about}; diamond: truth of the virtual bench" if of.knows_truth else about,
+            figure, 0.08, 0.52, f"{about}{diamond}",
             fontsize=SMALL,
         )  # fmt: skip
         for k in range(panels):

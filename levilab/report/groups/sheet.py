@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.present.units import name_with_unit
 from levilab.report.groups.beside import REPEAT
+from levilab.texts.text import in_language
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Sequence
@@ -41,7 +42,7 @@ def class_workbook(classes: Sequence[Class], date: datetime | None) -> bytes:
         red = {
             "type": "cell",
             "criteria": "==",
-            "value": f'"{REPEAT}"',
+            "value": f'"{in_language(REPEAT)}"',
             "format": book.add_format({"color": "#b00020"}),
         }
         for of in classes:
@@ -97,8 +98,8 @@ def _groups(of: Class) -> tuple[list[str], list[list[Cell]]]:
         source, record = group.source, group.source.run.record if group.source.run else None
         about: list[Cell] = [
             source.group or source.name,
-            mark.word,
-            "\n".join(mark.why),
+            in_language(mark.word),
+            "\n".join(map(in_language, mark.why)),
             source.path.name,
             source.note,
             (record.started_utc if record else None) or "",

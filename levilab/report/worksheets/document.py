@@ -22,6 +22,7 @@ from levilab.present.document.blocks import (
     Question,
     Section,
     Tabular,
+    in_language_of_reader,
 )
 from levilab.present.numbers import column, how_many
 from levilab.present.progress import Display
@@ -206,7 +207,7 @@ def write_worksheets(
             out.mkdir(parents=True, exist_ok=True)
             for name, document in contents.items():
                 files.append(out / f"{name}-{language}{ending}")
-                replace_atomically(files[-1], form.content(document))
+                replace_atomically(files[-1], form.content(in_language_of_reader(document, language)))
     return files
 
 

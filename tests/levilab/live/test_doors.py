@@ -123,12 +123,12 @@ def test_a_command_needs_the_token(hall, bench):
 @pytest.mark.parametrize(
     "wanted",
     [{}, [], "x", {"do": "explode"}, {"do": "pause", "on": "yes"}, {"do": "analyze", "run": ".."},
-     {"do": "tune the drive", "frequency_hz": "30"}, {"do": "stop the run"}],
+     {"do": "tune the drive", "frequency_hz": "30"}],
 )  # fmt: skip
 def test_what_is_no_command_is_refused_in_words(hall, wanted):
     right = {"X-Levilab-Token": hall.doors.token}
     status, text = request(address(hall), "/do", json.dumps(wanted).encode(), headers=right)
-    assert status in {400, 404, 409}
+    assert status in {400, 404}
     assert json.loads(text)["error"]
 
 

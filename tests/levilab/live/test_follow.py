@@ -98,12 +98,12 @@ def test_events_are_kept_up_to_a_number_and_damaged_ones_named(tmp_path):
     with (run.folder / "events.jsonl").open("a") as file:
         file.write('{"time_s": "never"}\n' + "x" * 3_000_000 + "\n")
         file.write(f'{{"time_s": 1{400 * "0"}, "kind": "said", "text": "a time beyond all floats"}}\n')
-    run.event("y" * 5000)
+    run.event("y" * 5000, kind="drive on", frequency_hz=29.4)
     followed = look(Followed(run.folder))
     assert len(followed.events) == MOST_EVENTS
     texts = followed.texts_after(followed.event_count - 3)
-    assert [event["kind"] for event in texts] == ["damaged", "damaged", "said"]
-    assert len(texts[-1]["text"]) == 600
+    assert [event["kind"] for event in texts] == ["damaged", "damaged", "drive on"]
+    assert (len(texts[-1]["text"]), texts[-1]["frequency_hz"]) == (600, 29.4)  # the running fit needs the frequency
 
 
 def test_a_run_whose_process_is_gone_is_interrupted(tmp_path):

@@ -470,12 +470,22 @@ def test_the_mass_that_floats_is_found(tmp_path: Path) -> None:
 
 
 class Measured(Script):
-    """Has recorded a spin-down before each answer from 3 s on."""
+    """Has recorded what a task asks for before each answer from 3 s on."""
 
     def poll(self) -> bool:
         if self.process and self.clock.now() > 3.0:
             self.process.tasks.take_run("spin")
+            self.process.tasks.take_run("precession")
         return super().poll()
+
+
+def test_the_stem_is_counted_by_the_precession(tmp_path: Path) -> None:
+    begin = (1.0, BeginTask(task="stem")), (2.0, AnswerTask(value=1.0))
+    script = carry_out(
+        tmp_path, *begin, (4.0, AnswerTask(value=2.0)), (5.0, AnswerTask(value=1.0)), (6.0, None), script=Measured
+    )
+    assert [text.partition(":")[0] for text in script.said("refused")] == ["that would be a guess", "b = 2 is not it"]
+    assert script.states[-1].tasks_done == ("stem",)
 
 
 def test_the_exponent_is_measured_and_neither_guessed_nor_found_by_elimination(tmp_path: Path) -> None:

@@ -137,7 +137,7 @@ def test_page_and_pdf_begin_with_the_result(of_three, tmp_path):
     assert places == sorted(places)
     assert "SYNTHETIC." in page
     assert "rms residual [Hz]" in page
-    assert "3 of 3 values lie within 2 u of it" in page
+    assert "within 2 u of it are 3 of 3 values" in page
     assert HOSTILE not in page
     assert write_class([of_three], tmp_path / "class.pdf").read_bytes().startswith(b"%PDF")
 
