@@ -228,6 +228,7 @@ def analyze(
     base_m: float | None = None,
     scale_m: float | None = None,
     camera_m: float | None = None,
+    beside: bool = False,
     stem_m: float | None = None,
     start_s: float | None = None,
     stop_s: float | None = None,
@@ -278,6 +279,7 @@ def analyze(
         base_m: scale of a film: outer diameter of the base [m] (video).
         scale_m: scale of a film: length of a pixel [m] (video).
         camera_m: its distance from the base, with base_m or rim_m, and height_m, here of the rim [m] (video).
+        beside: the camera is beside the top, at its height (video).
         stem_m: height of a light dot on the stem above the rim [m] (video).
         start_s: time in the film from which the top floats [s] (video).
         stop_s: time until which [s] (video).

@@ -28,16 +28,16 @@ if TYPE_CHECKING:
 _LONG, _SHORT, _COVERED = 44, 20, 0.95
 #: Length of a ray to either side of an edge, of half the height, and the least [pixels]; radii along it to either side.
 _WIDTH, _LEAST_WIDTH, _STEPS = 0.5, 3.0, 8
-#: Weight of the size before, in rays: where the mark lies at one end, the other one gives the place.
+#: Weight of the place and the size before, in rays: where the mark lies at one end, the other one gives the place.
 _ANY_SIZE = np.full(7, 1e-3)
-_SAME_SIZE = np.array([1e-3, 1e-3, 1e-3, 20.0, 1e-3, 1e-3, 1e-3])
+_SAME_SIZE = np.array([2.0, 1e-3, 1e-3, 20.0, 1e-3, 1e-3, 1e-3])
 #: An edge that is off by less is a real one [pixels]: corners are round.
 _LEAST_OFF = 0.4
 #: Pixels along an edge that the noise of a film is alike over, by the scatter of simulated films.
-_CORRELATED = 2.5
+_CORRELATED = 4.0
 #: A fit that moves the middle by less than this part of a ray's length is the last one.
 _CLOSE = 0.02
-#: The part that changes holds the edges at both ends of their motion; the side is at least so high [pixels].
+#: The side is at least so high [pixels].
 _LEAST_HEIGHT = 4.0
 #: The mark is looked for where the side is seen under less than this angle [rad], in the inner part of its height.
 _SEEN, _INNER, _ROWS = 1.2, 0.7, 8
@@ -95,14 +95,28 @@ def find_side(pictures: Array) -> Side:
     part = changing_part(pictures)
     if part is None:
         raise NoTop(moving=0.0)
-    rows, columns = part
+    picture = np.median(pictures, axis=0)
+    rows, columns = _grown(picture, *part)
     wide, high = (columns.stop - columns.start) / 2, (rows.stop - rows.start) / 2
     middle = (columns.start + columns.stop - 1) / 2, (rows.start + rows.stop - 1) / 2
     for less in np.arange(0.0, high - _LEAST_HEIGHT / 2):
-        found = fit_side(np.median(pictures, axis=0), Side(*middle, wide - less, high - less), rounds=8, find_size=True)
+        found = fit_side(picture, Side(*middle, wide - less / 2, high - less), rounds=8, find_size=True)
         if found is not None:
             return _with_size(found[1], pictures)
     raise NoTop(moving=4 * wide * high / pictures[0].size)
+
+
+def _grown(picture: Array, rows: slice, columns: slice) -> tuple[slice, slice]:
+    """Return the part of a picture, round one that changes, that is as bright as that, unlike the rest."""
+    from scipy.ndimage import find_objects, label
+
+    top, outside = float(np.median(picture[rows, columns])), float(np.median(picture))
+    parts, _ = label(np.abs(picture - top) < abs(outside - top) / 2)
+    inside = np.bincount(parts[rows, columns].ravel())
+    if inside[1:].max(initial=0) == 0:
+        return rows, columns
+    rows, columns = find_objects(parts)[int(np.argmax(inside[1:]))]
+    return rows, columns
 
 
 def _with_size(side: Side, pictures: Array) -> Side:
@@ -145,6 +159,8 @@ def fit_side(
         if fit is None:
             return None
         (dx, dy, turn, wider, higher, *_), spread, used = fit
+        if used[2 * _LONG :].sum() < _SHORT / 2:  # no end is seen
+            return None
         if max(abs(dx), abs(dy), abs(wider), abs(turn) * side.radius) > 1.5 * reach:
             return None
         c, s = math.cos(side.turn), math.sin(side.turn)

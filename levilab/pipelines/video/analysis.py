@@ -12,7 +12,7 @@ from analysis.errors import AnalysisError
 from analysis.film.circles import Circle  # noqa: TC001 - pydantic reads it
 from analysis.film.errors import NoMark, SlowMotion
 from analysis.film.mark import phases_of, without_pull
-from analysis.film.turning import Turning, choices_of, spins_of_start, turning_of
+from analysis.film.turning import WINDOW_S, Turning, choices_of, spins_of_start, turning_of
 from analysis.limits import spin_at_fall
 from analysis.sway import swings_of
 from analysis.uncertainty import Estimate
@@ -74,9 +74,12 @@ _SLOWER = 1.2
 _EDGE_U = 0.3
 #: Radius of the middle of the mark, in radii of the rim.
 _MARK = 0.65
-#: From beside: the mark is in front within this angle [turns], and describes this share of what changes there; nearer
+#: From beside: the mark is in front within this angle [turns], and describes what changes there nearly as well as at
+#: best; nearer
 #: than this to an end of the side it hides it [turns].
-_FRONT, _SHOWS_MARK, _END = 0.15, 0.5, 0.13
+_FRONT, _SHOWS_MARK, _END = 0.15, 0.8, 0.13
+#: How near a camera beside the top is at least [m].
+_NEAREST = 0.3
 #: A mark that turns more slowly would be seen in front in all pictures [Hz].
 _STANDS = 1.0
 #: The nearest choice is the one that was meant if it is nearer than the next one by this factor.
@@ -252,14 +255,13 @@ def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:
     angles = 2 * np.pi * (phases.phase + phases.angle)
     if options.beside:  # the mark is seen in front, and its row stays
         front = np.abs((phases.phase + phases.angle + 0.5) % 1 - 0.5) < _FRONT
-        marked = (phases.share > _SHOWS_MARK) & front
+        marked = (phases.share > _SHOWS_MARK * np.quantile(phases.share, 0.95)) & front
         rows = followed.y
     else:
         marked = np.ones(times.size, dtype=bool)
         places = without_pull(followed.x + 1j * followed.y, phases.phase)
         followed = replace(followed, x=places.real, y=places.imag)
         rows = followed.y + _MARK * followed.radius * np.sin(angles)
-    # from beside the phase swings with the place, too: the line of sight turns by 2 mrad each mm, 0.4 m away
     late = np.zeros_like(rows) if line_time and not options.beside else rows
     seen = times + line_time * rows
     turning, choices, problem = _turn(seen[marked], _part(phases, marked), late[marked], options, rate)
@@ -267,6 +269,7 @@ def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:
     assert scale.value is not None
     size = scale.value
     if options.beside and turning is not None:
+        turning = _by_sight(turning, size * float(np.std(followed.x)), float(np.ptp(times)))
         clear = _mark_is_off_the_ends(seen, phases, marked, turning)
         followed, times = _of_pictures(followed, clear), times[clear]
         turning = replace(turning, smooth=np.interp(times, seen[marked], turning.smooth))
@@ -288,6 +291,17 @@ def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:
         choices, None if options.beside else _precession(times, x + 1j * y), leaning, rising, fall, at_fall,
         (*_notes(options, followed, leaning), *_notes_on_spin(turning, choices, problem, rate, options)),
     )  # fmt: skip
+
+
+def _by_sight(turning: Turning, sway: float, length: float) -> Turning:
+    """Add to u that the line of sight turns with the place, a sway of some metres, and the phase with it."""
+    turns = np.sqrt(12) * sway / (2 * np.pi * _NEAREST)  # times 1/T: the slope through T seconds of it, at most
+    return replace(
+        turning,
+        u=np.hypot(turning.u, turns / WINDOW_S),
+        u_frequency=float(np.hypot(turning.u_frequency, turns / length)),
+        u_chirp=float(np.hypot(turning.u_chirp, 4 * turns / length**2)),
+    )
 
 
 def _part(phases: Phases, chosen: NDArray[np.bool_]) -> Phases:
