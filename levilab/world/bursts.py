@@ -96,6 +96,27 @@ def _turns_per_burst(length: float, jitter: float) -> float:
     return 1 + sum(0.5 * math.erfc((k - length) / spread) for k in later)
 
 
+def gated_starts(start: float, stop: float, period: float, closes: Array, opens: Array) -> Array:
+    """Return when cycles start behind a gate that pulses close: a cycle ends, and the next one waits for an open gate.
+
+    Args:
+        start: of the first cycle [s].
+        stop: of the last one, at most [s].
+        period: of a cycle [s].
+        closes: when pulses close the gate, shape (n,), increasing [s].
+        opens: when they open it again, shape (m,), increasing [s].
+
+    >>> gated_starts(0.0, 3.5, 1.0, np.array([1.2, 1.9]), np.array([1.4, 2.5])).tolist()
+    [0.0, 1.0, 2.5, 3.5]
+    """
+    starts = [start]
+    while (end := starts[-1] + period) <= stop:
+        closed = np.searchsorted(closes, end, side="right") > np.searchsorted(opens, end, side="right")
+        later = opens[opens > end]
+        starts.append((float(later[0]) if later.size else np.inf) if closed else end)
+    return np.array([one for one in starts if one <= stop])
+
+
 def burst_starts(edges: Array, length: float) -> Array:
     """Return those of the edges that start a burst: none that comes before the last burst has ended.
 

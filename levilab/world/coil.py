@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from instruments.virtual.generator.channel import Output
 from instruments.virtual.generator.voltage import voltage
-from levilab.world.bursts import burst_starts
+from levilab.world.bursts import burst_starts, gated_starts
 from levilab.world.timeline import Timeline
 
 Array = NDArray[np.float64]
+#: Cycles after which it does not matter any more when a gate that pulses close was opened.
+_REMEMBERED = 100
 Edges = Callable[[float, float, bool], Array]
 
 
@@ -30,6 +32,8 @@ class _Stretch:
         """Return the field at times within it [T]."""
         if self.output.triggered and edges:
             return self._triggered_field(times, edges)
+        if self.output.closes is not None and edges:
+            return self._gated_field(times, edges)
         since, burst = times - self.origin, self.output.burst
         if burst is None or burst.period is None:
             return voltage(self.output, self.turns + self.output.frequency * since, times)
@@ -52,6 +56,16 @@ class _Stretch:
         playing = (turns >= 0) & (turns < bursts.cycles)
         signal = voltage(replace(self.output, amplitude=bursts.amplitude), turns, times)
         return np.where(playing, signal, self.output.offset)
+
+    def _gated_field(self, times: Array, edges: Edges) -> Array:
+        """Return the field of cycles behind a gate that pulses at the trigger input close."""
+        rate, delay, last = self.output.frequency, self.output.closes or 0.0, float(times[-1])
+        before = max(self.origin, float(times[0]) - _REMEMBERED / rate)
+        first = before - (self.turns + rate * (before - self.origin)) % 1.0 / rate
+        closes, opens = (edges(max(first, self.origin), last, rising) + delay for rising in (True, False))
+        starts = gated_starts(first, last, 1 / rate, closes, opens)
+        turns = rate * (times - starts[np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)])
+        return np.where(turns < 1, voltage(self.output, turns, times), self.output.offset)
 
 
 class Coil:

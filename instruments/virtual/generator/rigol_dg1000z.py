@@ -81,6 +81,7 @@ _CHANNEL: tuple[Row, ...] = (
     ),
     Switch("OUTPut[n]:SYNC[:STATe]", "{n}:sync", default=True, words=("OFF", "ON")),
     Word(f"{_BURST}:MODE", "{n}:burst_mode", "TRIGgered GATed"),
+    Word(f"{_BURST}:GATE:POLarity", "{n}:gate_polarity", "NORMal INVerted"),
     Quantity(f"{_BURST}:PHASe", "{n}:burst_phase", 0.0, (0.0, 360.0), angle=True),
     burst_cycles(1e6),
     Word(f"{_BURST}:TRIGger:SOURce", "{n}:trigger_source", _SOURCES, default="INT"),

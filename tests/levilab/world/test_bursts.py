@@ -12,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from instruments.clock import VirtualClock
-from instruments.virtual.generator.channel import Output, Triggered
+from instruments.virtual.generator.channel import Burst, Output, Triggered
 from levilab.world.bursts import TriggerWire, burst_starts, mean_pull
 from levilab.world.spin_world import SpinScene, SpinWorld
 
@@ -153,6 +153,25 @@ def test_the_coil_has_a_cycle_for_each_pulse_of_the_tape():
     assert np.mean(field == 0.0) == pytest.approx(1 - 30 / 40, abs=0.02)
     pieces = np.concatenate([world.coil_field(1.0 + 0.1 * k, 1e-5, 10_000) for k in range(10)])
     assert pieces == pytest.approx(field, abs=2e-6)  # of a sample's place
+
+
+def test_a_pulse_closes_an_inverted_gate_at_the_end_of_a_cycle():
+    # true-low logic (33500 guide, page 177); the cycle is completed before the output stops (DG2000 guide, page 2-57)
+    world = SpinWorld(SpinScene(jitter=0.0), VirtualClock())
+    open_gate = replace(bursts(frequency=40.0), amplitude=4e-4, triggered=None, burst=Burst(math.inf, None), closes=0.0)
+    world.drive(0.0, open_gate)
+    silent, light = world.coil_field(2.0, 1e-5, 50_000) == 0.0, world.light(2.0, 1e-5, 50_000)
+    ends = np.flatnonzero(silent[1:] & ~silent[:-1]) + 1
+    begins = np.flatnonzero(silent[:-1] & ~silent[1:]) + 1
+    begins = begins[begins > ends[0]]
+    assert begins.size > 2
+    assert light[ends].min() > 0.35  # a pulse, by a comparator of 0.6 V with a hysteresis of 0.2 V
+    assert light[begins - 30].min() > 0.35  # it is over where the next cycle begins
+    assert light[begins + 30].max() < 0.45
+    cycles = (ends[1:] - begins[: ends.size - 1]) * 40e-5
+    assert cycles == pytest.approx(np.rint(cycles), abs=1e-3)  # whole ones, to samples of 10 µs
+    pieces = np.concatenate([world.coil_field(2.0 + 0.1 * k, 1e-5, 10_000) for k in range(5)])
+    assert np.array_equal(pieces == 0.0, silent)
 
 
 def test_an_edge_doubled_within_a_burst_starts_none():
