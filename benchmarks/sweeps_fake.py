@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.sweeps.observables import columns_of
+from levilab.sweeps.quantities import columns_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

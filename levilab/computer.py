@@ -116,3 +116,12 @@ def at_another_computer(other: Computer) -> Iterator[None]:
         yield
     finally:
         _in_use.remove(other)
+
+
+def utc_now() -> str:
+    """Return the time as it stands in run.json.
+
+    >>> utc_now()[-1]
+    'Z'
+    """
+    return computer().utc().strftime("%Y-%m-%dT%H:%M:%S.%fZ")

@@ -129,7 +129,7 @@ def _raised(equation: str) -> str:
 
 def observables() -> str:
     """Return the columns of a sweep but for the lines of the axis, in Markdown."""
-    from levilab.sweeps.observables import GROUPS, OBSERVABLES
+    from levilab.sweeps.quantities import GROUPS, OBSERVABLES
 
     rows = (f"| `{one}` | {row.meaning} |\n" for one, row in OBSERVABLES.items() if one not in GROUPS["lines"])
     return "| name | meaning |\n|---|---|\n" + "".join(rows)

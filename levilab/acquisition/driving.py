@@ -30,6 +30,7 @@ from levilab.texts.text import Text
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence
 
+    from levilab.acquisition.experiment import ModelOf
     from levilab.acquisition.session import Session
     from levilab.bench.config import BenchConfig, Limits
 
@@ -84,14 +85,14 @@ class DriveSettings(CounterSettings):
     by_hand: ClassVar[bool] = False
     by_trigger: ClassVar[bool] = False
 
-    def for_bench(self, config: BenchConfig) -> Self:
+    def for_bench(self, config: BenchConfig, model_of: ModelOf) -> Self:
         """See the base.  Raises ConfigError for a triggered drive where no wire leads to the generator's trigger."""
         if self.drive == "triggered" and config.generator and config.generator.trigger is None:
             raise ConfigError(
                 "a triggered drive needs a wire from the tape's phototransistor to the generator's trigger input: say "
                 'in the bench file which edge of its pulse starts a cycle, generator.trigger = "rising" or "falling"'
             )
-        return super().for_bench(config)
+        return super().for_bench(config, model_of)
 
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
 from pydantic import Field, PositiveFloat, model_validator
 from pydantic_core import PydanticCustomError
 
-from levilab.bench.kinds import COUNTER
 from levilab.runs.channel import Channel
 from levilab.settings import Settings
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from instruments.catalogue import Model
     from levilab.acquisition.session import Session
     from levilab.bench.config import BenchConfig, Limits
     from levilab.simulator.scene import Scene
+
+    #: From a kind of instrument to the row of its model; None where the bench has none.
+    ModelOf = Callable[[str], Model[Any] | None]
 
 
 class ExperimentSettings(Settings):
@@ -35,8 +38,13 @@ class ExperimentSettings(Settings):
             limits: of the bench.
         """
 
-    def for_bench(self, config: BenchConfig) -> Self:
-        """Return these settings for a bench; defaults may change to suit its instruments."""
+    def for_bench(self, config: BenchConfig, model_of: ModelOf) -> Self:
+        """Return these settings for a bench; defaults may change to suit its instruments.
+
+        Args:
+            config: of the bench.
+            model_of: from a kind of instrument to the row of its model; None where the bench has none.
+        """
         return self
 
     def for_scene(self, scene: Scene) -> Self:
@@ -72,11 +80,10 @@ class CounterSettings(ExperimentSettings):
             )
         return self
 
-    def for_bench(self, config: BenchConfig) -> Self:
+    def for_bench(self, config: BenchConfig, model_of: ModelOf) -> Self:
         """See the base: the gate is one that the counter has; its driver refuses what is far from all of them."""
-        if config.count_with != COUNTER.name or config.counter is None:
-            return self
-        gates = COUNTER.model(config.counter.model).gates
+        counter = model_of("counter") if config.count_with == "counter" else None
+        gates = counter.gates if counter else ()
         if not gates or not gates[0] <= self.gate_s <= 2 * gates[-1]:
             return self
         return self.model_copy(update={"gate_s": max(gate for gate in gates if gate <= self.gate_s)})

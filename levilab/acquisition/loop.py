@@ -19,11 +19,12 @@ from levilab.acquisition.session import Earlier, Session
 from levilab.acquisition.table import EXPERIMENTS, settings_of
 from levilab.bench.bench import OutputMayBeOn, open_bench
 from levilab.bench.kinds import GENERATOR, estimates_u
+from levilab.computer import utc_now
 from levilab.errors import LevilabError, unquote
 from levilab.files import CannotWrite
 from levilab.interruption import Interrupted, watching_for_interruption
 from levilab.runs.events import RunEvent
-from levilab.runs.run import Run, RunRecord, utc_now
+from levilab.runs.run import Run, RunRecord
 from levilab.runs.writer import RunWriter
 from levilab.software import software_versions
 from levilab.texts.text import Text, text_of

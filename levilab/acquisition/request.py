@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiment import CounterSettings
-from levilab.acquisition.keys import refusal, refuse_unknown
+from levilab.acquisition.given import with_given_settings
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
 from levilab.bench.config import BenchConfig, ConfigError, read_bench
@@ -23,7 +23,6 @@ from levilab.formats.typed import read_masses, read_temperature
 from levilab.runs.find import run_to_resume
 from levilab.runs.run import LONGEST_GROUP, Run
 from levilab.settings import in_one_line
-from levilab.simulator.keys import parse_setting
 from levilab.simulator.scene import SceneError, read_scene, scene_of
 from levilab.texts.text import Text, text_of
 from levilab.world.bench import VIRTUAL, scene_world, virtual_instruments, virtual_settings, virtual_wiring
@@ -32,6 +31,8 @@ from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
+    from instruments.catalogue import Model
+    from levilab.acquisition.experiment import ExperimentSettings
     from levilab.bench.config import InstrumentSettings
     from levilab.bench.person import Person
     from levilab.bench.wiring import Wiring
@@ -124,10 +125,10 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     without = _with_named_instruments(without, named, EXPERIMENTS[experiment].instruments, virtual=virtual)
     if virtual:
         without = without.model_copy(update={"visa_library": "@levilab", **virtual_instruments(named)})
-    without = with_settings(without, experiment, settings_of(without, experiment).for_bench(without))
-    config = _with_given_settings(without, experiment, options.settings)
+    without = with_settings(without, experiment, _suited(without, experiment))
+    config = _with_given(without, experiment, options.settings)
     _check_given(config, without, experiment)
-    config = with_settings(config, experiment, settings_of(config, experiment).for_bench(config))
+    config = with_settings(config, experiment, _suited(config, experiment))
     _refuse_unused(options, config, experiment)
     request = AcquisitionRequest(
         experiment,
@@ -164,7 +165,7 @@ def chosen_bench(options: AcquisitionOptions) -> BenchConfig:
 
 def chosen_settings(experiment: str, options: AcquisitionOptions) -> BenchConfig:
     """Return the configuration with the typed values at some of the experiment's keys.  Raises UsageError."""
-    return _with_given_settings(_configuration(options, None, {}, virtual=True), experiment, options.settings)
+    return _with_given(_configuration(options, None, {}, virtual=True), experiment, options.settings)
 
 
 def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> None:
@@ -269,50 +270,21 @@ def _refuse_unused(options: AcquisitionOptions, config: BenchConfig, experiment:
             )
 
 
-def _with_given_settings(config: BenchConfig, experiment: str, settings: Sequence[str]) -> BenchConfig:
+def _with_given(config: BenchConfig, experiment: str, given: Sequence[str]) -> BenchConfig:
     """Return the configuration with some of the experiment's settings changed.  Raises UsageError."""
-    texts = dict(_key_and_text(config, experiment, setting) for setting in settings)
-    if not texts:
-        return config
-    table = config.model_dump(mode="json", exclude_unset=True)  # defaults may still be suited to a scene
-    values = {name: parse_setting(f"{name}={text}")[1] for name, text in texts.items()}
-    table[experiment] = table.get(experiment, {}) | values
-    try:
-        return Configuration.model_validate(table)
-    except ValidationError as error:
-        raise refusal(error, texts, config, experiment) from error
+    now = settings_of(config, experiment)
+    return with_settings(config, experiment, with_given_settings(now, experiment, given, config.limits))
 
 
-def _key_and_text(config: BenchConfig, experiment: str, setting: str) -> tuple[str, str]:
-    """Split "limit.which=upper" into which and upper; a key without its table is one of the experiment's.
+def _suited(config: BenchConfig, experiment: str) -> ExperimentSettings:
+    """Return an experiment's settings, suited to the instruments of the bench.  Raises ConfigError."""
 
-    Raises UsageError for another form or an unknown key.
-    """
-    key, equals, text = setting.partition("=")
-    name, dot, field = key.strip().rpartition(".")
-    if equals and (not field or (field == experiment and not dot)) and name in {"", experiment}:
-        raise _wrong_form(experiment, setting, "the key is missing: ")
-    name = name if dot else experiment
-    if not equals or name not in EXPERIMENTS:
-        raise _wrong_form(experiment, setting)
-    if name != experiment:
-        expected = Text(
-            "is a setting of levilab acquire {name}, this is levilab acquire {experiment}",
-            name=name,
-            experiment=experiment,
-        )
-        raise UsageError("settings", expected, value=setting)
-    refuse_unknown(config, experiment, field)
-    return field, text
+    def model_of(kind: str) -> Model[Any] | None:
+        described = getattr(config, kind)
+        return KINDS[kind].model(described.model) if described else None
 
-
-def _wrong_form(experiment: str, setting: str, why: str = "") -> UsageError:
-    what = Text(
-        "{why}{experiment}.KEY=VALUE is expected; levilab acquire {experiment} --settings lists all",
-        why=why,
-        experiment=experiment,
-    )
-    return UsageError("settings", what, value=setting)
+    settings: ExperimentSettings = settings_of(config, experiment).for_bench(config, model_of)
+    return settings
 
 
 def _check_given(config: BenchConfig, without: BenchConfig, experiment: str) -> None:
@@ -336,7 +308,7 @@ def _check_given(config: BenchConfig, without: BenchConfig, experiment: str) -> 
 
 def _check_settings(config: BenchConfig, experiment: str) -> None:
     """Raise ConfigError for settings of an experiment that the bench does not allow."""
-    settings_of(config, experiment).for_bench(config).check(experiment, config.limits)
+    _suited(config, experiment).check(experiment, config.limits)
 
 
 def _original_configuration(run: Run) -> BenchConfig:

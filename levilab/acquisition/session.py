@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from instruments.errors import InstrumentError, SettingsLost
 from levilab.bench.person import ask_no_person
+from levilab.computer import utc_now
 from levilab.errors import LevilabError
 from levilab.present.units import unit
 from levilab.runs.events import RunEvent
-from levilab.runs.run import utc_now
 from levilab.settings import Settings
 from levilab.telemetry.messages import Count
 from levilab.texts.text import Text, in_language

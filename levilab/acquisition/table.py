@@ -9,8 +9,7 @@ from pydantic import Field, create_model
 
 from levilab.acquisition.experiment import CounterSettings, Experiment
 from levilab.acquisition.experiments import field, hold, limit, precession, spin, sway, trace
-from levilab.bench.config import BenchConfig
-from levilab.bench.template import Setting, SettingsTable
+from levilab.bench.config import BenchConfig, Setting, SettingsTable
 
 if TYPE_CHECKING:
     from collections.abc import Iterator

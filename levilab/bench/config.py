@@ -2,18 +2,44 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, ValidationError
 
 from instruments.drivers.generator import Limits as DriveLimits
 from levilab.errors import LevilabError
-from levilab.files import parse_toml
+from levilab.files import parse_toml, toml_value
 from levilab.settings import Settings, in_one_line
 from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A line of a table.  comment: its meaning, or empty; is_set: otherwise the line is a comment, an example."""
+
+    name: str
+    value: Any
+    comment: str = ""
+    is_set: bool = True
+
+    @property
+    def line(self) -> str:
+        """As it stands in the file."""
+        assignment = f"{'' if self.is_set else '# '}{self.name} = {toml_value(self.value)}"
+        return f"{assignment:31} # {self.comment}" if self.comment else assignment
+
+
+@dataclass(frozen=True)
+class SettingsTable:
+    """A table of settings.  about: its subject."""
+
+    name: str
+    about: str
+    settings: tuple[Setting, ...]
 
 
 class ConfigError(LevilabError):

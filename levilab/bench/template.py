@@ -2,44 +2,18 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from levilab.bench.kinds import KINDS
 from levilab.errors import LevilabError
-from levilab.files import CannotWrite, replace_atomically
+from levilab.files import CannotWrite, replace_atomically, toml_value
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
+    from levilab.bench.config import SettingsTable
     from levilab.bench.discover import Found
-
-
-@dataclass(frozen=True)
-class Setting:
-    """A line of a table.  comment: its meaning, or empty; is_set: otherwise the line is a comment, an example."""
-
-    name: str
-    value: Any
-    comment: str = ""
-    is_set: bool = True
-
-    @property
-    def line(self) -> str:
-        """As it stands in the file."""
-        assignment = f"{'' if self.is_set else '# '}{self.name} = {_quote(self.value)}"
-        return f"{assignment:31} # {self.comment}" if self.comment else assignment
-
-
-@dataclass(frozen=True)
-class SettingsTable:
-    """A table of settings.  about: its subject."""
-
-    name: str
-    about: str
-    settings: tuple[Setting, ...]
 
 
 class WouldOverwrite(LevilabError):
@@ -58,7 +32,7 @@ def bench_text(found: Sequence[Found], library: str, tables: Sequence[SettingsTa
         keep_trailing_newline=True,
     )
     # TOML's strings are JSON's; jinja's own filter would escape signs of HTML
-    environment.policies["json.dumps_function"] = lambda value, **_: _quote(value)
+    environment.policies["json.dumps_function"] = lambda value, **_: toml_value(value)
     by_kind = {kind: [one for one in found if one.kind == kind] for kind in KINDS}
     about = {
         kind.name: {
@@ -77,10 +51,6 @@ def bench_text(found: Sequence[Found], library: str, tables: Sequence[SettingsTa
         tables=tables,
         unknown=[one for one in found if one.identity and not one.kind],
     )
-
-
-def _quote(value: Any) -> str:
-    return json.dumps(value, ensure_ascii=False)
 
 
 def refuse_to_overwrite(path: Path) -> None:

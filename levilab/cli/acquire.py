@@ -110,7 +110,17 @@ def acquire_experiment(
     speak(language)
     if not list_settings:
         look_at_files(bench, resume, out, scene, virtual=mock, named=bool(counter or scope))
+    shorthands = {"drive": drive, "drive_frequency_hz": spin}
+    given = (
+        *(f"{key}={value}" for key, value in shorthands.items() if value is not None),
+        *(settings or ()),
+        *[SHORT["upper"]] * upper,
+    )
     with importing():
+        if given and mock and not (bench or resume):  # wrong ones are refused before the rest is imported
+            from levilab.acquisition.given import settings_without_bench, with_given_settings
+
+            with_given_settings(settings_without_bench(experiment), experiment, given)
         from levilab.acquisition.loop import acquire
         from levilab.acquisition.request import AcquisitionOptions, chosen_settings, request_for
         from levilab.acquisition.table import EXPERIMENTS
@@ -118,8 +128,6 @@ def acquire_experiment(
         from levilab.interruption import watching_for_end
         from levilab.present.progress import to_stderr
 
-    shorthands = {"drive": drive, "drive_frequency_hz": spin}
-    given = [f"{key}={value}" for key, value in shorthands.items() if value is not None]
     options = AcquisitionOptions(
         mock=mock,
         bench=bench,
@@ -137,7 +145,7 @@ def acquire_experiment(
         wire_log=wire_log,
         person=ask_no_person if yes else _ask,
         tell=message,
-        settings=(*given, *(settings or ()), *[SHORT["upper"]] * upper),
+        settings=given,
     )
     if list_settings:
         _print_settings(chosen_settings(experiment, options), experiment, as_json=as_json)

@@ -13,6 +13,7 @@ from levilab.cli.output import interruptible, message, print_json, result
 from levilab.errors import DataError, UsageError, WorkersLost
 
 if TYPE_CHECKING:
+    from levilab.simulator.scene import Scene
     from levilab.sweeps.store import Store
 
 #: Interval between lines of progress where standard error is no terminal [s].
@@ -114,6 +115,7 @@ def _begin_store(name: str, given: dict[str, Any], *, resume: bool) -> Store:
     from levilab.cli.simulate import chosen_scene
 
     scene = chosen_scene(name, given["settings"])
+    _look_at_names(scene, given)
 
     from levilab.simulator.keys import parse_setting
     from levilab.sweeps.axes import parse_axis
@@ -128,6 +130,18 @@ def _begin_store(name: str, given: dict[str, Any], *, resume: bool) -> Store:
     request = SweepRequest(scene, **given)
     with interruptible("nothing was written"):
         return store_for(request, out, message, resume=resume)
+
+
+def _look_at_names(scene: Scene, given: dict[str, Any]) -> None:
+    """Refuse keys and observables that are not there, before what takes long is imported.  Raises UsageError."""
+    from levilab.sweeps.keys import value_at
+    from levilab.sweeps.quantities import columns_of
+
+    for axis in given["sweep"] or ():
+        key, equals, _ = axis.partition("=")
+        if key.strip() and equals:  # any other form is refused where it is read
+            value_at(scene, key.strip(), 1.0)
+    columns_of(filter(None, (one.strip() for one in (given["observe"] or "").split(","))))
 
 
 def _compute(store: Store, cores: int | None, scheduler: str | None) -> bool:

@@ -8,12 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.animation.parts import parts_of
+from levilab.computer import utc_now
 from levilab.errors import LevilabError
 from levilab.live.practice.commands import command_of
 from levilab.live.practice.experiments import PRACTICE
 from levilab.live.practice.tasks import TASKS
 from levilab.live.practice.what_if import WHAT_IF
-from levilab.runs.run import read_record, utc_now
+from levilab.runs.run import read_record
 from levilab.simulator.scene import read_scene, scene_of
 
 if TYPE_CHECKING:

@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from levilab.computer import utc_now
 from levilab.errors import UsageError
 from levilab.files import writing
 from levilab.interruption import interruption_postponed
 from levilab.motion.lines import rate_for
 from levilab.motion.summary import as_document, summarise
 from levilab.runs.events import RunEvent
-from levilab.runs.run import STATES, RunRecord, utc_now
+from levilab.runs.run import STATES, RunRecord
 from levilab.runs.writer import RunWriter
 from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.single import LONGEST_S, simulate

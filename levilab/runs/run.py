@@ -87,15 +87,6 @@ class RunRecord(BaseModel):
         return as_json(self.model_dump(mode="json", by_alias=True, exclude=unsaid)) + "\n"
 
 
-def utc_now() -> str:
-    """Return the time as it stands in run.json.
-
-    >>> utc_now()[-1]
-    'Z'
-    """
-    return computer().utc().strftime("%Y-%m-%dT%H:%M:%S.%fZ")
-
-
 def lock_of(folder: Path) -> Any:
     """Return the lock of the process that writes.  The operating system drops it when that ends, however it ends."""
     return computer().lock(folder / LOCK)

@@ -18,14 +18,14 @@ from itertools import count
 from typing import TYPE_CHECKING, Any, Self
 
 from analysis.numbers import how_many
-from levilab.computer import computer
+from levilab.computer import computer, utc_now
 from levilab.errors import DataError
 from levilab.files import CannotWrite, replace_atomically
 from levilab.runs import traces
 from levilab.runs.events import RunEvent
 from levilab.runs.find import RECORD, must_take_runs
 from levilab.runs.package import field, package, resource
-from levilab.runs.run import EVENTS, LOCK, PACKAGE, READINGS, STATES, WIRE, RunRecord, lock_of, read_record, utc_now
+from levilab.runs.run import EVENTS, LOCK, PACKAGE, READINGS, STATES, WIRE, RunRecord, lock_of, read_record
 from levilab.texts.text import Text
 
 if TYPE_CHECKING:

@@ -18,8 +18,7 @@ from levilab.errors import SimulationError, UsageError, WorkersLost
 from levilab.files import writing
 from levilab.interruption import interruption_postponed
 from levilab.sweeps.axes import first_error
-from levilab.sweeps.observables import OBSERVABLES, columns_of
-from levilab.sweeps.quantities import step_in_words
+from levilab.sweeps.quantities import OBSERVABLES, columns_of, step_in_words
 from levilab.sweeps.refinement import AUDIT, CONFIDENCE, STRIDE, Points, Refined, refine, run_refinement
 from levilab.sweeps.run import Task, compute
 from levilab.sweeps.store import COMPUTED, DONE, FILLED, STATUS, as_text

@@ -13,10 +13,11 @@ from levilab.formats.dialect import Dialect
 from levilab.formats.typed import read_number, unit_of_key
 from levilab.settings import hint_about
 from levilab.simulator.equilibrium import HEAVIEST_KG
-from levilab.simulator.keys import SceneError, UnknownKey, short_text
+from levilab.simulator.keys import SceneError, short_text
 from levilab.simulator.scene import SWITCHES
 from levilab.simulator.start import start_of
 from levilab.simulator.varied import broadcast
+from levilab.sweeps.keys import value_at
 from levilab.sweeps.plan import Axis, Scale, unit_of
 
 if TYPE_CHECKING:
@@ -232,7 +233,7 @@ def check_axes(scene: Scene, axes: Sequence[Axis], settings: Iterable[str] = ())
 
 def _check_key(scene: Scene, axis: Axis, name: str) -> None:
     """Raise UsageError for a key that the scene does not have, or that takes other values than those of an axis."""
-    now = _value_of(scene, axis, name)
+    now = value_at(scene, axis.key, _plain(axis.values[0]), name)
     if isinstance(now, list):
         parts = ", ".join(f"{axis.key}.{k}" for k in range(len(now)))
         raise UsageError(name, f"it has {len(now)} numbers: sweep one of them, {parts}", value=axis.key)
@@ -255,31 +256,6 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _value_of(scene: Scene, axis: Axis, name: str) -> Any:
-    """Return the scene's own value of an axis's key.  Raises UsageError where it has none."""
-    try:
-        scene.changed({axis.key: _plain(axis.values[0])})
-    except UnknownKey as error:
-        raise UsageError(name, error.problem, value=axis.key) from error
-    except SceneError:
-        pass  # of the value, which is looked at below
-    at: Any = scene.as_table()
-    for part in axis.key.split("."):
-        if isinstance(at, dict) and part in at:
-            at = at[part]
-        elif isinstance(at, list) and part.isdecimal() and int(part) < len(at):
-            at = at[int(part)]
-        elif isinstance(at, list):
-            whole = axis.key.rpartition(".")[0]
-            parts = ", ".join(f"{whole}.{k}" for k in range(len(at)))
-            raise UsageError(name, f"{whole} has {len(at)} numbers: sweep one of them, {parts}", value=axis.key)
-        else:
-            raise UsageError(name, "there is no such number in the scene", value=axis.key)
-    if isinstance(at, dict):
-        raise UsageError(name, f"it is a table: sweep one of its keys, {', '.join(at)}", value=axis.key)
-    return at
 
 
 def _points_to_try(axes: Sequence[Axis]) -> Iterator[dict[str, Any]]:

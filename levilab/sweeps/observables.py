@@ -7,9 +7,8 @@ and lock from `levilab.motion`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
-from itertools import starmap
-from typing import TYPE_CHECKING, Any, Literal
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,15 +19,15 @@ from levilab.motion.summary import changing_energy
 from levilab.simulator.energy import core_spin, energy
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
-from levilab.simulator.keys import nearest
 from levilab.simulator.model import model_of
 from levilab.simulator.numbers import Numbers, ceil, largest
 from levilab.simulator.start import start_of
 from levilab.simulator.varied import broadcast, for_each, scene_at
 from levilab.sweeps.plan import QUICKLY, Plan, chunk_shape
+from levilab.sweeps.quantities import GROUPS, LINES, columns_of
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Mapping
 
     from numpy.typing import NDArray
 
@@ -37,9 +36,6 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
 
     Values = Mapping[str, NDArray[Any]]
-
-#: What must be simulated: the ends alone, those and once more with longer steps, or samples on the way.
-Need = Literal["ends", "errors", "samples"]
 
 #: Samples per second for the height, whose fastest motion is some Hz: its turning points are met to 0.5 % of the swing.
 HEIGHT_RATE_HZ = 100.0
@@ -53,90 +49,6 @@ MOST_NUMBERS, FEWEST = 16_000_000, 32
 TOGETHER = 32
 #: The column of a state that the height is.
 HEIGHT = R.stop - 1
-
-
-@dataclass(frozen=True)
-class Observable:
-    """One column of results.
-
-    Attributes:
-        name: with its unit at the end.
-        unit: "1" for a number without one.
-        meaning: one sentence; where a value is missing, it says when.
-        dtype: of its array; a missing float is NaN.
-        needs: what must be simulated for it.
-    """
-
-    name: str
-    unit: str
-    meaning: str
-    dtype: str
-    needs: Need
-
-
-#: A line's columns begin with this → its name in `levilab.motion.lines`.
-LINES = {
-    "precession": "precession",
-    "nutation": "nutation",
-    "swing": "swing sideways",
-    "back_swing": "swing sideways, backwards",
-    "drive": "drive",
-    "wobble": "wobble, once a turn",
-}
-
-
-def _columns_of_line(start: str, name: str) -> tuple[Observable, Observable]:
-    of = f"of the axis's line that is called {name}; NaN where there is none"
-    return (
-        Observable(f"{start}_line_hz", "Hz", f"Frequency {of}.", "float64", "samples"),
-        Observable(f"{start}_line_rad", "rad", f"Amplitude {of}.", "float64", "samples"),
-    )
-
-
-#: Rows of Observable.
-_ROWS: tuple[tuple[str, str, str, str, Need], ...] = (
-    ("survived", "1", "Whether the top is still up at the end.", "bool", "ends"),
-    ("lifetime_s", "s", "Time from the start to the fall; NaN of a top that is still up.", "float64", "ends"),
-    ("fall_spin_hz", "Hz", "Spin at the moment of the fall; NaN of a top that is still up.", "float64", "ends"),
-    ("end_spin_hz", "Hz", "Spin at the end, or at the fall.", "float64", "ends"),
-    ("energy_error", "1",
-     "Change of the energy from start to end, relative; NaN where drag, drive or washers change it.", "float64",
-     "ends"),
-    ("position_error_m", "m", "Estimated error of the place at the end, or at the fall.", "float64", "errors"),
-    ("highest_spin_hz", "Hz", "Highest spin on the way, with its swing about a drive.", "float64", "samples"),
-    ("height_spread_m", "m", "Highest less lowest place; NaN of a top that falls.", "float64", "samples"),
-    ("locked", "1",
-     "Whether the top is up and its body slips by no turn behind the drive in the last half of the time.", "bool",
-     "samples"),
-)  # fmt: skip
-OBSERVABLES: dict[str, Observable] = {
-    one.name: one
-    for one in (
-        *starmap(Observable, _ROWS),
-        *(column for start, name in LINES.items() for column in _columns_of_line(start, name)),
-    )
-}
-
-#: Short names of several columns.
-GROUPS: dict[str, tuple[str, ...]] = {
-    "lines": tuple(name for name in OBSERVABLES if name.endswith(("_line_hz", "_line_rad")))
-}
-
-#: Names for `--observe`: each is a column, or several.
-NAMES = (*(name for name in OBSERVABLES if name not in GROUPS["lines"]), *GROUPS)
-
-
-def columns_of(names: Iterable[str]) -> tuple[Observable, ...]:
-    """Return the columns that these observables fill, each once.  Raises UsageError for a name that is unknown."""
-    found: dict[str, Observable] = {}
-    for name in names:
-        columns = GROUPS.get(name, (name,))
-        if columns[0] not in OBSERVABLES:
-            near = nearest(name, [*NAMES, *OBSERVABLES])
-            meant = f"did you mean {near}? Known" if near else "known"
-            raise UsageError("observe", f"there is no such observable; {meant} are {', '.join(NAMES)}", value=name)
-        found |= {column: OBSERVABLES[column] for column in columns}
-    return tuple(found.values())
 
 
 def check_observables(plan: Plan) -> None:

@@ -24,7 +24,7 @@ from levilab.present.document.blocks import (
 )
 from levilab.sweeps.adaptive import in_words, report_in
 from levilab.sweeps.axes import in_words as axis_in_words
-from levilab.sweeps.observables import GROUPS, columns_of
+from levilab.sweeps.quantities import GROUPS, columns_of
 from levilab.sweeps.store import Store
 from levilab.sweeps.summary import columns_table, headline, points_table, summarise
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
     from levilab.present.document.blocks import Block
     from levilab.present.style import Figure
-    from levilab.sweeps.observables import Observable
+    from levilab.sweeps.quantities import Observable
     from levilab.sweeps.store import Map
     from levilab.sweeps.summary import Summary
 

@@ -10,8 +10,9 @@ from levilab.errors import UsageError
 from levilab.simulator.single import LONGEST_S
 from levilab.sweeps.adaptive import begin_adaptive, is_adaptive
 from levilab.sweeps.axes import check_axes, read_points
-from levilab.sweeps.observables import check_observables, columns_of, cut
+from levilab.sweeps.observables import check_observables, cut
 from levilab.sweeps.plan import Plan
+from levilab.sweeps.quantities import columns_of
 from levilab.sweeps.run import with_step
 from levilab.sweeps.store import Store, differences
 

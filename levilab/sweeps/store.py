@@ -16,15 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from levilab.computer import computer
+from levilab.computer import computer, utc_now
 from levilab.errors import DataError
 from levilab.files import CannotWrite, locked, writing
-from levilab.runs.run import utc_now
 from levilab.simulator.keys import short_text
 from levilab.software import software_versions
-from levilab.sweeps.observables import columns_of
 from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
-from levilab.sweeps.quantities import quantity_of
+from levilab.sweeps.quantities import columns_of, quantity_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping

@@ -13,12 +13,12 @@ from levilab.files import finite
 from levilab.present.tables import Table, table
 from levilab.present.units import unit
 from levilab.sweeps.axes import in_words
-from levilab.sweeps.observables import columns_of
 from levilab.sweeps.plan import unit_of
+from levilab.sweeps.quantities import columns_of
 
 if TYPE_CHECKING:
-    from levilab.sweeps.observables import Observable
     from levilab.sweeps.plan import Plan
+    from levilab.sweeps.quantities import Observable
     from levilab.sweeps.store import Map, Store
 
 

@@ -18,7 +18,6 @@ from levilab.acquisition.driving import DriveSettings, PointFailed, check_drive,
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import ExperimentFailed, NotHeld
 from levilab.bench.config import ConfigError
-from levilab.bench.kinds import COUNTER
 from levilab.bench.person import Task
 from levilab.computer import computer
 from levilab.present.numbers import pulses_too_many
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from instruments.drivers.generator import Limits as DriveLimits
+    from levilab.acquisition.experiment import ModelOf
     from levilab.acquisition.session import Row, Session
     from levilab.bench.config import BenchConfig, Limits
     from levilab.simulator.scene import Scene
@@ -86,20 +86,20 @@ class PrecessionSettings(DriveSettings):
     record_drive_channel: PositiveInt = Field(default=2, description="and the generator's output")
     longest_s: PositiveFloat = Field(default=4 * 3600.0, description="an end if it takes longer")
 
-    def for_bench(self, config: BenchConfig) -> Self:
+    def for_bench(self, config: BenchConfig, model_of: ModelOf) -> Self:
         """See the base: a counter with one input has its cable changed.
 
         Raises ConfigError for a counter that cannot count the laser as well.
         """
-        if config.count_with != COUNTER.name:
+        if config.count_with != "counter":
             raise ConfigError(
                 "an oscilloscope cannot count the laser beside the spin: name a `counter`, too; the second input shows "
                 "the drive, that of a sound card a pickup coil, and would be taken for the laser"
             )
-        suited = super().for_bench(config)
-        if config.counter is None:
+        suited = super().for_bench(config, model_of)
+        model = model_of("counter")
+        if model is None:
             return suited
-        model = COUNTER.model(config.counter.model)
         if model.driver.SIGNAL is not LIGHT:
             raise ConfigError(
                 "{model} cannot count a laser beam: the precession needs another counter, one of pulses of light",

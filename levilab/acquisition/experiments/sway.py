@@ -21,6 +21,7 @@ from levilab.runs.events import RunEvent
 from levilab.runs.run import STATES
 
 if TYPE_CHECKING:
+    from levilab.acquisition.experiment import ModelOf
     from levilab.acquisition.session import Session
     from levilab.bench.config import BenchConfig
 
@@ -39,11 +40,11 @@ class SwaySettings(CounterSettings):
     frames_hz: float = Field(default=120.0, ge=30.0, le=1000.0, description="frames per second of the film")
     longest_s: PositiveFloat = Field(default=120.0, description="how long is filmed if the top stays up")
 
-    def for_bench(self, config: BenchConfig) -> Self:
+    def for_bench(self, config: BenchConfig, model_of: ModelOf) -> Self:
         """See the base.  Raises ConfigError for a real bench."""
         if config.visa_library != "@levilab":
             raise ConfigError(_NO_CAMERA)
-        return super().for_bench(config)
+        return super().for_bench(config, model_of)
 
 
 def channels(_: SwaySettings) -> tuple[Channel, ...]:

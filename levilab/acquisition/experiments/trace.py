@@ -18,7 +18,6 @@ from levilab.acquisition.driving import HELD_WITHIN_HZ, check_drive
 from levilab.acquisition.experiment import Experiment, ExperimentSettings
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
-from levilab.bench.kinds import OSCILLOSCOPE
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.runs.traces import INDEX, described_times, undescribed_codes
@@ -26,6 +25,7 @@ from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from instruments.drivers.oscilloscope import Trace
+    from levilab.acquisition.experiment import ModelOf
     from levilab.acquisition.session import Row, Session
     from levilab.bench.config import BenchConfig, Limits
     from levilab.simulator.scene import Scene
@@ -109,10 +109,10 @@ class TraceSettings(ExperimentSettings):
         if self.drive_frequency_hz is not None:
             check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
 
-    def for_bench(self, config: BenchConfig) -> Self:
+    def for_bench(self, config: BenchConfig, model_of: ModelOf) -> Self:
         """See the base: the whole range of an input that is AC coupled only, triggered where the signal passes 0."""
-        scope = config.oscilloscope
-        if scope is None or "DC" in OSCILLOSCOPE.model(scope.model).driver.INPUT_COUPLINGS:
+        scope = model_of("oscilloscope")
+        if scope is None or "DC" in scope.driver.INPUT_COUPLINGS:
             return self
         suited: dict[str, object] = {
             "channels": (1,), "shows": (TAPE,), "volts_per_division": 0.25, "offset_v": 0.0, "coupling": "AC",

@@ -22,6 +22,8 @@ from levilab.runs.find import RECORD, find_run, find_runs
 from levilab.runs.run import EVENTS, READINGS, STATES, Run
 from levilab.runs.waveforms import run_waveforms
 from levilab.sweeps.plan import unit_of
+from levilab.sweeps.quantities import columns_of, quantity_of
+from levilab.sweeps.store import Store
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
@@ -31,7 +33,6 @@ if TYPE_CHECKING:
     from levilab.formats.waveforms.waveform import Waveform
     from levilab.pipelines.document import Analysis
     from levilab.pipelines.result import Result
-    from levilab.sweeps.store import Store
 
     Results = Sequence[tuple[Analysis[Any], Any]]
 
@@ -141,8 +142,6 @@ def contents_of(
         return _of_sweep(place)
     path = find_run(place)
     if (path / "zarr.json").exists():
-        from levilab.sweeps.store import Store  # with kernels of the simulator
-
         return _of_sweep(Store.open(path))
     if len(runs := [] if path.is_file() else find_runs(path)) > 1:
         raise _several(path, len(runs))
@@ -300,8 +299,6 @@ def facts_of(run: Run | None, path: Path, results: Results = ()) -> dict[str, st
 
 
 def _of_sweep(store: Store) -> Contents:
-    from levilab.sweeps.observables import columns_of
-    from levilab.sweeps.quantities import quantity_of
     from levilab.sweeps.summary import headline, summarise
 
     plan, found = store.plan, store.load()

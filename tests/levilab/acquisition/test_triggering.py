@@ -305,9 +305,9 @@ def test_the_bursts_start_at_the_edge_and_the_phase_that_were_stated(tmp_path, e
 def test_a_bench_without_the_wire_has_no_triggered_drive():
     generator = InstrumentSettings(model="33500B", address="TCPIP::1::INSTR")
     with pytest.raises(ConfigError, match=r"wire.*trigger input.*generator\.trigger = \"rising\""):
-        TRIGGERED.for_bench(BenchConfig(generator=generator))
+        TRIGGERED.for_bench(BenchConfig(generator=generator), lambda _: None)
     wired = BenchConfig(generator=generator.model_copy(update={"trigger": "falling"}))
-    assert TRIGGERED.for_bench(wired) == TRIGGERED
+    assert TRIGGERED.for_bench(wired, lambda _: None) == TRIGGERED
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import shutil
 import pytest
 
 from levilab.sweeps import run as run_module
-from levilab.sweeps.observables import NAMES
+from levilab.sweeps.quantities import NAMES
 from support.commands import command
 
 SPINS, MASSES = "start.spin_hz=18:24:40", "top.mass_kg=0.0250:0.0254:20"

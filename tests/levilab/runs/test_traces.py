@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from instruments.drivers.oscilloscope import Trace
+from levilab.computer import utc_now
 from levilab.errors import DataError
-from levilab.runs.run import Run, RunRecord, utc_now
+from levilab.runs.run import Run, RunRecord
 from levilab.runs.traces import load_traces, undescribed_codes
 from levilab.runs.writer import RunWriter
 

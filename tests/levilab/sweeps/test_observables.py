@@ -13,8 +13,9 @@ from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 from levilab.sweeps import observables
-from levilab.sweeps.observables import GROUPS, NAMES, OBSERVABLES, check_observables, columns_of, observe
+from levilab.sweeps.observables import check_observables, observe
 from levilab.sweeps.plan import Axis, Plan
+from levilab.sweeps.quantities import GROUPS, NAMES, OBSERVABLES, columns_of
 
 UNDRIVEN, DRIVEN = preset("undriven"), preset("driven")
 SPINS = np.array([19.0, 22.0, 30.0])

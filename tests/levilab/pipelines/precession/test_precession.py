@@ -7,6 +7,7 @@ import pytest
 
 from analysis.precession.gates import Gates, rates_at_point
 from instruments.drivers.oscilloscope import Trace
+from levilab.computer import utc_now
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.precession.document import PRECESSION
@@ -16,7 +17,7 @@ from levilab.pipelines.suits import analyze_suiting
 from levilab.report.page import render
 from levilab.runs.events import RunEvent
 from levilab.runs.gates import gates_event
-from levilab.runs.run import RunRecord, utc_now
+from levilab.runs.run import RunRecord
 from levilab.runs.writer import RunWriter
 from support.commands import command
 from support.figures import faults, without_drawing

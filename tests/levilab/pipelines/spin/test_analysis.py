@@ -12,6 +12,7 @@ import pytest
 import levilab
 from analysis.rotation.result import Kind
 from instruments.drivers.oscilloscope import Trace
+from levilab.computer import utc_now
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions, SpinOptions
@@ -23,7 +24,7 @@ from levilab.pipelines.spin.report import meaning, spin_part, spin_tables
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import analyze_suiting
 from levilab.pipelines.suits import save as save_found
-from levilab.runs.run import Run, RunRecord, utc_now
+from levilab.runs.run import Run, RunRecord
 from levilab.runs.waveforms import run_waveforms
 from levilab.runs.writer import RunWriter
 from support.detector import C32, RELEASE_HZ, coasting_turns, coasting_wav, pulses, write_wav

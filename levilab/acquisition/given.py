@@ -1,0 +1,166 @@
+"""Settings of an experiment that are given as texts: which there are, and the values that they take.
+
+Nothing heavy is imported here, and of the experiments that one alone: a wrong setting is refused at once.
+"""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from importlib import import_module
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+from pydantic import ValidationError
+
+from levilab.bench.config import Limits
+from levilab.errors import UsageError
+from levilab.present.units import split
+from levilab.settings import hint_about
+from levilab.simulator.keys import parse_setting
+from levilab.texts.text import Text
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from levilab.acquisition.experiment import ExperimentSettings
+
+_TYPES = {"number": "a number", "integer": "a whole number", "string": "a text", "boolean": "true or false"}
+#: Lists as they are typed, by the type of what stands in them.
+_LISTS = {"integer": "[1, 3]", "number": "[44.0, 38.0]", "string": '["tape", "laser"]'}
+
+
+def settings_without_bench(experiment: str) -> ExperimentSettings:
+    """Return the settings of an experiment where no bench file says others; its module alone is imported."""
+    settings: ExperimentSettings = import_module(f"{_EXPERIMENTS}.{experiment}").EXPERIMENT.settings()
+    return settings
+
+
+#: The room with a file for each experiment.
+_EXPERIMENTS = "levilab.acquisition.experiments"
+
+
+def with_given_settings(
+    now: ExperimentSettings, experiment: str, given: Sequence[str], limits: Limits | None = None
+) -> ExperimentSettings:
+    """Return settings of an experiment some of which are changed.
+
+    Args:
+        now: the others.
+        experiment: its name.
+        given: as "limit.which=upper".
+        limits: of the bench, which messages name.
+
+    Raises:
+        UsageError: a setting is not there, or takes other values.
+    """
+    texts = dict(_key_and_text(now, experiment, setting) for setting in given)
+    if not texts:
+        return now
+    values = {name: parse_setting(f"{name}={text}")[1] for name, text in texts.items()}
+    table = now.model_dump(mode="json", exclude_unset=True)  # defaults may still be suited to a scene
+    try:
+        return type(now).model_validate(table | values)
+    except ValidationError as error:
+        raise _refusal(error, texts, now, limits or Limits(), experiment) from error
+
+
+def _key_and_text(now: ExperimentSettings, experiment: str, setting: str) -> tuple[str, str]:
+    """Split "limit.which=upper" into which and upper; a key without its table is one of the experiment's.
+
+    Raises UsageError for another form or an unknown key.
+    """
+    key, equals, text = setting.partition("=")
+    name, dot, field = key.strip().rpartition(".")
+    if equals and (not field or (field == experiment and not dot)) and name in {"", experiment}:
+        raise _wrong_form(experiment, setting, "the key is missing: ")
+    name = name if dot else experiment
+    if not equals or not name.isidentifier() or find_spec(f"{_EXPERIMENTS}.{name}") is None:
+        raise _wrong_form(experiment, setting)
+    if name != experiment:
+        expected = Text(
+            "is a setting of levilab acquire {name}, this is levilab acquire {experiment}",
+            name=name,
+            experiment=experiment,
+        )
+        raise UsageError("settings", expected, value=setting)
+    _refuse_unknown(now, experiment, field)
+    return field, text
+
+
+def _wrong_form(experiment: str, setting: str, why: str = "") -> UsageError:
+    what = Text(
+        "{why}{experiment}.KEY=VALUE is expected; levilab acquire {experiment} --settings lists all",
+        why=why,
+        experiment=experiment,
+    )
+    return UsageError("settings", what, value=setting)
+
+
+def describe_values(name: str, schema: Mapping[str, Any]) -> str:
+    """Return the values that a key takes, with their unit.
+
+    Args:
+        name: of the key, which ends with its unit.
+        schema: of the key, as JSON Schema describes it.
+
+    >>> describe_values("gate_s", {"exclusiveMinimum": 0, "type": "number"})
+    'a number above 0 [s]'
+    >>> describe_values("which", {"enum": ["lower", "upper"], "type": "string"})
+    'lower or upper'
+    """
+    _, unit = split(name)
+    kinds = [schema | one for one in schema.get("anyOf", [{}]) if one.get("type") != "null"]
+    return " or ".join(_describe_schema(one) for one in kinds) + (f" [{unit.text}]" if unit else "")
+
+
+def _describe_schema(schema: Mapping[str, Any]) -> str:
+    if "enum" in schema:
+        *some, last = map(str, schema["enum"])
+        return f"{', '.join(some)} or {last}" if some else last
+    if schema.get("type") == "array":
+        each = _describe_schema(schema["items"])
+        return f"a list as {_LISTS.get(schema['items'].get('type'), '[…]')}, each {each}"
+    words = [_TYPES.get(schema.get("type", ""), "a value")]
+    low, high = schema.get("minimum"), schema.get("maximum")
+    if low is not None:
+        words.append(f"from {low:g}" if high is not None else f"from {low:g} on")
+    elif "exclusiveMinimum" in schema:
+        words.append(f"above {schema['exclusiveMinimum']:g}")
+    if high is not None:
+        words.append(f"to {high:g}" if low is not None else f"up to {high:g}")
+    return " ".join(words)
+
+
+def _refuse_unknown(now: ExperimentSettings, experiment: str, name: str) -> None:
+    """Raise UsageError for a name that is no setting of an experiment."""
+    known = type(now).model_fields
+    if name in known:
+        return
+    near = [f"{experiment}.{one}" for one in get_close_matches(name, known, cutoff=0.5)]
+    meant = f", did you mean {' or '.join(near)}?" if near else ";"
+    raise UsageError("settings", f"there is no such setting{meant} {_where(experiment)}", value=f"{experiment}.{name}")
+
+
+def _refusal(
+    error: ValidationError, given: Mapping[str, str], now: ExperimentSettings, limits: Limits, experiment: str
+) -> UsageError:
+    """Return the faults of settings that were given as texts by their names."""
+    first = error.errors()[0]
+    name = str(first["loc"][0]) if first["loc"] else ""
+    own = first["type"] == "value_error" or not name  # the experiment's own words
+    text = str(first.get("ctx", {}).get("error", first["msg"])) if own else ""
+    if name not in given:
+        return UsageError("settings", f"{experiment}: {text or first['msg']}")
+    what = text or f"{describe_values(name, schema_of(now, limits)[name])} is expected{hint_about(given[name])}"
+    return UsageError("settings", f"{what}; {_where(experiment)}", value=f"{experiment}.{name}={given[name]}")
+
+
+def _where(experiment: str) -> str:
+    return f"levilab acquire {experiment} --settings lists all"
+
+
+def schema_of(now: ExperimentSettings, limits: Limits) -> dict[str, Any]:
+    """Return the values that an experiment's settings take, by name: as declared, and as the bench allows."""
+    schema: dict[str, Any] = type(now).model_json_schema()["properties"]
+    allowed = {name: {"maximum": limit} for name, limit in limits.model_dump().items()}
+    return {name: one | allowed.get(name, {}) for name, one in schema.items()}
