@@ -6,6 +6,7 @@ The drive coil's field is left out, since its winding is not known, and so are t
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -65,12 +66,13 @@ def field_beside(
         moment: of the top, shape (n, 3) [A m²].
         up: whether there is a top, shape (n,).
     """
-    field = np.tile(base_beside(place, ring), (up.size, 1))
+    field = np.tile(base_beside(tuple(place.tolist()), ring), (up.size, 1))
     field[up] += dipole_field(moment[up], place - position[up])
     return field
 
 
-def base_beside(place: Array, ring: base.Base | parts.Base) -> Array:
+@lru_cache(maxsize=16)  # it is asked for with each block of samples
+def base_beside(place: tuple[float, ...], ring: base.Base | parts.Base) -> Array:
     """Return the field of the base at a place off its axis, exactly, shape (3,) [T].  A series holds near the axis."""
     from levilab.simulator.field import field_of, flux_density  # with numba
 

@@ -28,7 +28,7 @@ def test_the_base_beside_the_bench_is_that_of_two_loops():
     place = np.array([0.12, -0.16, 0.03])
     loops = [magpylib.current.Circle(current=sign * current, diameter=2 * r) for sign, r in ((1, 0.055), (-1, 0.030))]
     theirs = sum(loop.getB(place) for loop in loops)
-    np.testing.assert_allclose(base_beside(place, Base()), theirs, rtol=1e-6)
+    np.testing.assert_allclose(base_beside(tuple(place), Base()), theirs, rtol=1e-6)
 
 
 def test_the_transverse_moment_turns_past_the_phone_once_a_turn():
@@ -54,5 +54,5 @@ def test_where_no_top_is_up_only_the_base_is_left():
     world = SpinWorld(SpinScene(), VirtualClock())
     world.take_top()
     fallen = world.magnetic_field(np.array([0.5, 1.0]), PLACE)
-    alone = base_beside(PLACE, world.scene.base)
+    alone = base_beside(tuple(PLACE), world.scene.base)
     np.testing.assert_array_equal(fallen, [alone, alone])
