@@ -99,18 +99,18 @@ def reproduce(
     wanted = choose(only)
 
     from levilab.present.progress import ShareBar
-    from levilab.reproduce.report import format_of, write
+    from levilab.report.page import format_of, write_content
+    from levilab.reproduce.report import document_of
     from levilab.reproduce.run import document, reproduce
 
     report = out or (None if as_json else Path("reproduce.html"))
-    if report is not None:
-        format_of(report)
+    form = format_of(report) if report is not None else None
     place = place_of_report(report) if report is not None else None
     with interruptible("no report is written"):
         with contextlib.closing(ShareBar("reproducing")) as progress:
             found = reproduce(wanted, progress)
-        if report is not None:
-            write(found, report)
+        if report is not None and form is not None:
+            write_content(report, form.content(document_of(found)))
     if as_json:
         print_json(document(found))
     else:

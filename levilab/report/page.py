@@ -100,12 +100,7 @@ def write_report(
         NoTypst: PDF, and the extra `pdf` is not installed.
         CannotWrite: of the output.
     """
-    form = FORMATS.get(output.suffix.lower())
-    if form is None:
-        raise UnknownFormat("out", "a name that ends in .html or .pdf is expected", value=output)
-    form.check()
-    with writing_report(output):
-        check_writable(output)  # before what takes long
+    form = format_of(output)  # before what takes long
     others, left = _sorted_by_kind(paths)
     sections = [section for kind, found in others for section in kind.sections(found)]
     results = _results(left, given or {}, tell, needed=not others)
@@ -114,14 +109,36 @@ def write_report(
     document = heading.above(document_of(results, sections, asked))
     document = replace(document, date=newest_of(results, others))
     content = form.content(in_language_of_reader(replace(document, language=spoken())))
-    with writing_report(output):
-        output.parent.mkdir(parents=True, exist_ok=True)
-        replace_atomically(output, content)
+    write_content(output, content)
     if tables:
         write_tables(document, _values(results, others, folder_of(output)), folder_of(output))
     for text in _remarks(results, others) if tell else ():
         tell(text)  # type: ignore[misc]
     return output
+
+
+def format_of(output: Path) -> Format:
+    """Return the format that a file's name asks for.
+
+    Raises:
+        UnknownFormat: there is no such format.
+        NoTypst: PDF, and the extra `pdf` is not installed.
+        CannotWrite: of the file.
+    """
+    form = FORMATS.get(output.suffix.lower())
+    if form is None:
+        raise UnknownFormat("out", "a name that ends in .html or .pdf is expected", value=output)
+    form.check()
+    with writing_report(output):
+        check_writable(output)
+    return form
+
+
+def write_content(output: Path, content: str | bytes) -> None:
+    """Write a report, also into a folder that is not there yet.  Raises CannotWrite."""
+    with writing_report(output):
+        output.parent.mkdir(parents=True, exist_ok=True)
+        replace_atomically(output, content)
 
 
 def writing_report(output: Path) -> AbstractContextManager[None]:

@@ -1,10 +1,9 @@
-"""The report of a reproduction: a document of blocks, written as HTML or PDF."""
+"""The report of a reproduction: a document of blocks."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from levilab.files import replace_atomically, writing
 from levilab.present.document.blocks import (
     Banner,
     Code,
@@ -17,16 +16,12 @@ from levilab.present.document.blocks import (
     Verdict,
     Warnings,
 )
-from levilab.report.page import FORMATS, UnknownFormat
 from levilab.reproduce.chapters import CHAPTERS
 from levilab.reproduce.table import HEADS, findings_table, in_words, overview
 from levilab.software import software_versions
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from levilab.present.document.blocks import Block
-    from levilab.report.page import Format
     from levilab.reproduce.chapters import Chapter
     from levilab.reproduce.check import Found
     from levilab.reproduce.run import Reproduction
@@ -39,29 +34,6 @@ HOW_TO_READ = (
     "for it. By construction: readings were made to return it. Our second way: where a figure has no numbers, they "
     "were computed by us with other code, apart from levilab; these test levilab, not the source."
 )
-
-
-def format_of(output: Path) -> Format:
-    """Return the format that a file's name asks for.  Raises UnknownFormat, or what the format itself lacks."""
-    found = FORMATS.get(output.suffix.lower())
-    if found is None:
-        raise UnknownFormat("out", "a name that ends in .html or .pdf is expected", value=output)
-    found.check()
-    return found
-
-
-def write(found: Reproduction, output: Path) -> Path:
-    """Write the report; returns the file.
-
-    Raises:
-        UnknownFormat: of the file's name.
-        CannotWrite: of the file.
-    """
-    content = format_of(output).content(document_of(found))
-    with writing(f"{output}: could not be written", "choose another place with `out`"):
-        output.parent.mkdir(parents=True, exist_ok=True)
-        replace_atomically(output, content)
-    return output
 
 
 def document_of(found: Reproduction) -> Document:

@@ -9,7 +9,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import unquote
-from levilab.files import check_writable, replace_atomically
+from levilab.files import check_writable
 from levilab.pipelines.suits import recall_suiting
 from levilab.present.document.blocks import (
     Details,
@@ -41,7 +41,7 @@ from levilab.report.groups.beside import (
     verdict,
 )
 from levilab.report.groups.sheet import class_workbook
-from levilab.report.page import FORMATS, UnknownFormat, newest_of, writing_report
+from levilab.report.page import FORMATS, UnknownFormat, newest_of, write_content, writing_report
 from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
 from levilab.texts.text import Sentences, Text, in_language, spoken
@@ -263,7 +263,5 @@ def write_class(
         content = form.content(in_language_of_reader(replace(document, date=date, language=spoken())))
     else:
         content = class_workbook(classes, date)
-    with writing_report(output):
-        output.parent.mkdir(parents=True, exist_ok=True)
-        replace_atomically(output, content)
+    write_content(output, content)
     return output
