@@ -71,7 +71,7 @@ def one_by_one(scene: Any, over: Any, duration: float, step: float) -> Callable[
 def observables(names: str) -> Callable[[], Any]:
     """Return a call that observes 128 driven tops for 10 s, on one core, with the step of a sweep."""
     axis = Axis("drive.frequency_hz", np.linspace(29, 31, 128))
-    plan = with_step(Plan.of(DRIVEN, (axis,), tuple(names.split(",")), 10.0), lambda _: None)
+    plan = with_step(Plan(DRIVEN, (axis,), tuple(names.split(",")), 10.0), lambda _: None)
     return lambda: observe(plan, {axis.key: axis.values})
 
 

@@ -102,7 +102,7 @@ def plan_of(name: str, *, brief: bool) -> Plan:
         parse_axis(f"start.spin_hz=18:90:{points}"),
         parse_axis(f"top.mass_kg=0.0247:0.0255:{points}"),
     )
-    plan = Plan.of(preset("undriven"), axes, observables, duration_s)
+    plan = Plan(preset("undriven"), axes, observables, duration_s)
     return with_step(replace(plan, chunk=(points, max(points // CHUNKS, 1))), print)
 
 
@@ -171,7 +171,7 @@ def memory_of(points: int) -> dict[str, Any]:
 def write_a_map(points: int) -> dict[str, Any]:
     side = round(points**0.5)
     axes = parse_axis(f"start.spin_hz=18:90:{side}"), parse_axis(f"top.mass_kg=0.0247:0.0255:{side}")
-    plan = with_step(cut(Plan.of(preset("undriven"), axes, ("survived", "lifetime_s", "fall_spin_hz"), 30.0)), str)
+    plan = with_step(cut(Plan(preset("undriven"), axes, ("survived", "lifetime_s", "fall_spin_hz"), 30.0)), str)
     writing, peak, results = 0.0, 0, 0
     with tempfile.TemporaryDirectory() as folder:
         store = Store.create(Path(folder, "map.zarr"), plan)

@@ -60,7 +60,7 @@ def test_points_of_the_lock_map_come_out_again():
     spots = FOUND["spots"]["lock"]
     drives, amplitudes, up, locked = (np.array(column) for column in zip(*spots, strict=True))
     axes = (Axis("drive.frequency_hz", drives, "table"), Axis("drive.amplitude_t", amplitudes, "table"))
-    plan = Plan.of(preset("driven"), axes, ("survived", "locked"), 60.0, tolerance=1e-6)
+    plan = Plan(preset("driven"), axes, ("survived", "locked"), 60.0, tolerance=1e-6)
     found = observe(plan, {axis.key: axis.values for axis in axes})
     assert found["survived"].tolist() == up.tolist()
     assert found["locked"].tolist() == locked.tolist()

@@ -47,9 +47,7 @@ class Sweep:
     def plan(self) -> Plan:
         """Its plan, with a step still to be chosen."""
         axes = tuple(parse_axis(axis) for axis in self.axes)
-        return Plan.of(
-            self.changed_scene, axes, tuple(self.observe.split(",")), self.duration_s, tolerance=self.tolerance
-        )
+        return Plan(self.changed_scene, axes, tuple(self.observe.split(",")), self.duration_s, tolerance=self.tolerance)
 
     @property
     def changed_scene(self) -> Scene:

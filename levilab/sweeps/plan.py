@@ -108,7 +108,7 @@ class Plan:
         duration_s: of each motion.
         tolerance: wanted error of place [m] and axis [rad] at the end.
         seed: of what is random.
-        chunk: points of a chunk along each dimension.
+        chunk: points of a chunk along each dimension; empty: those that suit ends of motions in lanes.
         step_share: part of its longest step that each motion takes; None: chosen in each chunk.
     """
 
@@ -121,20 +121,10 @@ class Plan:
     chunk: tuple[int, ...] = ()
     step_share: float | None = None
 
-    @classmethod
-    def of(
-        cls,
-        scene: Scene,
-        axes: tuple[Axis, ...],
-        observables: tuple[str, ...],
-        duration_s: float,
-        *,
-        tolerance: float = 1e-6,
-        seed: int = 0,
-    ) -> Plan:
-        """Make a plan whose chunks suit ends of motions in lanes; `observables.cut` suits them to any plan."""
-        plan = cls(scene, axes, observables, duration_s, tolerance, seed)
-        return replace(plan, chunk=chunk_shape(plan.shape, QUICKLY / duration_s))
+    def __post_init__(self) -> None:
+        """Choose chunks that suit ends of motions in lanes; `observables.cut` suits them to any plan."""
+        if self.axes and not self.chunk:
+            object.__setattr__(self, "chunk", chunk_shape(self.shape, QUICKLY / self.duration_s))
 
     @property
     def is_table(self) -> bool:

@@ -66,7 +66,7 @@ def plan_of(request: SweepRequest) -> Plan:
         raise UsageError("observe", "names are expected, such as survived,lifetime_s", value=",".join(request.observe))
     axes = read_points(request.points) if request.points else tuple(request.sweep)
     check_axes(request.scene, axes, request.settings)
-    plan = Plan.of(request.scene, axes, names, request.duration, tolerance=request.tolerance, seed=request.seed)
+    plan = Plan(request.scene, axes, names, request.duration, tolerance=request.tolerance, seed=request.seed)
     check_observables(plan)
     return cut(plan)
 

@@ -79,7 +79,7 @@ def plan_of(scene: Scene, spins: Span | None = None, masses: Span | None = None,
     _check(spins, masses)
     axes = (Axis(MASS, np.linspace(*masses)), Axis(SPIN, np.linspace(*spins)))
     # from the given place: some of the masses of a map float nowhere
-    return cut(Plan.of(scene.changed({"start.place": "given"}), axes, ("survived",), duration))
+    return cut(Plan(scene.changed({"start.place": "given"}), axes, ("survived",), duration))
 
 
 def floating_masses(scene: Scene) -> tuple[tuple[float, float], ...]:

@@ -22,7 +22,7 @@ SCENE = preset("undriven").changed({"start.place": "given"})
 def plan(spins, masses, duration=3.0):
     """The upper edge, with its islands."""
     axes = (Axis("start.spin_hz", np.linspace(46, 94, spins)), Axis("top.mass_kg", np.linspace(0.0251, 0.0259, masses)))
-    made = Plan.of(SCENE, axes, ("survived", "lifetime_s"), duration)
+    made = Plan(SCENE, axes, ("survived", "lifetime_s"), duration)
     share = step_share_of(SCENE, grid({axis.key: axis.values for axis in axes}), duration, tolerance=1e-6)
     return replace(made, step_share=share)
 
@@ -128,6 +128,6 @@ def test_what_has_no_boundary_cannot_be_refined():
         begin_adaptive(Store.create(None, asked), "locked")
     with pytest.raises(UsageError, match="stride = 6: a power of 2"):
         begin_adaptive(Store.create(None, asked), stride=6)
-    table = Plan.of(SCENE, (Axis("start.spin_hz", np.linspace(58, 82, 9), "table"),), ("survived",), 0.01)
+    table = Plan(SCENE, (Axis("start.spin_hz", np.linspace(58, 82, 9), "table"),), ("survived",), 0.01)
     with pytest.raises(UsageError, match="rows of a table have no neighbours"):
         begin_adaptive(Store.create(None, table))

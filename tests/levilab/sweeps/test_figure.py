@@ -19,7 +19,7 @@ HEIGHT = Axis("start.position_m.2", np.linspace(0.0695, 0.0765, 5))
 
 
 def a_map(*axes, names=("survived", "lifetime_s"), scene=UNDRIVEN, adaptive=False):
-    plan = Plan.of(scene, axes, names, 10.0)
+    plan = Plan(scene, axes, names, 10.0)
     first = np.indices(plan.shape)[0]
     yes = first % 3 > 0
     values = {name: np.where(yes, np.nan, 1.0 + first) for name in names}

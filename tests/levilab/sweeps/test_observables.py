@@ -22,7 +22,7 @@ SPINS = np.array([19.0, 22.0, 30.0])
 
 
 def plan(scene, names, duration, *axes):
-    made = Plan.of(scene, axes or (Axis("start.spin_hz", SPINS),), names, duration)
+    made = Plan(scene, axes or (Axis("start.spin_hz", SPINS),), names, duration)
     # a drift turns the axis by 0.1 rad at most
     return Plan(made.scene, made.axes, names, duration, 1e-7, chunk=made.chunk, step_share=0.05)
 

@@ -18,7 +18,7 @@ from levilab.sweeps.store import Store, differences
 @pytest.fixture(scope="module")
 def plan():
     axes = parse_axis("start.spin_hz=18:24:40"), parse_axis("top.mass_kg=0.0250:0.0254:20")
-    return with_step(Plan.of(preset("undriven"), axes, ("survived", "lifetime_s"), 0.3), print)
+    return with_step(Plan(preset("undriven"), axes, ("survived", "lifetime_s"), 0.3), print)
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +71,7 @@ def test_the_order_of_the_chunks_and_what_is_beside_a_point_change_no_bit(plan, 
 
 def test_chunks_follow_from_the_plan_and_cover_it_once():
     axes = tuple(Axis(key, np.arange(n, dtype=float)) for key, n in (("a", 317), ("b", 91), ("c", 5)))
-    plan = Plan.of(preset("undriven"), axes, ("survived",), 30.0)
+    plan = Plan(preset("undriven"), axes, ("survived",), 30.0)
     times = np.zeros(plan.shape, dtype=int)
     for chunk in plan.chunks():
         times[chunk.box] += 1
@@ -85,7 +85,7 @@ def test_chunks_follow_from_the_plan_and_cover_it_once():
 
 def test_a_plan_of_ten_million_points_has_small_attributes_and_tasks():
     axes = parse_axis("start.spin_hz=18:90:3200"), parse_axis("top.mass_kg=0.0247:0.0256:3200")
-    plan = Plan.of(preset("undriven"), axes, ("survived", "lifetime_s"), 30.0)
+    plan = Plan(preset("undriven"), axes, ("survived", "lifetime_s"), 30.0)
     assert plan.size > 1e7
     assert len(str(plan.as_table())) < 5000
     assert 100 <= plan.chunk_count <= 10_000
@@ -97,7 +97,7 @@ def test_a_plan_of_ten_million_points_has_small_attributes_and_tasks():
 def test_a_table_is_swept_row_by_row_with_words_in_it(tmp_path):
     path = tmp_path / "points.csv"
     path.write_text("start.spin_hz,drive.waveform\n30.03,sine\n18,sine\n30.03,off\n", encoding="utf-8")
-    plan = with_step(Plan.of(preset("driven"), read_points(path), ("survived",), 0.5), print)
+    plan = with_step(Plan(preset("driven"), read_points(path), ("survived",), 0.5), print)
     run(Store.create(tmp_path / "map.zarr", plan))
     found = Store.open(tmp_path / "map.zarr")
     assert found.plan.shape == (3,)
@@ -124,7 +124,7 @@ def test_a_point_that_the_scene_refuses_is_named(tmp_path):
         np.array([0.0250, 0.0251, 0.030, 0.0252]),
     )
     axes = Axis("top.mass_kg", masses), Axis("start.spin_hz", np.array([25.0, 30.0]))
-    asked = replace(Plan.of(scene, axes, ("survived",), 0.01), chunk=(4, 1), step_share=0.1)
+    asked = replace(Plan(scene, axes, ("survived",), 0.01), chunk=(4, 1), step_share=0.1)
     with pytest.raises(
         ChunksFailed, match=r"2 of 2 chunks .*: at top\.mass_kg = 0\.03, start\.spin_hz = 25.* is invalid"
     ):
@@ -133,7 +133,7 @@ def test_a_point_that_the_scene_refuses_is_named(tmp_path):
 
 def test_what_differs_from_the_plan_of_a_store_is_named(plan):
     axes = parse_axis("start.spin_hz=18:24:41"), plan.axes[1]
-    other = Plan.of(preset("undriven").changed({"top.moment_a_m2": -0.7}), axes, plan.observables, 0.4)
+    other = Plan(preset("undriven").changed({"top.moment_a_m2": -0.7}), axes, plan.observables, 0.4)
     assert differences(plan, plan) == []
     assert differences(plan, other) == [
         "the axis start.spin_hz is Hz, linear, 40, 18.0, 24.0 there and Hz, linear, 41, 18.0, 24.0 here",

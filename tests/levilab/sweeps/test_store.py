@@ -17,7 +17,7 @@ from levilab.sweeps.store import Store
 
 def plan():
     axes = (Axis("start.spin_hz", np.linspace(18, 26, 40)), Axis("top.mass_kg", np.linspace(0.0250, 0.0254, 15)))
-    return Plan.of(preset("undriven"), axes, ("survived", "lifetime_s"), duration_s=0.2)
+    return Plan(preset("undriven"), axes, ("survived", "lifetime_s"), duration_s=0.2)
 
 
 def made_up(task):
