@@ -76,7 +76,7 @@ def test_a_new_law_is_one_row_from_the_fit_to_every_page(tmp_path):
     commands = (
         ("analyze", "spindown", "--tilt", "none", data),
         ("report", data, "--tables", "-o", page),
-        ("analyze", "spindown", SAMPLE_DATA, data, "--table", many, "--cores=1"),
+        ("analyze", "spindown", SAMPLE_DATA / "spin-down-1", data, "--table", many, "--cores=1"),
     )
     shown = with_turbulent_law(COMMANDS, json.dumps(commands, default=str))
     assert "C₉/₅ = " in shown
