@@ -9,7 +9,6 @@ import shutil
 import pytest
 
 from support.commands import command
-from support.figures import without_drawing
 from support.less_work import with_less_work
 from support.paths import ROOT
 
@@ -24,7 +23,7 @@ PAGES = [
 @pytest.fixture(autouse=True, scope="module")
 def less_work():
     """No test looks at a figure here: those of each analysis are drawn by the tests of its room."""
-    with without_drawing(), with_less_work():
+    with with_less_work():
         yield
 
 

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from support.commands import command
-from support.figures import without_figures
+from support.figures import with_drawing, without_figures
 from support.less_work import with_less_work
 from support.paths import SAMPLE_DATA
 from support.waiting import HANG_GUARD_S
@@ -19,8 +19,15 @@ def sample_data():
 
 @pytest.fixture(autouse=True, scope="session")
 def less_work():
-    """No test looks at the trials of a report; how many there are has a test of its own."""
+    """Few tests look at drawn figures, and none at the trials of a report, whose number has a test of its own."""
     with with_less_work():
+        yield
+
+
+@pytest.fixture
+def drawn_figures():
+    """For a test that looks at a drawn figure."""
+    with with_drawing():
         yield
 
 

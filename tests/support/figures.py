@@ -14,8 +14,10 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
+from levilab.present.style import as_png, as_svg
+
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
@@ -38,16 +40,29 @@ ONE_PIXEL = base64.b64decode(
 @contextlib.contextmanager
 def without_drawing() -> Iterator[None]:
     """Figures are made, but matplotlib does not draw them: that is most of what a result or a page costs."""
+    with _drawing_by(lambda *_, **__: ONE_PIXEL, lambda *_, **__: "<svg/>"):
+        yield
+
+
+@contextlib.contextmanager
+def with_drawing() -> Iterator[None]:
+    """Figures are drawn, as without these tests; for those that look at what matplotlib makes of them."""
+    with _drawing_by(as_png, as_svg):
+        yield
+
+
+@contextlib.contextmanager
+def _drawing_by(png: Callable[..., bytes], svg: Callable[..., str]) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("levilab.present.style.as_png", lambda *_, **__: ONE_PIXEL)
-        patch.setattr("levilab.present.style.as_svg", lambda *_, **__: "<svg/>")
+        patch.setattr("levilab.present.style.as_png", png)
+        patch.setattr("levilab.present.style.as_svg", svg)
         yield
 
 
 @contextlib.contextmanager
 def without_figures() -> Iterator[None]:
-    """Figures of analyses are empty, too: for texts of a page whose figure other tests make from the same runs."""
-    with without_drawing(), pytest.MonkeyPatch.context() as patch:
+    """Figures of analyses are empty: for texts of a page whose figure other tests make from the same runs."""
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr("levilab.pipelines.document.Analysis.figure", lambda *_, **__: Figure())
         yield
 

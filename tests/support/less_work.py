@@ -1,4 +1,4 @@
-"""Work that no test looks at: trials of a report, and a second fit of readings that another test has fitted."""
+"""Work that few tests look at: drawing, trials of a report, a second fit of readings that another test has fitted."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from levilab.crosscheck.own.study import FEWEST, trials_of_report
+from support.figures import without_drawing
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -22,12 +23,15 @@ FITS = {"field": "fit_scan", "spindown": "fit_spin_down", "sway": "swings_of"}
 
 @contextlib.contextmanager
 def with_less_work() -> Iterator[None]:
-    """Make the fewest trials that a report shows, 2 s for each analysis otherwise; fit the same readings once."""
+    """Make the fewest trials that a report shows, 2 s for each analysis otherwise; fit the same readings once.
+
+    Figures are made and not drawn, which is half a second for each; see `with_drawing`.
+    """
 
     def count(subject: Own) -> int:
         return min(trials_of_report(subject), FEWEST)
 
-    with pytest.MonkeyPatch.context() as patch:
+    with without_drawing(), pytest.MonkeyPatch.context() as patch:
         patch.setattr("levilab.crosscheck.own.study.trials_of_report", count)
         for room, name in FITS.items():
             module = import_module(f"levilab.pipelines.{room}.analysis")

@@ -120,6 +120,7 @@ def test_options_may_stand_before_the_name_of_an_analysis(levilab, sample_data):
     assert "spindown: there is no such file" in levilab("analyze", "--no-save", "--", "spindown", check=1).stderr
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_the_spin_of_a_record_is_printed_and_written_beside_it(levilab, sample_data, tmp_path):
     path = shutil.copy(sample_data / "scope-files" / "rigol-ds1000z.csv", tmp_path)
     done = levilab("analyze", "spin", path)

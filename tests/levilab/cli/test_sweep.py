@@ -9,6 +9,7 @@ import pytest
 from levilab.sweeps import run as run_module
 from levilab.sweeps.quantities import NAMES
 from support.commands import command
+from support.figures import with_drawing
 
 SPINS, MASSES = "start.spin_hz=18:24:40", "top.mass_kg=0.0250:0.0254:20"
 MAP = (
@@ -21,13 +22,15 @@ MAP = (
 def shown(tmp_path_factory):
     """A folder with a map that is complete, and what the command printed."""
     folder = tmp_path_factory.mktemp("sweep")
-    ended = command(*MAP, cwd=folder)
+    with with_drawing():
+        ended = command(*MAP, cwd=folder)
     assert ended.status == 0, ended.err
     assert "wrote map.zarr\n" in ended.err
     assert ended.err.splitlines()[-1].startswith("wrote map")  # as the last lines, in one terminal with the table
     return folder, ended.out
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_a_map_is_summarised_drawn_and_shown_again_without_simulating(shown, monkeypatch):
     folder, printed = shown
     assert "undriven: 40 × 20 points, each up to 0.3 s" in printed
@@ -51,6 +54,7 @@ def test_json_has_the_plan_and_each_column_in_numbers(shown):
     assert found["figures"] == ["map.zarr.survived.png"]
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_after_ctrl_c_the_printed_command_continues_to_the_same_result(shown, tmp_path, monkeypatch):
     calls, compute = [], run_module.compute
 

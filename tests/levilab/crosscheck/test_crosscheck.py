@@ -167,6 +167,7 @@ def test_a_trial_goes_through_drivers_and_analysis(tmp_path, name, seed, quantit
     assert (run / "readings.csv").exists()
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_the_command_prints_writes_and_judges(levilab, tmp_path, monkeypatch):
     monkeypatch.setattr("levilab.crosscheck.command.SUBJECTS", {"spin": made_up(), "tune": made_up(2.0)})
     done = levilab("crosscheck", "spin", "--trials", "40", "--out", "kept")

@@ -35,6 +35,7 @@ def summary(scene, duration, rate=100.0):
 # --- the run folder ---
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_a_run_folder_holds_the_states_in_full_precision_the_scene_and_a_figure(tmp_path):
     scene = preset("undriven").changed({"start.spin_hz": 31.0})
     done = run_simulation(SimulationRequest(scene, 2.0, out=tmp_path), lambda _: None)

@@ -166,6 +166,7 @@ def test_the_summary_is_what_the_command_line_prints_also_in_a_notebook(
     assert limits.summary().split() == printed.out.split()
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_a_notebook_shows_results_escaped_and_short(tmp_path: Path) -> None:
     folder = tmp_path / "lower-limits"
     shutil.copytree(SAMPLE_DATA / "lower-limits", folder)
@@ -183,6 +184,7 @@ def test_a_notebook_shows_results_escaped_and_short(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ANALYSES)
+@pytest.mark.usefixtures("drawn_figures")
 def test_a_cell_is_short_and_folds(kind: str) -> None:
     if kind == "video":
         return  # its film takes seconds, and its cell is as all others

@@ -55,7 +55,7 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "xr.open_dataset(run.export(new / 'r.nc')[0]).spin_frequency_hz.dims": lambda dims: dims == ("time_s",),
     "xr.open_dataset(result.export(new / 'r.nc')[0]).result_spindown_disc_c32.item() == result.c32.n": bool,
     "xr.open_dataset(motion.export(new / 'm.nc')[0]).z_m.sel(time_s=0.0).item()": lambda z: z == pytest.approx(0.071),
-    "run.report(new / 'r.html', crosscheck=False).stat().st_size > 50_000": bool,
+    "run.report(new / 'r.html', crosscheck=False).stat().st_size > 20_000": bool,
     "levilab.runs(folder).df.experiment.nunique() > 3": bool,
     "result.params.valuesdict() == result.best_values": bool,
     "'time_s' in dir(run) and 'to_xarray' in dir(run)": bool,
@@ -112,7 +112,7 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "result.to_dict()['c32']": lambda found: list(found) == ["value", "u", "unit"],
     "json.loads(result.to_json())['best_model']": lambda law: law == "disc",
     "result.to_latex()": lambda text: r"c32 & $0.0002369(4)\,\mathrm{(rad/s)^{-1/2}/s}$ \\" in text,
-    "result.report(new / 'r.html', crosscheck=False)": lambda path: path.stat().st_size > 50_000,
+    "result.report(new / 'r.html', crosscheck=False)": lambda path: path.stat().st_size > 20_000,
     "result.df": lambda frame: "c32" in set(frame["name"]),
     "result.data.shape == (20, 6)": bool,
     "result.time[-1]": lambda t: t == 190.0,
@@ -220,7 +220,7 @@ GUESSES: dict[str, Callable[[Any], object]] = {
         lambda survived: survived == [0, 1]
     ),
     "round(result['c32'], 5)": lambda number: number == 0.00024,
-    "levilab.report(result, new / 'r.html', crosscheck=False)": lambda path: path.stat().st_size > 50_000,
+    "levilab.report(result, new / 'r.html', crosscheck=False)": lambda path: path.stat().st_size > 20_000,
 }
 #: Wrong guesses → what the error says instead.
 REFUSED = {

@@ -7,6 +7,7 @@ import pytest
 
 from levilab.report.page import write_report
 from support.browser import PHONE, watch
+from support.figures import with_drawing
 from support.paths import SAMPLE_DATA
 
 EVIL = (
@@ -37,7 +38,8 @@ def report(tmp_path_factory):
     (run / "run.json").write_text(json.dumps(record), encoding="utf-8")
     events = [{"time_s": float(k), "kind": EVIL, "text": EVIL if k % 2 else LONG} for k in range(20)]
     (run / "events.jsonl").write_text("".join(json.dumps(event) + "\n" for event in events), encoding="utf-8")
-    return write_report([run], folder / "report.html", {"tilt": "none"})
+    with with_drawing():
+        return write_report([run], folder / "report.html", {"tilt": "none"})
 
 
 @pytest.fixture(scope="module")

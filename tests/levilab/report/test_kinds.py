@@ -20,7 +20,6 @@ from levilab.sweeps.request import SweepRequest, store_for
 from levilab.sweeps.run import compile_for, run
 from levilab.sweeps.store import SCHEMA
 from levilab.workers import this_process
-from support.figures import without_drawing
 from support.paths import SAMPLE_DATA
 
 
@@ -32,8 +31,7 @@ def place(tmp_path_factory):
     """A folder with a simulated motion, a sweep and a result of stability."""
     place = tmp_path_factory.mktemp("simulated")
     scene = with_settings(preset("undriven"), ["top.mass_kg=0.0252", "start.spin_hz=31"])
-    with without_drawing():
-        run_simulation(SimulationRequest(scene, 1.2, 1e-6, 100.0, place / "runs"), silent)
+    run_simulation(SimulationRequest(scene, 1.2, 1e-6, 100.0, place / "runs"), silent)
     axes = axis_of("start.spin_hz", [18, 29, 40]), axis_of("start.position_m.2", ["70 mm", "72 mm"])
     request = SweepRequest(scene, axes, duration=0.3)
     store = store_for(request, place / "map.zarr")
@@ -118,9 +116,8 @@ def test_a_motion_that_is_not_whole_is_an_error_that_names_the_folder(folder, tm
 
 def test_simulations_and_a_measurement_go_into_one_report(place, tmp_path):
     said = []
-    with without_drawing():
-        paths = [place, place / "where.json", SAMPLE_DATA / "lower-limits"]
-        page = write_report(paths, tmp_path / "x.html", tell=said.append, tables=True).read_text(encoding="utf-8")
+    paths = [place, place / "where.json", SAMPLE_DATA / "lower-limits"]
+    page = write_report(paths, tmp_path / "x.html", tell=said.append, tables=True).read_text(encoding="utf-8")
     for title in ("Limits of the spin", "Simulated motion: undriven", "Sweep: undriven", "Where the top floats"):
         assert title in page
     assert not [text for text in said if "simulate run" in text], "it is in the report"
@@ -133,8 +130,7 @@ def test_simulations_and_a_measurement_go_into_one_report(place, tmp_path):
 
 
 def test_a_report_of_simulations_alone_is_synthetic_as_a_whole(place, tmp_path):
-    with without_drawing():
-        page = write_report([place / "map.zarr"], tmp_path / "x.html").read_text(encoding="utf-8")
+    page = write_report([place / "map.zarr"], tmp_path / "x.html").read_text(encoding="utf-8")
     assert page.count("SYNTHETIC") >= 2
     assert "levilab sweep" in page or "How to reproduce it" in page
 

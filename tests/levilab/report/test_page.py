@@ -24,7 +24,7 @@ from levilab.report.inputs import _drive
 from levilab.report.page import render as render_found
 from levilab.report.page import write_report
 from levilab.runs.run import RunRecord
-from support.figures import without_figures
+from support.figures import with_drawing, without_figures
 from support.pages import Page
 from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
@@ -42,7 +42,8 @@ def found():
 
 @pytest.fixture(scope="module")
 def page(found):
-    return Page(render(found))
+    with with_drawing():
+        return Page(render(found))
 
 
 def column(found, name, head):
@@ -273,6 +274,7 @@ def test_a_report_of_a_data_file_knows_no_instrument_and_says_so(tmp_path):
     assert "SYNTHETIC" not in parsed.text
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path):
     import numpy as np
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from levilab.report.pdf.renderer import as_pdf
 from support.commands import command
 from support.documents import of_all_blocks
+from support.figures import with_drawing
 from support.paths import ROOT, SAMPLE_DATA
 from support.waiting import HANG_GUARD_S
 
@@ -24,7 +25,8 @@ def test_two_processes_write_the_same_page_and_the_same_pdf(tmp_path):
     here, there = tmp_path / "here", tmp_path / "there"
     for folder in (here, there):
         folder.mkdir()
-    write_into(here)
+    with with_drawing():
+        write_into(here)
     paths = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
     environment = os.environ | {"PYTHONPATH": paths, "PYTHONHASHSEED": "7", "TZ": "Asia/Tokyo"}
     subprocess.run(

@@ -23,7 +23,6 @@ from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from support.acquisitions import QUICKLY, Impatient, mock
 from support.commands import command
-from support.figures import without_drawing
 from support.paths import SAMPLE_DATA
 
 SAMPLE = SAMPLE_DATA / "spin-down-1"
@@ -399,8 +398,7 @@ def test_too_few_open_files_cost_one_line(tmp_path, words):
             resource.setrlimit(resource.RLIMIT_NOFILE, (gaps[-1].fileno(), hard))
             for gap in gaps:
                 gap.close()
-            with without_drawing():
-                ended = command(*words, cwd=tmp_path)
+            ended = command(*words, cwd=tmp_path)
         costs_one_line(ended.status, ended.err)
         assert more or ended.status == 1 or words[0] == "runs"  # which lists what can be read
         if ended.status == 0:

@@ -20,6 +20,7 @@ def mapped(spins, masses, duration):
     return store.load()
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_a_map_is_written_as_a_table_and_a_picture(tmp_path):
     found = mapped((20.0, 30.0, 2), (0.0252, 0.0254, 2), 5.0)
     table, picture = write_map(found, tmp_path / "new")

@@ -21,7 +21,7 @@ from levilab.pipelines.sources import collect
 from levilab.pipelines.top import calculate_top
 from levilab.report.page import render
 from levilab.world.base import Base
-from support.figures import faults, without_drawing
+from support.figures import faults
 
 #: A top alone: the base is taken from the run.
 TOP_OF_THESIS = Device.model_validate({"top": {"moment_a_m2": 0.714}})
@@ -102,8 +102,7 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp
     assert mean.value == pytest.approx(np.mean([one.value for one in alone]))
     assert alone[0].u is not None
     assert mean.u > 0.99 * alone[0].u
-    with without_drawing():
-        page = render([(ANALYSES["field"], found)])
+    page = render([(ANALYSES["field"], found)])
     assert "None of these 2 runs came from a real bench" in page
     assert ANALYSES["field"].document(found, tmp_path)["values"]["strength"]["runs"] == 2
     figure = field_figure(found)

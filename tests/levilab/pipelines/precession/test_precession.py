@@ -20,7 +20,7 @@ from levilab.runs.gates import gates_event
 from levilab.runs.run import RunRecord
 from levilab.runs.writer import RunWriter
 from support.commands import command
-from support.figures import faults, without_drawing
+from support.figures import faults
 
 DRIVE = np.arange(28.0, 46.0, 2.0)
 U = 0.03
@@ -147,8 +147,7 @@ def test_figure_and_page_show_what_was_found(tmp_path):
     found = analysis.analyze(
         [sweep_csv(tmp_path / "mine.csv", half=3), run_with_records(tmp_path / "runs", 0.0)], PrecessionOptions()
     )
-    with without_drawing():
-        page = render([(analysis, found)])
+    page = render([(analysis, found)])
     assert found.text.split(". ")[0].replace("−", "-") in page.replace("−", "-")
     assert "mean vector" in page
     assert "half the frequency was counted" in page

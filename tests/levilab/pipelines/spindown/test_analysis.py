@@ -87,6 +87,7 @@ def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data
     assert disc.u == pytest.approx(disc.scatter / 2, rel=1e-9)
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_the_result_is_written_as_the_interface_says(sample_data, tmp_path):
     save(ANALYSES["spindown"], SPINDOWN.analyze([sample_data], SpinDownOptions()), tmp_path)
     text = (tmp_path / "result.json").read_text(encoding="utf-8")

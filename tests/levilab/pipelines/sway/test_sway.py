@@ -176,6 +176,7 @@ def test_places_in_a_wrong_unit_are_named(tmp_path):
         analyze(write(tmp_path / "metres.csv", ("t", "x", "y", "f"), rows))
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_report_figure_and_table_of_many_show_it(found):
     assert SWAY.part(found).result
     assert "geometric magnetism" in found.text

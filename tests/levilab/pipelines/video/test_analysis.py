@@ -250,6 +250,7 @@ def test_of_spins_that_look_the_same_the_one_that_slows_down_is_taken(folder):
     assert "30.6" in note
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_the_command_writes_tables_that_other_analyses_read(path, tmp_path):
     ended = command("analyze", "video", path, "--rim", 2000 * RIM, "--out", tmp_path, "--json", cwd=tmp_path)
     assert ended.status == 0, ended.err
@@ -265,6 +266,7 @@ def test_the_command_writes_tables_that_other_analyses_read(path, tmp_path):
     assert "240 pictures in 0.99 s, 3.33 to 5.00 ms apart" in " ".join(ended.out.split())
 
 
+@pytest.mark.usefixtures("drawn_figures")
 def test_a_film_is_recalled_from_its_result_and_reported_with_its_still(path, tmp_path):
     video, copy = ANALYSES["video"], tmp_path / path.name
     copy.write_bytes(path.read_bytes())

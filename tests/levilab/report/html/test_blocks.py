@@ -22,6 +22,8 @@ from levilab.report.html.page import fragment_of, page_of
 from support.documents import all_blocks, drawn, of_all_blocks
 from support.pages import Page
 
+pytestmark = pytest.mark.usefixtures("drawn_figures")  # texts of a figure, and its ids, are in the page, too
+
 EVIL = "</script></style></svg><b onclick=x>{{7*7}}${x}\"'&"
 NAMES = ("a", EVIL)
 
