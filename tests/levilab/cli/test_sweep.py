@@ -11,6 +11,8 @@ from levilab.sweeps.quantities import NAMES
 from support.commands import command
 from support.figures import with_drawing
 
+pytestmark = pytest.mark.usefixtures("drawn_figures")  # each command draws the map of its folder again
+
 SPINS, MASSES = "start.spin_hz=18:24:40", "top.mass_kg=0.0250:0.0254:20"
 MAP = (
     "sweep", "undriven", "--sweep", SPINS, "--sweep", MASSES, "--observe", "survived", "--duration", "0.3",
@@ -30,7 +32,6 @@ def shown(tmp_path_factory):
     return folder, ended.out
 
 
-@pytest.mark.usefixtures("drawn_figures")
 def test_a_map_is_summarised_drawn_and_shown_again_without_simulating(shown, monkeypatch):
     folder, printed = shown
     assert "undriven: 40 × 20 points, each up to 0.3 s" in printed
@@ -54,7 +55,6 @@ def test_json_has_the_plan_and_each_column_in_numbers(shown):
     assert found["figures"] == ["map.zarr.survived.png"]
 
 
-@pytest.mark.usefixtures("drawn_figures")
 def test_after_ctrl_c_the_printed_command_continues_to_the_same_result(shown, tmp_path, monkeypatch):
     calls, compute = [], run_module.compute
 
