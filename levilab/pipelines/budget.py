@@ -65,15 +65,15 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
         u = math.hypot(*drift)
         note = Text(
             "it gained {gained:.0f}×10⁻⁶ on the computer's clock during the run, to {u:.0f}×10⁻⁶",
-            gained=1000000.0 * drift[0],
-            u=1000000.0 * drift[1],
+            gained=1e6 * drift[0],
+            u=1e6 * drift[1],
         )
     elif known:
         u = u_of_limit(known.limit)
         note = Text(
             "±{limit:g}×10⁻⁶ when new, even over that range, and {drift:g}×10⁻⁶ more each year ({manual})",
-            limit=known.limit * 1000000.0,
-            drift=known.per_year * 1000000.0,
+            limit=known.limit * 1e6,
+            drift=known.per_year * 1e6,
             manual=known.source,
         )
     elif about:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Literal
 from analysis.uncertainty import Estimate
 from levilab.present.numbers import column
 from levilab.present.units import name_with_unit, unit
-from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -76,8 +75,7 @@ class Quantity:
     @property
     def head(self) -> str:
         """Symbol and unit, above a column."""
-        shown = self._scale.unit
-        return Text("{name} [{unit:s}]", name=self.shown_symbol, unit=shown) if shown else self.shown_symbol
+        return f"{self.shown_symbol} [{self._scale.unit}]" if self._scale.unit else self.shown_symbol
 
     @property
     def _scale(self) -> Scale:

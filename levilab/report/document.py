@@ -205,7 +205,7 @@ def _title(counts: str, others: Sequence[Section]) -> str:
 def _lead(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
     """Return the amount of data used."""
     count = sum(map(len, found.grouped_warnings))
-    notes = how_many(count, "note") if count else "no notes"
+    notes = Text("{n} notes", n=count) if count > 1 else "1 note" if count else "no notes"
     return Text("{inputs}, {used}, {notes}", inputs=count_inputs(found.sources), used=part.lead, notes=notes)
 
 

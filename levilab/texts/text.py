@@ -25,6 +25,8 @@ ENGLISH = "en"
 #: A value in a template: its name, and how it is written, as in an f-string; ``n``: text of numbers, ``s``: a name.
 _FIELD = re.compile(r"\{(\w+)(?::([+,]?[0-9]{0,2}(?:\.[0-9]{1,2})?[a-z%]?))?\}")
 _POINT = re.compile(r"(?<![\d.])(\d+)\.(?=\d+(?![\d.]*\.\d))")
+#: A head of a column: the quantity, and its unit.
+_HEAD = re.compile(r"(.+?)(\s+\[[^\]]+\])")
 #: A text that says a value, and not a word, such as "39.85(3) Hz": units have at most three letters.
 _VALUE = re.compile(r"(?!.*[^\W\d_]{4}).*\d\.\d", re.DOTALL)
 
@@ -143,7 +145,11 @@ def in_language(text: str, code: str | None = None) -> str:
     if isinstance(text, Text):
         return _fill(language_of(code).texts.get(text.template, text.template), text.values, code)
     language = language_of(code)
-    return language.texts.get(text) or (_with_decimals(text, language.decimal) if _VALUE.match(text) else text)
+    if said := language.texts.get(text):
+        return said
+    if (head := _HEAD.fullmatch(text)) and head[1] in language.texts:
+        return f"{language.texts[head[1]]}{head[2]}"
+    return _with_decimals(text, language.decimal) if _VALUE.match(text) else text
 
 
 def _with_decimals(text: str, decimal: str) -> str:

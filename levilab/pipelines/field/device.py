@@ -114,7 +114,7 @@ def known_top(
     """
     device = options.device or Device()
     table = _merged(source, TopTable, _OF_TOP, source.settings("field"), options.device.top if options.device else None)
-    warnings = []
+    warnings: list[str] = []
     made = top_of(parts_of(table)) if table.parts else None
     moment = _estimate(table.moment_a_m2, table.moment_u_a_m2, "A m^2")
     mass = made.mass if made else _estimate(table.mass_kg, table.mass_u_kg, "kg")
@@ -131,11 +131,7 @@ def known_top(
     if moment is None and height is None:
         moment = Estimate(THESIS["moment"][0], 0.0, "A m^2")
         missing = [*missing, "moment"]
-    if missing:
-        warnings.append(
-            f"of the top the {' and the '.join(missing)} are not known, those of the thesis's top are taken: what "
-            "follows is of that top; describe yours in a file, for the option `device`"
-        )
+    warnings += [_TAKEN[name] for name in missing]
     magnet = Disc(table.magnet_radius_m, table.magnet_height_m or 0.0) if table.magnet_radius_m else None
     if magnet is None:
         warnings.append(
@@ -144,6 +140,15 @@ def known_top(
         )
     covariance = made.covariance if made else None
     return KnownTop(transverse, axial, moment, mass, height, device.gravity_m_s2, covariance, magnet), warnings
+
+
+#: What is missing in the file of a top → what is taken instead.
+_TAKEN = {
+    "inertias": "the inertias of the top are not known, those of the thesis's top are taken: spins are of that top; "
+    "describe yours in a file, for the option `device`",
+    "moment": "the moment of the top is not known, that of the thesis's top is taken: masses and heights are of that "
+    "top; describe yours in a file, for the option `device`",
+}
 
 
 def inertias(table: TopTable) -> tuple[Estimate, Estimate, list[str]]:

@@ -17,6 +17,7 @@ from levilab.pipelines.field.report import field_columns, field_curve, field_cur
 from levilab.pipelines.field.words import FIELD_ROW, QUANTITIES, remark
 from levilab.pipelines.options import FieldOptions
 from levilab.pipelines.row import symbols_of
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -89,7 +90,7 @@ def _input(source: Source[FieldReadings], scan: FieldScan, part: UPart) -> tuple
         if readings.u is None:
             return None, "", "their scatter about the fit"
         number = setting_of(source, EXPERIMENT, "readings")
-        text = f"mean of {number:g} readings; the last digit is in it" if number else "each reading by itself"
+        text = Text("mean of {n:g} readings; the last digit is in it", n=number) if number else "each reading by itself"
         return float(np.sqrt(np.mean(readings.u**2))), "T", text
     return None, "", ""
 
@@ -124,9 +125,10 @@ def _of_mean(analysis: FieldAnalysis, name: str, budgets: Sequence[Budget]) -> B
     u = mean.u or 0.0
     own = math.sqrt(sum(one.u**2 for one in budgets) / n)
     if u > own * (1 + 1e-9):
-        remedy = f"more scans: it takes {4 * n} instead of {n} to halve it"
+        remedy = Text("more scans: it takes {more} instead of {n} to halve it", more=4 * n, n=n)
         scatter = Component("runs", "scatter between the scans", "A", u * math.sqrt(n), mean.unit, 1 / math.sqrt(n),
-                            note=f"standard deviation of one scan from another, {n} scans", remedy=remedy)  # fmt: skip
+                            note=Text("standard deviation of one scan from another, {n} scans", n=n),
+                            remedy=remedy)  # fmt: skip
         return Budget(name, mean.value or 0.0, u, mean.unit, (scatter,))
     rows = []
     for part in dict.fromkeys(row.name for one in budgets for row in one.included):

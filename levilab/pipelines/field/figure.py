@@ -16,6 +16,7 @@ from levilab.present.drawing import SMALL, band, headline, panel, sigma_bands, s
 from levilab.present.looks import BLUE, GREY, LOOKS, PURPLE, SKY, VERMILION
 from levilab.present.numbers import short_name, with_uncertainty
 from levilab.present.style import STYLE, WIDE
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -62,12 +63,14 @@ def field_figure(analysis: FieldAnalysis) -> Figure:
 def _finding(analysis: FieldAnalysis) -> str:
     values = analysis.values
     strength = with_uncertainty(QUANTITIES["strength"].show(values["strength"]))
-    said = f"Field of the base on its axis: ρ = {strength}"
+    said = Text("Field of the base on its axis: ρ = {strength:n}", strength=strength)
     if "lowest_height" not in values:
         return said
     mass = with_uncertainty(QUANTITIES["mass_to_set"].show(values["mass_to_set"]))
     low, high = (1e2 * (values[name].value or 0.0) for name in ("lowest_height", "highest_height"))
-    return f"{said}; tops float from {low:.2f} to {high:.2f} cm, set {mass}"
+    return Text(
+        "{said}; tops float from {low:.2f} to {high:.2f} cm, set {mass:n}", said=said, low=low, high=high, mass=mass
+    )
 
 
 # --- field and residuals -------------------------------------------------------------------------------
@@ -111,9 +114,16 @@ def _mark_window(axes: Axes, analysis: FieldAnalysis) -> None:
     low, high, middle = (
         1e2 * (values[name].value or 0.0) for name in ("lowest_height", "highest_height", "height_at_mass")
     )
-    axes.axvspan(low, high, color=FLOATS, alpha=0.15, linewidth=0, label=f"tops float:\n{low:.2f} to {high:.2f} cm")
+    axes.axvspan(
+        low,
+        high,
+        color=FLOATS,
+        alpha=0.15,
+        linewidth=0,
+        label=Text("tops float:\n{low:.2f} to {high:.2f} cm", low=low, high=high),
+    )
     mass = with_uncertainty(QUANTITIES["mass_to_set"].show(values["mass_to_set"]))
-    axes.axvline(middle, linewidth=1.3, label=f"a top of {mass}", **LOOKS["to set"].as_line)
+    axes.axvline(middle, linewidth=1.3, label=Text("a top of {mass:n}", mass=mass), **LOOKS["to set"].as_line)
 
 
 def _draw_residuals(axes: Axes, analysis: FieldAnalysis, limits: tuple[float, float]) -> None:
@@ -129,9 +139,10 @@ def _draw_residuals(axes: Axes, analysis: FieldAnalysis, limits: tuple[float, fl
         )  # fmt: skip
     axes.set(xlim=limits, ylim=(-most, most), xlabel="height  [cm]", ylabel="residual  [u]")
     u = 1e6 * np.concatenate([run.scan.u for run in analysis.runs])
-    text = (
-        f"reading − fit, in units of its\nu of {u.min():.0f} to {u.max():.0f} µT, that of the\n"
-        "height included; shaded ±1, ±2"
+    text = Text(
+        "reading − fit, in units of its\nu of {low:.0f} to {high:.0f} µT, that of the\nheight included; shaded ±1, ±2",
+        low=u.min(),
+        high=u.max(),
     )
     axes.text(_BESIDE, 1.0, text, transform=axes.transAxes, va="top", fontsize=8)
 
@@ -156,7 +167,15 @@ def _draw_masses(axes: Axes, run: FieldRun) -> None:
         axes.plot(1e2 * height, 1e3 * floating[name], marker="s", color=FLOATS)
     set_at = 1e2 * floating["height_at_mass"], 1e3 * floating["mass_to_set"]
     mass_to_set = with_uncertainty(QUANTITIES["mass_to_set"].show(floating.values["mass_to_set"]))
-    axes.plot(*set_at, marker="D", color=SET, linestyle="none", markersize=5, zorder=4, label=f"to set: {mass_to_set}")
+    axes.plot(
+        *set_at,
+        marker="D",
+        color=SET,
+        linestyle="none",
+        markersize=5,
+        zorder=4,
+        label=Text("to set: {mass:n}", mass=mass_to_set),
+    )
     axes.set(xlabel="height at which it floats  [cm]", ylabel="mass of the top  [g]")
     bottom, top_of = axes.get_ylim()
     axes.set_ylim(bottom, top_of + 0.55 * (top_of - bottom))
@@ -185,5 +204,5 @@ def _draw_spins(axes: Axes, run: FieldRun) -> None:
     ]
     axes.set(xlabel="mass of the top  [g]", ylabel="spin  [Hz]", ylim=(0, 1.35 * float(np.nanmax(fast))))
     axes.set_title("Spins at which small motions stay small", loc="left")
-    about = f"at the mass to set:\n{texts[0]} to {texts[1]}"
+    about = Text("at the mass to set:\n{slow:n} to {fast:n}", slow=texts[0], fast=texts[1])
     axes.text(0.02, 0.98, about, transform=axes.transAxes, va="top", fontsize=SMALL)

@@ -16,6 +16,7 @@ from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, first_of, in
 from levilab.present.document.blocks import Listing, Note, Paragraph, Section, Tabular
 from levilab.present.numbers import off, plain, short_name, with_decimals, with_sign, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -84,7 +85,7 @@ def _gain(scan: FieldScan, name: str) -> str:
         return "held"
     if left is None:
         return "all of it"
-    return "nothing" if left > LEARNS_NOTHING else f"u is {100 * left:.0f} % of what it was"
+    return "nothing" if left > LEARNS_NOTHING else Text("u is {percent:.0f} % of what it was", percent=100 * left)
 
 
 def follows_table(values: Mapping[str, Estimate]) -> Table:
@@ -142,14 +143,14 @@ MOST_READINGS = 200
 def field_part(analysis: FieldAnalysis) -> ReportPart:
     """Return what the scans say, the base, what follows, and the readings."""
     several = len(analysis.runs) > 1
-    means = " Of several scans these are means; what is common to them makes no mean more certain." if several else ""
+    means = "Of several scans these are means; what is common to them makes no mean more certain." if several else ""
     return ReportPart(
         subject="field of the base",
         heading="Field of the base on its axis",
-        lead=f"{sum(run.scan.statistics.n for run in analysis.runs)} heights measured",
+        lead=Text("{n} heights measured", n=sum(run.scan.statistics.n for run in analysis.runs)),
         result=(
-            Paragraph(" ".join(_meaning(analysis)), "What it means."),
-            Tabular("field-follows", follows_table(analysis.values), f"{_FOLLOWS}{means}"),
+            Paragraph(Sentences(*_meaning(analysis)), "What it means."),
+            Tabular("field-follows", follows_table(analysis.values), Sentences(*_FOLLOWS.each, means)),
             Tabular("field-scans", scans_table(analysis), _SCANS, first_column_wraps=True),
         ),
         figure=FigureText(
@@ -166,10 +167,11 @@ def field_part(analysis: FieldAnalysis) -> ReportPart:
     )
 
 
-_FOLLOWS = (
-    f"{VALUE_U} All of what calliper, scales "
-    "and scan leave open is in it, to first order. Masses and heights are those at which a moment that follows the "
-    "field is stable; spins those at which small motions of the whole top stay small, for a top of the mass to set."
+_FOLLOWS = Sentences(
+    VALUE_U,
+    "All of what calliper, scales and scan leave open is in it, to first order. Masses and heights are those at which "
+    "a moment that follows the field is stable; spins those at which small motions of the whole top stay small, for a "
+    "top of the mass to set.",
 )
 _SCANS = (
     "χ²/dof is near 1 where the fit leaves nothing but the uncertainties. Order p: the order test (Wald–Wolfowitz); a "
@@ -196,9 +198,18 @@ def _bases(analysis: FieldAnalysis) -> tuple[Block, ...]:
 def _in_words(_: Source[FieldReadings], run: FieldRun, *__: object) -> tuple[str, ...]:
     scan = run.scan
     low, high = 1e2 * scan.height[0], 1e2 * scan.height[-1]
-    text = f"{scan.statistics.n} heights, {with_decimals(low, 2)} cm to {with_decimals(high, 2)} cm"
-    u = f"u of a reading against the fit: {1e6 * scan.u.min():.0f} µT to {1e6 * scan.u.max():.0f} µT"
-    return text, f"{u}, that of its height included"
+    text = Text(
+        "{n} heights, {low:n} cm to {high:n} cm",
+        n=scan.statistics.n,
+        low=with_decimals(low, 2),
+        high=with_decimals(high, 2),
+    )
+    u = Text(
+        "u of a reading against the fit: {low:.0f} µT to {high:.0f} µT",
+        low=1e6 * scan.u.min(),
+        high=1e6 * scan.u.max(),
+    )
+    return text, Text("{u}, that of its height included", u=u)
 
 
 def _readings(_: Source[FieldReadings], run: FieldRun, *__: object) -> tuple[Listing]:
@@ -211,7 +222,7 @@ def _readings(_: Source[FieldReadings], run: FieldRun, *__: object) -> tuple[Lis
         for z, b, r in zip(scan.height[:shown], scan.flux_density[:shown], scaled[:shown], strict=True)
     ]
     heads = ("z [cm]", "B [mT]", "residual [u]")
-    note = f"Residual: reading − fit, in units of u. {first_of(shown, len(scan.height))}".rstrip()
+    note = Sentences("Residual: reading − fit, in units of u.", first_of(shown, len(scan.height)))
     return (Listing("field-readings", table("Readings", heads, rows, numbers=heads), note),)
 
 
@@ -221,7 +232,11 @@ def _points(run: FieldRun) -> Iterator[tuple[str, ...]]:
     for z, b, u, residual in zip(scan.height, scan.flux_density, 1e3 * scan.u, 1e3 * scan.residuals, strict=True):
         field = Estimate(1e3 * float(b), float(u), "mT")
         left = off(float(residual), float(u))
-        yield f"z = {with_decimals(1e2 * z, 3)} cm", f"B = {with_uncertainty(field)}", f"B − fit = {left} mT"
+        yield (
+            Text("z = {z:n} cm", z=with_decimals(1e2 * z, 3)),
+            Text("B = {z:n}", z=with_uncertainty(field)),
+            Text("B − fit = {z:n} mT", z=left),
+        )
 
 
 # --- what it means ---
@@ -238,18 +253,29 @@ def _meaning(analysis: FieldAnalysis) -> Iterator[str]:
         return
     b, slope = (float(each[0]) for each in on_axis(scan.ring, np.array([_HEIGHT_M]))[:2])
     yield (
-        f"The base is as strong as ρ = {with_uncertainty(QUANTITIES['strength'].show(strength))}, known to "
-        f"{digits(100 * strength.u / abs(strength.value))} %; {1e2 * _HEIGHT_M:g} cm up that is "
-        f"{plain(abs(1e3 * b))} mT, and {plain(abs(10 * slope))} mT less for each centimetre higher."
+        Text(
+            "The base is as strong as ρ = {strength:n}, known to {percent:n} %; {height:g} cm up that is "
+            "{mt:n} mT, and {less:n} mT less for each centimetre higher.",
+            strength=with_uncertainty(QUANTITIES["strength"].show(strength)),
+            percent=digits(100 * strength.u / abs(strength.value)),
+            height=1e2 * _HEIGHT_M,
+            mt=plain(abs(1e3 * b)),
+            less=plain(abs(10 * slope)),
+        )
     )
     yield "What the base holds up is in proportion to its strength: 1 % stronger, and the top weighs 1 % more."
     reduced = scan.statistics.reduced_chi_square
     if reduced is None:
         yield "No uncertainty of the readings is given, so whether a ring describes the field is not tested."
     elif reduced < 1.5:
-        yield f"A uniform ring describes the readings to their uncertainties (χ²/dof = {digits(reduced)})."
+        yield Text(
+            "A uniform ring describes the readings to their uncertainties (χ²/dof = {chi:n}).", chi=digits(reduced)
+        )
     else:
         yield (
-            f"A uniform ring leaves more than the uncertainties explain (χ²/dof = {digits(reduced)}): the magnet is "
-            "not uniform, or the probe was off the axis, or a size is wrong."
+            Text(
+                "A uniform ring leaves more than the uncertainties explain (χ²/dof = {chi:n}): the magnet is "
+                "not uniform, or the probe was off the axis, or a size is wrong.",
+                chi=digits(reduced),
+            )
         )

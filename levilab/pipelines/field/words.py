@@ -176,35 +176,52 @@ def remark(of: Remark) -> str:
 
 def _contradicts(found: float, stated: float, u: float, name: str) -> str:
     unit, times = _SHOWN[UNITS[name]]
-    return (
-        f"the scan wants {name.replace('_', ' ')} = {times * found:.4g} {unit}, which lies "
-        f"{abs(found - stated) / u:.1f} u from the stated {times * stated:.4g} {unit} (u = {digits(times * u)} "
-        f"{unit}): measure it again, and where the heights are counted from"
+    return Text(
+        "the scan wants {name} = {found:.4g} {unit:s}, which lies {times:.1f} u from the stated "
+        "{stated:.4g} {unit:s} (u = {u:n} {unit}): measure it again, and where the heights are "
+        "counted from",
+        name=name.replace("_", " "),
+        found=times * found,
+        unit=unit,
+        times=abs(found - stated) / u,
+        stated=times * stated,
+        u=digits(times * u),
     )
 
 
-_REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType({
-    "scan scatters": lambda reduced: (
-        f"the fit leaves more than the stated uncertainties explain (χ²/dof = {digits(reduced, 3)}): all uncertainties "
-        f"are enlarged by {digits(math.sqrt(reduced), 3)}; is the probe on the axis, and are the radii right?"
-    ),
-    "scan overstated": lambda reduced: (
-        f"the readings scatter far less than their stated uncertainties (χ²/dof = {digits(reduced)}): what is common "
-        "to all of them, such as the scale of the instrument, belongs into gain_u and background_u_t"
-    ),
-    "contradicts": _contradicts,
-    "no strength": Doubting(
-        "the strength is not significantly different from zero: was the probe near the base?"
-    ),
-    "stray reading": lambda height, off: (
-        f"the reading at {1e3 * height:.4g} mm lies {off:.1f} u off the others: measure that height again"
-    ),
-    "another zero": lambda height, low, high: (
-        f"the top is said to float at {1e3 * height:.4g} mm, by this scan tops float from {1e3 * low:.4g} to "
-        f"{1e3 * high:.4g} mm: are both counted from the same zero?"
-    ),
-    "rough mass": lambda u, width: (
-        f"the mass to set is known to {digits(1e3 * u)} g only, and the window is {digits(1e3 * width)} g wide: try "
-        "masses about it; the height at which one floats gives the moment"
-    ),
-})  # fmt: skip
+_REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(
+    {
+        "scan scatters": lambda reduced: Text(
+            "the fit leaves more than the stated uncertainties explain (χ²/dof = {chi:n}): all "
+            "uncertainties are enlarged by {factor:n}; is the probe on the axis, and are the radii right?",
+            chi=digits(reduced, 3),
+            factor=digits(math.sqrt(reduced), 3),
+        ),
+        "scan overstated": lambda reduced: Text(
+            "the readings scatter far less than their stated uncertainties (χ²/dof = {chi:n}): what is "
+            "common to all of them, such as the scale of the instrument, belongs into gain_u and "
+            "background_u_t",
+            chi=digits(reduced),
+        ),
+        "contradicts": _contradicts,
+        "no strength": Doubting("the strength is not significantly different from zero: was the probe near the base?"),
+        "stray reading": lambda height, off: Text(
+            "the reading at {height:.4g} mm lies {off:.1f} u off the others: measure that height again",
+            height=1e3 * height,
+            off=off,
+        ),
+        "another zero": lambda height, low, high: Text(
+            "the top is said to float at {height:.4g} mm, by this scan tops float from {low:.4g} to "
+            "{high:.4g} mm: are both counted from the same zero?",
+            height=1e3 * height,
+            low=1e3 * low,
+            high=1e3 * high,
+        ),
+        "rough mass": lambda u, width: Text(
+            "the mass to set is known to {u:n} g only, and the window is {width:n} g wide: try masses "
+            "about it; the height at which one floats gives the moment",
+            u=digits(1e3 * u),
+            width=digits(1e3 * width),
+        ),
+    }
+)

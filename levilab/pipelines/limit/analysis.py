@@ -251,8 +251,8 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
         for which in ("lower", "upper"):
             texts = [group.conditions_text for group in self.groups if group.which == which]
             if len(texts) > 1:
-                listed = "; ".join(texts)
-                yield f"the {which} limits are of {len(texts)} conditions and are not put together: {listed}"
+                several = "the {which} limits are of {n} conditions and are not put together: {conditions}"
+                yield Text(several, which=which, n=len(texts), conditions=tuple(texts))
         for group in self.groups:
             if len(group.runs) > 1:
                 yield from warnings_of(group.statistics)
@@ -422,23 +422,23 @@ def warnings_of(statistics: Statistics) -> list[Note]:
     """Return what to know before using the mean."""
     texts: dict[str, str] = {}
     if statistics.outliers:
-        numbers = ", ".join(str(i + 1) for i in statistics.outliers)
-        plural = "s" * (len(statistics.outliers) > 1)
-        texts["outliers"] = (
-            f"repetition{plural} {numbers} do{'es' * (not plural)} not belong to the others; the mean includes them"
+        numbers = tuple(i + 1 for i in statistics.outliers)
+        texts["outliers"] = Text(
+            "limits that do not belong to the others: {numbers}; the mean has them", numbers=numbers
         )
     if statistics.drifts and statistics.trend:
-        texts["drifts"] = (
-            f"the limit drifts by {with_uncertainty(statistics.trend)} a repetition: the mean is of no fixed state of "
-            "the top; look for its mass, or the room's temperature"
+        texts["drifts"] = Text(
+            "the limit drifts by {trend:n} a repetition: the mean is of no fixed state of the top; look for its mass, "
+            "or the room's temperature",
+            trend=with_uncertainty(statistics.trend),
         )
     if statistics.scatter is None:
         texts["single"] = "a single repetition: its scatter is not known, repeat it"
     if statistics.mean.u and statistics.step**2 > 0.5 * statistics.mean.u**2 and statistics.scatter:
-        texts["steps"] = (
-            "the tops scatter by less than the drive's steps, which leave "
-            f"{digits(statistics.step)} Hz to the mean however often it is repeated: creep slower, or look more often "
-            "(limit.creep_hz_per_s, limit.interval_s)"
+        texts["steps"] = Text(
+            "the tops scatter by less than the drive's steps, which leave {hz:n} Hz to the mean however often it is "
+            "repeated: creep slower, or look more often (limit.creep_hz_per_s, limit.interval_s)",
+            hz=digits(statistics.step),
         )
     return [Note(kind, text) for kind, text in texts.items()]
 

@@ -18,6 +18,7 @@ from levilab.pipelines.limit.report import limit_columns, limit_part, limit_tabl
 from levilab.pipelines.options import LimitOptions
 from levilab.pipelines.result import Dump, Result
 from levilab.pipelines.row import find_all, symbols_of
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -72,7 +73,8 @@ def _rows(sources: Sequence[Source[LimitReadings]], limits: Limits) -> Iterator[
         rounding = u_of_step(printed)
         if 0 < rounding < each and not step:
             yield Component("resolution", "last digit of the limits", "B", rounding, "Hz", 1 / root,
-                            note=f"steps of {printed:g} Hz; a part of the scatter", remedy="more digits")  # fmt: skip
+                            note=Text("steps of {step:g} Hz; a part of the scatter", step=printed),
+                            remedy="more digits")  # fmt: skip
             each = rest(each, rounding)
         yield Component("scatter", "scatter from top to top", "A", each, "Hz", 1 / root,
                         note=_about_scatter(limits), remedy=_more(limits))  # fmt: skip
@@ -88,17 +90,20 @@ def _rows(sources: Sequence[Source[LimitReadings]], limits: Limits) -> Iterator[
 def _more(limits: Limits) -> str:
     found = limits.statistics
     if found.between and found.between.value:
-        return f"more runs: the {found.runs} differ by more than their tops"
-    return f"more tops: it takes {_TO_HALVE * found.n} instead of {found.n} to halve it"
+        return Text("more runs: the {n} differ by more than their tops", n=found.runs)
+    return Text("more tops: it takes {more} instead of {n} to halve it", more=_TO_HALVE * found.n, n=found.n)
 
 
 def _about_scatter(limits: Limits) -> str:
     found = limits.statistics
     scatter = (found.scatter.value or 0.0) if found.scatter else 0.0
-    text = f"standard deviation of one top from another {digits(scatter)} Hz, of {found.n} tops"
+    text = Text("standard deviation of one top from another {s:n} Hz, of {n} tops", s=digits(scatter), n=found.n)
     if found.between and found.between.value:
-        text += f"; {found.runs} runs differ by {digits(found.between.value)} Hz beyond that, which is in it"
-    return f"{text}; what the counter and the moment of the fall leave to each limit is part of it"
+        beyond = digits(found.between.value)
+        text = Text(
+            "{tops}; {n} runs differ by {hz:n} Hz beyond that, which is in it", tops=text, n=found.runs, hz=beyond
+        )
+    return Text("{tops}; what the counter and the moment of the fall leave to each limit is part of it", tops=text)
 
 
 class LimitResult(Result):

@@ -15,6 +15,7 @@ from levilab.present.looks import BLACK, GREEN, GREY, LOOKS, MARKERS, ORANGE, PU
 from levilab.present.numbers import with_uncertainty
 from levilab.present.style import STYLE, TALLEST, WIDE, label_of_run
 from levilab.runs.events import RunEvent
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -64,12 +65,16 @@ def limit_figure(analysis: LimitAnalysis) -> Figure:
 def _finding(analysis: LimitAnalysis) -> str:
     """Return the means of the groups, while there are few."""
     found = [
-        f"{'no limit, drag equals pull,' if group.conditions.levels_off else group.which} "
-        f"{with_uncertainty(group.statistics.mean)}"
+        Text(
+            "{limit} {hz:n}",
+            limit="no limit, drag equals pull," if group.conditions.levels_off else group.which,
+            hz=with_uncertainty(group.statistics.mean),
+        )
         for group in analysis.groups
     ]
-    more = f" and {len(found) - 3} more conditions" if len(found) > 3 else ""
-    return f"Limit{'s' if len(found) > 1 else ''} of levitation: {', '.join(found[:3])}{more}"
+    more = Text(" and {n} more conditions", n=len(found) - 3) if len(found) > 3 else ""
+    head = "Limits of levitation: {limits}{more}" if len(found) > 1 else "Limit of levitation: {limits}{more}"
+    return Text(head, limits=tuple(found[:3]), more=more)
 
 
 def _legend_lines(group: Limits) -> int:
@@ -97,7 +102,7 @@ def _draw_limits(axes: Axes, height: float, analysis: LimitAnalysis, group: Limi
             "linestyle": "none",
         }
         axes.plot(np.array(outliers) + 1, every[outliers], label="outlier, in the mean", **style)
-    axes.axhline(mean, color=_MEAN, linewidth=1.2, label=f"mean {with_uncertainty(found.mean)}")
+    axes.axhline(mean, color=_MEAN, linewidth=1.2, label=Text("mean {mean:n}", mean=with_uncertainty(found.mean)))
     if found.scatter and found.scatter.value is not None and found.mean.u is not None:
         band = (mean - found.mean.u, mean + found.mean.u)
         axes.axhspan(*band, color=_MEAN, alpha=0.18, linewidth=0, label="± its standard error")
@@ -118,8 +123,8 @@ def _draw_limits(axes: Axes, height: float, analysis: LimitAnalysis, group: Limi
     title = ("Lower limit: the spin at which a free top falls", _upper_title(group))[group.which == "upper"]
     made_up = {bool(source.synthetic) for source in analysis.sources}
     own = all(analysis.sources[number].synthetic for number in group.runs)
-    title += "  (SYNTHETIC)" if len(made_up) > 1 and own and not group.told_apart else ""
-    axes.set_title(title + "\n" + group.conditions_text, loc="left", fontsize=8)
+    mark = "(SYNTHETIC)" if len(made_up) > 1 and own and not group.told_apart else ""
+    axes.set_title(Sentences(Sentences(title, mark), group.conditions_text, between="\n"), loc="left", fontsize=8)
     axes.legend(
         loc="upper left",
         bbox_to_anchor=(-0.09, -0.44 / height),
@@ -142,7 +147,7 @@ def _draw_run(axes: Axes, analysis: LimitAnalysis, group: Limits, k: int, start:
     axes.plot(
         tops, limit, color=colour, marker=MARKERS[k % len(MARKERS)], linestyle="none", markersize=4, zorder=3,
         gid=f"readings-{group.which}-{group.runs[k]}",
-        label=label_of_run(source.name, k, len(group.runs), "a top" + " ± u" * (u is not None)),
+        label=label_of_run(source.name, k, len(group.runs), "a top" if u is None else "a top ± u"),
     )  # fmt: skip
     if several:
         axes.plot([start - 0.4, start + len(limit) - 0.6], [limit.mean()] * 2, color=colour, linewidth=1.2)
@@ -154,13 +159,13 @@ def _draw_theory(axes: Axes, theory: Mapping[str, float]) -> None:
     low, high = axes.get_ylim()
     named = {1: 0, -1: 0}  # at each edge
     for name, expected in theory.items():
-        (colour, dashes), text = _THEORY[name], f"{name}, {expected:.2f} Hz"
+        (colour, dashes), text = _THEORY[name], Text("{name}, {hz:.2f} Hz", name=name, hz=expected)
         if low <= expected <= high:
             axes.axhline(expected, color=colour, linestyle=dashes, label=text)
             continue
         side = 1 if expected > high else -1
         axes.annotate(
-            f"{'↑' if side > 0 else '↓'} {text}",
+            Text("↑ {text}" if side > 0 else "↓ {text}", text=text),
             (1, (1 + side) / 2), (-4, -side * (3 + 1.3 * SMALL * named[side])),
             xycoords="axes fraction", textcoords="offset points",
             ha="right", va="top" if side > 0 else "bottom", fontsize=SMALL, color=colour,
@@ -172,7 +177,9 @@ def _shade_beyond_window(axes: Axes, group: Limits) -> None:
     """Shade the spins at which small motions of the top grow, so that it cannot float."""
     window = (group.device.linear_lower_hz, group.device.linear_upper_hz)
     low, high = axes.get_ylim()
-    label: str | None = f"small motions grow: outside the linear window, {window[0]:.2f} to {window[1]:.2f} Hz"
+    label: str | None = Text(
+        "small motions grow: outside the linear window, {low:.2f} to {high:.2f} Hz", low=window[0], high=window[1]
+    )
     for begin, end in ((low, min(window[0], high)), (max(window[1], low), high)):
         if begin < end:
             axes.axhspan(begin, end, color="#D55E00", alpha=0.08, linewidth=0, zorder=0, label=label)
@@ -181,10 +188,13 @@ def _shade_beyond_window(axes: Axes, group: Limits) -> None:
 
 def _upper_title(group: Limits) -> str:
     lock, top = group.ends.get(RunEvent.LOCK_LOST, 0), group.ends.get(RunEvent.TOP_LOST, 0)
-    how = f" (lost by the drive {lock} ×, fell {top} ×)" if lock or top else ""
+    how = Text(" (lost by the drive {lost} ×, fell {fell} ×)", lost=lock, fell=top) if lock or top else ""
     if group.causes:
-        how = f" ({', '.join(f'{cause} {n} ×' for cause, n in sorted(group.causes.items()))})"
-    return f"Upper limit of a driven top{how}"
+        how = Text(
+            " ({causes})",
+            causes=tuple(Text("{cause} {n} ×", cause=str(c), n=n) for c, n in sorted(group.causes.items())),
+        )
+    return Text("Upper limit of a driven top{how}", how=how)
 
 
 def _limits(analysis: LimitAnalysis, group: Limits) -> Array:

@@ -25,6 +25,7 @@ from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
 from levilab.present.numbers import how_many, off, reading, share, short_name, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
 from levilab.stability.thesis import ISLANDS_HZ, MEASURED_HZ, MEASURED_U_HZ
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -46,11 +47,17 @@ def limit_tables(analysis: LimitAnalysis) -> tuple[Table, ...]:
 def runs_table(analysis: LimitAnalysis) -> Table:
     """Return the statistics, run by run and of each kind together."""
     rows = [
-        Row((f"{short_name(source.name)} ({_group(analysis, k)})", *_cells(run)))
+        Row((Text("{name:s} ({group})", name=short_name(source.name), group=_group(analysis, k)), *_cells(run)))
         for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
     ]
     rows += [
-        Row((f"{group.statistics.runs} runs ({_group(analysis, group.runs[0])})", *_cells(group)), "together")
+        Row(
+            (
+                Text("{n} runs ({group})", n=group.statistics.runs, group=_group(analysis, group.runs[0])),
+                *_cells(group),
+            ),
+            "together",
+        )
         for group in analysis.groups
         if len(group.runs) > 1
     ]
@@ -74,7 +81,9 @@ def theory_table(analysis: LimitAnalysis) -> Table:
     rows = [
         Row(
             (
-                one.name if analysis.number(group) is None else f"{analysis.number(group)}: {one.name}",
+                one.name
+                if analysis.number(group) is None
+                else Text("{number}: {name}", number=analysis.number(group), name=one.name),
                 f"{one.expected:.2f}",
                 without_unit(one.difference),
                 share(one.p),
@@ -85,16 +94,16 @@ def theory_table(analysis: LimitAnalysis) -> Table:
         for one in group.comparisons
     ]
     devices = list(dict.fromkeys(group.device.name for group in analysis.groups))
-    top = devices[0] if len(devices) == 1 else f"{len(devices)} kinds of top"
+    top = devices[0] if len(devices) == 1 else Text("{n} kinds of top", n=len(devices))
     heads = ("theory", "[Hz]", "mean − theory [Hz]", "p", "agrees")
-    return table(f"Beside theory, for {top}", heads, rows)
+    return table(Text("Beside theory, for {top}", top=top), heads, rows)
 
 
 def _group(analysis: LimitAnalysis, run: int) -> str:
     """Return the group that a run is of: its kind, and its number where there are several, as in result.json."""
     group = next(group for group in analysis.groups if run in group.runs)
     number = analysis.number(group)
-    return group.which if number is None else f"{group.which} {number}"
+    return group.which if number is None else Text("{which} {number}", which=group.which, number=number)
 
 
 # --- readings as columns of tables for programs ---
@@ -128,7 +137,7 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
         heading="Limits of the spin of a levitated top",
         lead=how_many(n, "top"),
         result=(
-            Paragraph(" ".join(text for group in analysis.groups for text in _meaning(group)), "What it means."),
+            Paragraph(Sentences(*(text for group in analysis.groups for text in _meaning(group))), "What it means."),
             Tabular("limit-statistics", runs_table(analysis), _STATISTICS, first_column_wraps=True),
         ),
         figure=FigureText(
@@ -150,12 +159,13 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
     )
 
 
-_STATISTICS = (
-    f"{VALUE_U} That of the mean is the "
-    "standard error: s/√n from the scatter s of the tops, and what the steps of the drive leave, up to step/√12 where "
-    "the tops scatter less than that. Several runs of the same conditions have a random-effects mean, whose standard "
-    "error holds the scatter between them; runs of other conditions are no repetitions, and stand apart. Trend: slope "
-    "of a straight line through the limits of a run. Outliers by Grubbs's test, 1 %; the mean includes them."
+_STATISTICS = Sentences(
+    VALUE_U,
+    "That of the mean is the standard error: s/√n from the scatter s of the tops, and what the steps of the drive "
+    "leave, up to step/√12 where the tops scatter less than that. Several runs of the same conditions have a "
+    "random-effects mean, whose standard error holds the scatter between them; runs of other conditions are no "
+    "repetitions, and stand apart. Trend: slope of a straight line through the limits of a run. Outliers by Grubbs's "
+    "test, 1 %; the mean includes them.",
 )
 _THEORY = (
     "p: how probable so large a difference is by chance (Student's t); below 0.05 it is called a difference. The "
@@ -166,8 +176,13 @@ _THEORY = (
 
 def _in_words(source: Source[LimitReadings], run: Limits, *_: object) -> tuple[str, ...]:
     limit, u = source.readings.limit, source.readings.u
-    span = f"{how_many(run.statistics.n, f'{run.which} limit')}, {limit.min():.2f} Hz to {limit.max():.2f} Hz"
-    return span, f"u of a limit: {'not known' if u is None else size_of_u(u)}"
+    span = Text(
+        "{limits}, {low:.2f} Hz to {high:.2f} Hz",
+        limits=how_many(run.statistics.n, f"{run.which} limit"),
+        low=float(limit.min()),
+        high=float(limit.max()),
+    )
+    return span, Text("u of a limit: {u}", u="not known" if u is None else size_of_u(u))
 
 
 def _readings(source: Source[LimitReadings], run: Limits, *_: object) -> tuple[Listing]:
@@ -201,9 +216,13 @@ def _points(analysis: LimitAnalysis) -> tuple[Points, ...]:
 def _point(name: str, readings: LimitReadings, run: Limits, i: int) -> str:
     limit, mean = float(readings.limit[i]), run.statistics.mean.value
     u = None if readings.u is None else float(readings.u[i])
-    lines = [name, f"top {i + 1}", f"limit = {with_uncertainty(Estimate(limit, u, 'Hz'))}"]
-    lines += [] if mean is None else [f"limit − mean = {off(limit - mean, u)} Hz"]
-    return "\n".join(filter(None, lines))
+    lines = [
+        name,
+        Text("top {limit:n}", limit=i + 1),
+        Text("limit = {limit:n}", limit=with_uncertainty(Estimate(limit, u, "Hz"))),
+    ]
+    lines += [] if mean is None else [Text("limit − mean = {off:n} Hz", off=off(limit - mean, u))]
+    return Sentences(*lines, between="\n")
 
 
 # --- what it means ---
@@ -232,29 +251,47 @@ def _meaning(group: Limits) -> Iterator[str]:
         return
     if group.conditions.levels_off:
         yield (
-            f"The drive pulls no further than {with_uncertainty(mean)}: there the drag of the air is as large as its "
-            "pull. This is no limit of the top; a stronger drive gets higher."
+            Text(
+                "The drive pulls no further than {spin:n}: there the drag of the air is as large as its "
+                "pull. This is no limit of the top; a stronger drive gets higher.",
+                spin=with_uncertainty(mean),
+            )
         )
         return
-    yield f"The {group.which} limit is {with_uncertainty(mean)}: {_WHY[group.which]}."
+    yield Text(
+        "The {which} limit is {limit:n}: {why}.", which=group.which, limit=with_uncertainty(mean), why=_WHY[group.which]
+    )
     yield from (_CAUSES[cause] for cause in _CAUSES if group.causes.get(cause))
     if group.which == "upper" and group.device.is_thesis and ISLANDS_HZ[0] < mean.value < ISLANDS_HZ[1]:
         yield (
-            f"From {ISLANDS_HZ[0]:g} to {ISLANDS_HZ[1]:g} Hz a simulated top without a drive is up or lost by its "
-            "start (islands), so a top that falls there has met no edge."
+            Text(
+                "From {low:g} to {high:g} Hz a simulated top without a drive is up or lost by its start "
+                "(islands), so a top that falls there has met no edge.",
+                low=ISLANDS_HZ[0],
+                high=ISLANDS_HZ[1],
+            )
         )
     if found.scatter is None or not found.scatter.value or not mean.u:
         yield "How far another top's limit lies from that one top does not say."
         return
     ratio = found.scatter.value / mean.u
-    yield f"One top is lost {digits(found.scatter.value)} Hz from another, so a single one may be off by that much" + (
-        f"; the mean of {found.n} is {digits(ratio)} times as good."
-        if ratio > 1
-        else f". The mean of {found.n} is known to {digits(mean.u)} Hz only: the drive's steps, or runs that differ, "
-        "add to u and do not become less by more tops."
+    yield Text(
+        "One top is lost {hz:n} Hz from another, so a single one may be off by that much.",
+        hz=digits(found.scatter.value),
     )
+    if ratio > 1:
+        yield Text("The mean of {n} is {times:n} times as good.", n=found.n, times=digits(ratio))
+    else:
+        yield Text(
+            "The mean of {n} is known to {hz:n} Hz only: the drive's steps, or runs that differ, add to u and do not "
+            "become less by more tops.",
+            n=found.n,
+            hz=digits(mean.u),
+        )
     if group.which == "lower":
         value, u = MEASURED_HZ, MEASURED_U_HZ
         away = abs(mean.value - value) / math.hypot(mean.u, u)
-        said = "which agrees" if away < 2 else f"{digits(away)} u from it: another top, or mass"
-        yield f"The thesis's ten tops have {with_uncertainty(Estimate(value, u, 'Hz'))}, {said}."
+        said = "which agrees" if away < 2 else Text("{away:n} u from it: another top, or mass", away=digits(away))
+        yield Text(
+            "The thesis's ten tops have {spin:n}, {said}.", spin=with_uncertainty(Estimate(value, u, "Hz")), said=said
+        )

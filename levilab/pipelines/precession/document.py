@@ -23,6 +23,7 @@ from levilab.pipelines.precession.report import (
 )
 from levilab.pipelines.precession.words import PRECESSION_ROW, QUANTITIES, intercept_of, slope_of, verdict
 from levilab.pipelines.row import find_all, symbols_of
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -111,7 +112,11 @@ def _of_points(
     rounding, is_part = u_of_step(step), u_of_step(step) < each
     sensitivity = of_counts / each
     if rounding > 0:
-        note = f"steps of {step:g} Hz, {'a part of what a point scatters' if is_part else 'more than the u of a point'}"
+        note: str = Text(
+            "steps of {step:g} Hz, {within}",
+            step=step,
+            within="a part of what a point scatters" if is_part else "more than the u of a point",
+        )
         yield Component("resolution", "last digit of the counts", "B", rounding, "Hz", sensitivity,
                         included=is_part, note=note, remedy="more digits")  # fmt: skip
     what, kind, note = _what_points(options, stated=stated)
@@ -122,7 +127,7 @@ def _of_points(
                         note="its u counts along the other axis", remedy="a generator of a better clock")  # fmt: skip
     excess = rest(whole, scatter)
     if stated and line.scale > 1:
-        note = f"the points scatter {digits(line.scale)} times as much as their u says"
+        note = Text("the points scatter {times:n} times as much as their u says", times=digits(line.scale))
         yield Component("excess", "scatter beyond the u of the points", "A", excess, _unit(fit, whole), 1.0,
                         note=note, remedy="finding what moves the points, such as miscounts")  # fmt: skip
 
@@ -143,9 +148,14 @@ def _what_points(options: PrecessionOptions, *, stated: bool) -> tuple[str, Lite
 def _better(source: Source[SweepReadings], fit: SweepFit) -> str:
     counts, gate = setting_of(source, EXPERIMENT, "counts"), gate_of(source, EXPERIMENT)
     n = fit.line.n
-    text = f"a wider range of drive frequencies (u falls with it), or {_TO_HALVE * n} points instead of {n} to halve it"
+    text = Text(
+        "a wider range of drive frequencies (u falls with it), or {n} points instead of {now} to halve it",
+        n=_TO_HALVE * n,
+        now=n,
+    )
     if counts and gate:
-        text += f"; or longer or more gates a point ({counts:g} of {gate:g} s now)"
+        gates = "{range}; or longer or more gates a point ({gates:g} of {gate:g} s now)"
+        return Text(gates, range=text, gates=counts, gate=gate)
     return text
 
 

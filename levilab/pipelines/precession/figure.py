@@ -14,6 +14,7 @@ from levilab.present.drawing import SMALL, band, headline, panel, run_look, synt
 from levilab.present.looks import GREY, LOOKS
 from levilab.present.numbers import plain, without_unit
 from levilab.present.style import STYLE, WIDE, label_of_run
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,7 +58,11 @@ def _draw_line(axes: Axes, analysis: PrecessionAnalysis) -> None:
     fit = analysis.combined
     x = _span(fit)
     axes.plot(x, x, linewidth=1, label="locked top: slope 1,\nintercept 0", zorder=2.4, **LOOKS["locked"].as_line)
-    label = f"line: slope {without_unit(slope_of(fit))},\nintercept {without_unit(intercept_of(fit))} Hz"
+    label = Text(
+        "line: slope {slope:n},\nintercept {intercept:n} Hz",
+        slope=without_unit(slope_of(fit)),
+        intercept=without_unit(intercept_of(fit)),
+    )
     axes.plot(x, fit.line.at(x), linewidth=1.4, label=label, zorder=2.6, **LOOKS["fit"].as_line)
     axes.plot(x, median_line(fit, x), linewidth=1.6, label="median line, robust", zorder=2.7, **LOOKS["robust"].as_line)
     _draw_bands(axes, x, fit.line.at(x), fit, labels=True)
@@ -82,7 +87,7 @@ def _finding(fit: SweepFit) -> str:
     if fit.p_locked is None:
         return "Precession against drive"
     follows = "follows" if fit.locked else "does not follow"
-    return f"The precession {follows} the drive one to one (p = {plain(fit.p_locked, 2)})"
+    return Text("The precession {follows} the drive one to one (p = {p:n})", follows=follows, p=plain(fit.p_locked, 2))
 
 
 def _span(fit: SweepFit) -> Array:
@@ -107,7 +112,11 @@ def _draw_bands(axes: Axes, x: Array, y: Array, fit: SweepFit, *, labels: bool =
         return
     usual = fit.line.scale * _usual_u(fit)
     for half, alpha, what in (
-        (fit.line.prediction_band(x, _usual_u(fit)), 0.10, f"95 % of further points\nof u = {digits(usual)} Hz"),
+        (
+            fit.line.prediction_band(x, _usual_u(fit)),
+            0.10,
+            Text("95 % of further points\nof u = {hz:n} Hz", hz=digits(usual)),
+        ),
         (fit.line.confidence_band(x), 0.28, "95 % confidence of the\nline"),
     ):
         band(axes, x, y, half, LOOKS["fit"].colour, alpha=alpha, label=what if labels else None)
@@ -144,7 +153,8 @@ def _draw_left_out(axes: Axes, fit: SweepFit) -> None:
         axes.plot(
             point.drive, y, marker=marker, color=LOOKS["left out"].colour, markersize=6, linestyle="none", zorder=5
         )
-        text = f"{point.precession:.4g} Hz: " * beyond + miscount_as_text(point.miscount)
+        text = miscount_as_text(point.miscount)
+        text = Text("{hz:.4g} Hz: {miscount}", hz=point.precession, miscount=text) if beyond else text
         last = point.drive > float(fit.column("drive").mean())
         axes.annotate(
             text, (point.drive, y), (-8 if last else 8, -3), textcoords="offset points", fontsize=SMALL,
@@ -177,7 +187,7 @@ def _draw_departures(axes: Axes, analysis: PrecessionAnalysis) -> None:
     axes.set(xlabel="frequency of the drive ν$_d$  [Hz]", ylabel="precession − drive  [Hz]")
     bar = "u of each point" if fit.line.chi_square is not None else "the scatter"
     axes.set_title("Departures from a locked top")
-    about = f"bars: ± {bar};\nlines and bands as above.\nA locked top scatters\nabout the dashed line."
+    about = Text("bars: ± {bar};\nlines and bands as above.\nA locked top scatters\nabout the dashed line.", bar=bar)
     axes.text(_BESIDE, 1.0, about, transform=axes.transAxes, va="top", fontsize=8)
 
 
@@ -193,7 +203,7 @@ def _draw_leverage(axes: Axes, analysis: PrecessionAnalysis) -> None:
     n = min(run.fit.line.n for run in analysis.runs)
     axes.axhline(2 / n, color=GREY, linestyle="dotted", linewidth=1)
     axes.set(xlabel="ν$_d$  [Hz]", ylabel="leverage", ylim=(0, None))
-    axes.set_title(f"Leverage; dotted: the mean, {digits(2 / n)}", loc="left", fontsize=8)
+    axes.set_title(Text("Leverage; dotted: the mean, {mean:n}", mean=digits(2 / n)), loc="left", fontsize=8)
 
 
 def _draw_changes(axes: Axes, analysis: PrecessionAnalysis) -> None:

@@ -37,6 +37,7 @@ from levilab.present.numbers import (
 )
 from levilab.present.tables import Row, Table, table
 from levilab.simulator.published.printed import published
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -67,7 +68,7 @@ def named_runs(analysis: PrecessionAnalysis) -> list[tuple[PrecessionRun, str]]:
     """Return each sweep with the end of its tables' titles."""
     several = len(analysis.runs) > 1
     return [
-        (run, f" of {source.name}" if several else "")
+        (run, Text(" of {name:s}", name=source.name) if several else "")
         for run, source in zip(analysis.runs, analysis.sources, strict=True)
     ]
 
@@ -78,11 +79,23 @@ def lines_table(analysis: PrecessionAnalysis) -> Table:
     rows = []
     if total > 1:
         for run, source in zip(analysis.runs, analysis.sources, strict=True):
-            rows.append(Row((f"{short_name(source.name)}: {line_name(run.fit)}", *_line_cells(run.fit))))
+            rows.append(
+                Row(
+                    (
+                        Text("{name:s}: {line}", name=short_name(source.name), line=line_name(run.fit)),
+                        *_line_cells(run.fit),
+                    )
+                )
+            )
     together = "together" if total > 1 else "best"
     rows.append(
         Row(
-            (("all points: " if total > 1 else "") + line_name(analysis.combined), *_line_cells(analysis.combined)),
+            (
+                Text("all points: {line}", line=line_name(analysis.combined))
+                if total > 1
+                else line_name(analysis.combined),
+                *_line_cells(analysis.combined),
+            ),
             together,
         )
     )
@@ -97,7 +110,7 @@ def lines_table(analysis: PrecessionAnalysis) -> Table:
 def line_name(fit: SweepFit) -> str:
     """Return the name of the line, and through how many points it goes."""
     kind = "orthogonal" if fit.line.orthogonal else "weighted" if fit.line.chi_square is not None else "least squares"
-    return f"{kind}, {how_many(fit.line.n, 'point')}"
+    return Text("{kind}, {points}", kind=kind, points=how_many(fit.line.n, "point"))
 
 
 def _line_cells(fit: SweepFit) -> tuple[str, ...]:
@@ -123,7 +136,9 @@ def power_table(fit: SweepFit) -> Table:
         ("range of ν_d [Hz], points and u as they are", plain(power.range_hz), plain(power.range_needed_hz)),
         ("u of a point [Hz], all else as it is", plain(power.u_hz, 2), plain(power.u_needed_hz, 2)),
     ]
-    title = f"To tell a slope of {power.slope:g} from 1 (95 % confidence, power 0.9), any one of the last three"
+    title = Text(
+        "To tell a slope of {slope:g} from 1 (95 % confidence, power 0.9), any one of the last three", slope=power.slope
+    )
     return table(title, ("", "now", "needed"), rows, numbers=("now", "needed"))
 
 
@@ -151,8 +166,13 @@ def points_table(
         Row((*when, *_point_cells(fit, point, departure)), "" if point.used else "outlier")
         for point, departure, when in zip(shown, departures, clock[1] or [()] * len(shown), strict=False)
     ]
-    more = f" (the first {most} of {len(fit.points)})" if len(fit.points) > most else ""
-    return table(f"Points{name}{more}", (*clock[0], *POINT_HEADS), rows, numbers=(*clock[0], *POINT_HEADS))
+    more = Text(" (the first {shown} of {n})", shown=most, n=len(fit.points)) if len(fit.points) > most else ""
+    return table(
+        Text("Points{of}{first}", of=name, first=more),
+        (*clock[0], *POINT_HEADS),
+        rows,
+        numbers=(*clock[0], *POINT_HEADS),
+    )
 
 
 def _point_cells(fit: SweepFit, point: Point, departure: str) -> tuple[str, ...]:
@@ -185,7 +205,7 @@ def coherence_table(run: PrecessionRun, name: str = "") -> Table:
         for one, drift in zip(run.coherences, drifts, strict=True)
     ]
     heads = ("ν_d [Hz]", "pulses", "mean vector", "phase [°]", "drift [mHz]", "turns", "locked")
-    return table(f"Phase of the laser's pulses on the drive{name}", heads, rows, numbers=heads[:6])
+    return table(Text("Phase of the laser's pulses on the drive{of}", of=name), heads, rows, numbers=heads[:6])
 
 
 # --- readings as columns of tables for programs ---
@@ -233,9 +253,9 @@ def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
     return ReportPart(
         subject="precession",
         heading="Precession of a driven top",
-        lead=f"{how_many(analysis.combined.line.n, 'point')} used",
+        lead=Text("{points} used", points=how_many(analysis.combined.line.n, "point")),
         result=(
-            Paragraph(" ".join(_meaning(analysis.combined)), "What it means."),
+            Paragraph(Sentences(*_meaning(analysis.combined)), "What it means."),
             Tabular("precession-lines", lines_table(analysis), _LINES, first_column_wraps=True),
             *_power(analysis),
         ),
@@ -253,11 +273,11 @@ def precession_part(analysis: PrecessionAnalysis) -> ReportPart:
     )
 
 
-_LINES = (
-    f"{VALUE_U} p locked: how probable it is "
-    "that the points of a locked top, slope 1 and intercept 0, lie as far off as these; below 0.01 that is excluded. "
-    "Slope and intercept are tested together, as they are correlated. The median line (Theil and Sen) goes through all "
-    "points, those left out of the fit as well; it stands up to a few wild ones."
+_LINES = Sentences(
+    VALUE_U,
+    "p locked: how probable it is that the points of a locked top, slope 1 and intercept 0, lie as far off as these; "
+    "below 0.01 that is excluded. Slope and intercept are tested together, as they are correlated. The median line "
+    "(Theil and Sen) goes through all points, those left out of the fit as well; it stands up to a few wild ones.",
 )
 _PHASES = (
     "Mean vector: length of the mean of unit vectors in the direction of each pulse's phase; 1 where all pulses come "
@@ -294,7 +314,7 @@ def _readings(source: Source[SweepReadings], run: PrecessionRun, _: PrecessionOp
     clock = with_clock(source.time_zero, None if time is None else time.tolist(), ())
     found = replace(points_table(run, most=MOST_POINTS, clock=clock), title="Points")
     more = first_of(min(count, MOST_POINTS), count)
-    return (Tabular("precession-points", found, f"{_POINTS} {more}".rstrip()),)
+    return (Tabular("precession-points", found, Sentences(_POINTS, more)),)
 
 
 def _figure_points(run: PrecessionRun) -> Iterator[tuple[str, ...]]:
@@ -305,14 +325,20 @@ def _figure_points(run: PrecessionRun) -> Iterator[tuple[str, ...]]:
                 f"ν_d = {point.drive:.7g} Hz",
                 f"ν_p = {with_uncertainty(Estimate(point.precession, point.u, 'Hz'))}",
                 f"ν_p − ν_d = {off(point.precession - point.drive, point.u)} Hz",
-                f"ν_p − line = {off(point.residual, point.u)} Hz",
+                Text("ν_p − line = {off:n} Hz", off=off(point.residual, point.u)),
             )
 
 
 def _in_words(source: Source[SweepReadings], run: PrecessionRun, options: PrecessionOptions) -> tuple[str, ...]:
     drive, out = run.fit.column("drive"), sum(not point.used for point in run.fit.points)
-    text = f"{how_many(len(drive), 'point')}, {drive.min():.4g} Hz to {drive.max():.4g} Hz"
-    return text + (f", {out} left out as miscounts" if out else ""), _uncertainty(source, run, options)
+    text = Text(
+        "{points}, {first:.4g} Hz to {last:.4g} Hz",
+        points=how_many(len(drive), "point"),
+        first=float(drive.min()),
+        last=float(drive.max()),
+    )
+    text = Text("{points}, {out} left out as miscounts", points=text, out=out) if out else text
+    return text, _uncertainty(source, run, options)
 
 
 def _uncertainty(source: Source[SweepReadings], run: PrecessionRun, options: PrecessionOptions) -> str:
@@ -321,8 +347,12 @@ def _uncertainty(source: Source[SweepReadings], run: PrecessionRun, options: Pre
     if not np.isfinite(u).all():
         return "u of a point: not known, taken from the scatter about the line"
     if options.reading_u is None and source.readings.laser is not None:
-        return f"u of a point: {size_of_u(u)}, from the gates of all points, the swing about the drive taken off"
-    return f"u of a point: {size_of_u(u)}, {origin_of_u(source, 'precession_frequency_u_hz', options)}"
+        return Text(
+            "u of a point: {u}, from the gates of all points, the swing about the drive taken off", u=size_of_u(u)
+        )
+    return Text(
+        "u of a point: {u}, {source}", u=size_of_u(u), source=origin_of_u(source, "precession_frequency_u_hz", options)
+    )
 
 
 # --- what it means ---
@@ -336,27 +366,46 @@ def _meaning(fit: SweepFit) -> Iterator[str]:
     line = fit.line
     slope = with_uncertainty(slope_of(fit))
     if fit.p_locked is None or not line.u_slope:
-        yield f"The line rises by {slope}; how far that may be off these points do not say, so nothing is tested."
+        yield Text(
+            "The line rises by {slope:n}; how far that may be off these points do not say, so nothing is tested.",
+            slope=slope,
+        )
         return
     if fit.locked:
         yield (
-            f"Each time the drive turns, the stem cuts the beam once: slope {slope} and intercept agree with 1 and 0, "
-            f"as of a top that is locked to its drive (p = {plain(fit.p_locked, 2)})."
+            Text(
+                "Each time the drive turns, the stem cuts the beam once: slope {slope:n} and intercept agree "
+                "with 1 and 0, as of a top that is locked to its drive (p = {p:n}).",
+                slope=slope,
+                p=plain(fit.p_locked, 2),
+            )
         )
     else:
         yield (
-            f"The stem does not cut the beam once in each period of the drive: slope {slope} and intercept together "
-            f"exclude 1 and 0 (p = {plain(fit.p_locked, 1)}). A top that is not locked, or a counter that misses or "
-            "doubles pulses, does that; the free precession does not follow the drive at all."
+            Text(
+                "The stem does not cut the beam once in each period of the drive: slope {slope:n} and "
+                "intercept together exclude 1 and 0 (p = {p:n}). A top that is not locked, or a counter that "
+                "misses or doubles pulses, does that; the free precession does not follow the drive at all.",
+                slope=slope,
+                p=plain(fit.p_locked, 1),
+            )
         )
     theirs = published("thesis")["measured.slope"]  # printed without an uncertainty
     away = abs(line.slope - theirs.value) / line.u_slope
     if away > _DIFFERS:
-        yield f"The slope of {theirs.text} that the thesis gives lies {digits(away)} u away from this one."
+        yield Text(
+            "The slope of {slope:n} that the thesis gives lies {away:n} u away from this one.",
+            slope=theirs.text,
+            away=digits(away),
+        )
     else:
         yield (
-            f"The slope of {theirs.text} that the thesis gives lies within {digits(away)} u: these points cannot "
-            "distinguish it from a locked top's."
+            Text(
+                "The slope of {slope:n} that the thesis gives lies within {away:n} u: these points cannot "
+                "distinguish it from a locked top's.",
+                slope=theirs.text,
+                away=digits(away),
+            )
         )
     if fit.spin_offset is not None and fit.u_spin_offset:
         offset = abs(fit.spin_offset)
@@ -365,4 +414,4 @@ def _meaning(fit: SweepFit) -> Iterator[str]:
             "the tape turns with the top." if follows else "is the tape on a washer that slips, or does the top swing?"
         )
         size = digits(1e3 * max(offset, fit.u_spin_offset))
-        yield f"The spin that was counted is the drive's frequency to {size} mHz: {why}"
+        yield Text("The spin that was counted is the drive's frequency to {size:n} mHz: {why}", size=size, why=why)

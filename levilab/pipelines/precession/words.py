@@ -96,10 +96,10 @@ def miscount_as_text(of: Miscount) -> str:
     """Return a miscount as text."""
     if of.times is not None:
         above, below = of.times
-        part = {(1, 2): "half", (2, 1): "twice"}.get(of.times, f"{above}/{below} of")
-        return f"{part} the frequency was counted"
+        part = {(1, 2): "half", (2, 1): "twice"}.get(of.times, Text("{above}/{below} of", above=above, below=below))
+        return Text("{part} the frequency was counted", part=part)
     if of.counts is not None:
-        return f"{pulses_too_many(of.counts)} in each gate"
+        return Text("{pulses} in each gate", pulses=pulses_too_many(of.counts))
     return "far off the line, and no miscount explains it"
 
 
@@ -112,58 +112,90 @@ def _miscount(points: tuple[Point, ...], k: float, gates_known: float = 1.0) -> 
     point = points[int(k)]
     assert point.miscount is not None
     gate = "" if gates_known else "; whether whole pulses are missing only the counter's gate could say"
-    end = ("" if point.used else ", left out of the line") if point.miscount.named else f"{gate} (it stays in)"
-    return (
-        f"point {k + 1:.0f}, {point.precession:.5g} Hz at a drive of {point.drive:.5g} Hz: "
-        f"{miscount_as_text(point.miscount)}{end}"
+    end = (
+        ("" if point.used else ", left out of the line")
+        if point.miscount.named
+        else Text("{gate} (it stays in)", gate=gate)
+    )
+    return Text(
+        "point {number:.0f}, {hz:.5g} Hz at a drive of {drive:.5g} Hz: {what}{end}",
+        number=k + 1,
+        hz=point.precession,
+        drive=point.drive,
+        what=miscount_as_text(point.miscount),
+        end=end,
     )
 
 
 def _point(points: tuple[Point, ...], k: float) -> str:
-    return f"point {k + 1:.0f}, at {points[int(k)].drive:.5g} Hz"
+    return Text("point {number:.0f}, at {drive:.5g} Hz", number=k + 1, drive=points[int(k)].drive)
 
 
-_REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType({
-    "many miscounts": Doubting(lambda _, named, n: (
-        f"{named:.0f} of {n:.0f} points look like miscounts: too many to leave out, so the line goes through all of "
-        "them; look at the laser's signal and the trigger level"
-    )),
-    "miscount": _miscount,
-    "unexplained": _miscount,
-    "sweep scatters": lambda _, scale, p: (
-        f"the points scatter {digits(scale)} times as much as their u says (p = {digits(p, 1)}): all uncertainties are "
-        "enlarged by that"
-    ),
-    "sweep overstated": lambda _, chi_square, freedom: (
-        f"the points scatter much less than their u says (χ² of {digits(chi_square)} for {freedom:.0f} degrees of "
-        "freedom): their u is too large, and so is that of the line; gates in a row scatter more than their mean, for "
-        "a locked top swings about its drive and comes back"
-    ),
-    "sweep exact": "the points lie on the line to the last digit: without their u nothing can be tested; give it",
-    "moves the slope": lambda points, k, change, share: (
-        f"{_point(points, k)}, alone moves the slope by {digits(change)}, {share:.1f} of its u"
-    ),
-    "holds the line": lambda points, k, leverage: (
-        f"{_point(points, k)}, holds the line nearly by itself (leverage {leverage:.2f}): measure more points near it"
-    ),
-    "uncertain drive": lambda _, worst: (
-        f"u of the drive's frequency is up to {digits(worst)} u of the precession: let it count with `orthogonal` = "
-        "True"
-    ),
-    "uncertain clock": lambda _, share, of_slope, u: (
-        f"u of the drive's frequency is {digits(share)} of it at all points, as that of a clock: the slope is "
-        f"uncertain by {digits(of_slope)} beside its u of {digits(u)}"
-    ),
-    "drive u unknown": "u of the drive's frequency is not known and taken as large as that of the precession",
-    "spin off": Doubting(lambda _, off: (
-        f"the spin that was counted lies {digits(abs(off), 3)} Hz {'below' if off < 0 else 'above'} the drive: a "
-        "locked top spins with it; is the tape on a loose washer, or was the top not locked?"
-    )),
-    "slopes differ": lambda _, n, p: (
-        f"the slopes of the {n:.0f} runs differ by more than their u says (p = {digits(p, 1)}): the line through all "
-        "points has too small a u; look at the runs one by one"
-    ),
-})  # fmt: skip
+_REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(
+    {
+        "many miscounts": Doubting(
+            lambda _, named, n: Text(
+                "{named:.0f} of {n:.0f} points look like miscounts: too many to leave out, so the line goes "
+                "through all of them; look at the laser's signal and the trigger level",
+                named=named,
+                n=n,
+            )
+        ),
+        "miscount": _miscount,
+        "unexplained": _miscount,
+        "sweep scatters": lambda _, scale, p: Text(
+            "the points scatter {times:n} times as much as their u says (p = {p:n}): all uncertainties "
+            "are enlarged by that",
+            times=digits(scale),
+            p=digits(p, 1),
+        ),
+        "sweep overstated": lambda _, chi_square, freedom: Text(
+            "the points scatter much less than their u says (χ² of {chi:n} for {freedom:.0f} degrees of "
+            "freedom): their u is too large, and so is that of the line; gates in a row scatter more "
+            "than their mean, for a locked top swings about its drive and comes back",
+            chi=digits(chi_square),
+            freedom=freedom,
+        ),
+        "sweep exact": "the points lie on the line to the last digit: without their u nothing can be tested; give it",
+        "moves the slope": lambda points, k, change, share: Text(
+            "{point}, alone moves the slope by {change:n}, {share:.1f} of its u",
+            point=_point(points, k),
+            change=digits(change),
+            share=share,
+        ),
+        "holds the line": lambda points, k, leverage: Text(
+            "{point}, holds the line nearly by itself (leverage {leverage:.2f}): measure more points near it",
+            point=_point(points, k),
+            leverage=leverage,
+        ),
+        "uncertain drive": lambda _, worst: Text(
+            "u of the drive's frequency is up to {times:n} u of the precession: let it count with `orthogonal` = True",
+            times=digits(worst),
+        ),
+        "uncertain clock": lambda _, share, of_slope, u: Text(
+            "u of the drive's frequency is {share:n} of it at all points, as that of a clock: the slope "
+            "is uncertain by {slope:n} beside its u of {u:n}",
+            share=digits(share),
+            slope=digits(of_slope),
+            u=digits(u),
+        ),
+        "drive u unknown": "u of the drive's frequency is not known and taken as large as that of the precession",
+        "spin off": Doubting(
+            lambda _, off: Text(
+                "the spin that was counted lies {hz:n} Hz {way} the drive: a locked top spins with it; is "
+                "the tape on a loose washer, or was the top not locked?",
+                hz=digits(abs(off), 3),
+                way="below" if off < 0 else "above",
+            )
+        ),
+        "slopes differ": lambda _, n, p: Text(
+            "the slopes of the {n:.0f} runs differ by more than their u says (p = {p:n}): the line "
+            "through all points has too small a u; look at the runs one by one",
+            n=n,
+            p=digits(p, 1),
+        ),
+    }
+)
 
 
 #: Of `analysis.precession.sweep.SweepFit`.

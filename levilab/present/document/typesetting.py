@@ -14,6 +14,8 @@ Level = Literal["", "high", "low"]
 
 #: A hyphen that is a minus: at the beginning, or after a blank, a bracket or a sign, and before a digit.
 _MINUS = re.compile(r"(?:(?<=[\s(\[=±×])|(?<!.))-(?=\d)")
+#: The blank between a number and its unit, where no line ends.
+_UNIT = re.compile(r"(?<=[\d)]) (?=(?:%|m?Hz|rad|g|mm|cm|[mµ]T|Vpp)(?!\w))")
 _HIGH = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹ⁿ-", "+−0123456789n−")
 _LOW = str.maketrans("₊₋₀₁₂₃₄₅₆₇₈₉", "+−0123456789")
 #: Powers by raised characters, and those that no raised character exists for: ^−½, ^½, ^−4/5 and ^(1−n).
@@ -48,7 +50,7 @@ def typeset(text: str) -> tuple[Run, ...]:
     >>> typeset("")
     ()
     """
-    text = _MINUS.sub("−", text)
+    text = _UNIT.sub("\u00a0", _MINUS.sub("−", text))
     runs: list[Run] = []
     at = 0
     for found in _RUNS.finditer(text):

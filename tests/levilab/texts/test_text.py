@@ -129,6 +129,7 @@ def test_no_text_is_of_a_sentence_that_is_said_no_more(code: str) -> None:
     named = {node.arg or "" for tree in sources().values() for node in ast.walk(tree) if isinstance(node, ast.keyword)}
     named |= {ast.unparse(node) for tree in sources().values() for node in ast.walk(tree) if isinstance(node, ast.Name)}
     said |= {re.sub("_(hz|v|t|m|s|ohm|vpp)$", "", name).replace("_", " ") for name in named}  # settings
+    said |= {re.sub(r"\s+\[[^]]+\]$", "", text) for text in said}  # heads of columns without the unit
     said |= {f"{text}s" for text in said}  # as `how_many` makes them
     said |= {text.capitalize() for text in said}  # as figures have them
     said |= {text for module in PAGE.glob("*.js") for text in re.findall(_LITERAL, module.read_text("utf-8"))}

@@ -62,7 +62,7 @@ def test_both_kinds_together_have_values_of_both(sample_data, tmp_path):
     assert [group["statistics"]["n"] for group in document["groups"]] == [10, 8, 8]
     off, warning, conditions = sorted(analysis.all_warnings)  # spin-downs are a remark
     assert "the upper limits are of 2 conditions" in conditions
-    assert off.startswith("loose-washers: repetitions 1, 2 do not belong to the others")
+    assert off.startswith("loose-washers: limits that do not belong to the others: 1, 2")
     assert "LOOSE WASHERS" in warning
     assert warning.endswith("(the first of 16 such warnings)")
     assert SkippedRuns("spin", 4) in analysis.remarks
@@ -237,8 +237,8 @@ def test_a_repetition_far_off_is_numbered_among_all_and_the_page_shows_200(tmp_p
         (tmp_path / f"{name}.csv").write_text("\n".join(f"{one:.3f}" for one in limits), encoding="utf-8")
     analysis = LIMIT.analyze([tmp_path / "one.csv", tmp_path / "two.csv"], LimitOptions())
     of_all, of_second = (text for text in analysis.all_warnings if "not belong to the others" in text)
-    assert of_all.startswith("repetition 14 does not")
-    assert of_second.startswith("two.csv: repetition 4 does not")
+    assert of_all.startswith("limits that do not")
+    assert of_second.startswith("two.csv: limits that do not")
     one, two = (part.blocks[0] for part in limit_part(analysis).inputs)
     assert isinstance(one, Listing)
     assert isinstance(two, Listing)
