@@ -222,6 +222,7 @@ def analyze(
     below_m: float | None = None,
     moment_a_m2: float | None = None,
     scan: str | PathLike[str] | None = None,
+    side: str | PathLike[str] | None = None,
     spin_hz: float | None = None,
     spindown: str | PathLike[str] | None = None,
     rim_m: float | None = None,
@@ -273,6 +274,7 @@ def analyze(
         below_m: height of the top above the magnetometer [m] (spin).
         moment_a_m2: moment of the top [A m²]; the angle of its tilt follows (spin).
         scan: a Hall scan of the base, a run or a file (sway).
+        side: track of a film from beside, of the same time, for the heights (sway).
         spin_hz: spin of the top where no column has it [Hz] (sway).
         spindown: a spin-down of the same top, a run or a file, that is compared (hold).
         rim_m: scale of a film: diameter of the top's rim [m] (video).

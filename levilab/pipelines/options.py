@@ -276,6 +276,10 @@ class SwayOptions(InputOptions):
         "A Hall scan of the base, a run or a file; without one the radii of --device count.", kind=Path, metavar="PATH",
         read=Path,
     ))  # fmt: skip
+    side: Path | None = field(default=None, metadata=_about(
+        "The track of a film from beside, of the same time, for the heights; the spins in both tell their times.",
+        kind=Path, metavar="TRACKS.csv", read=Path,
+    ))  # fmt: skip
     spin_hz: float | None = field(default=None, metadata=_about(
         "Spin of the top, where no column has it.", kind=float, metavar="HZ", typed="spin", unit="Hz", above=0.0,
     ))  # fmt: skip

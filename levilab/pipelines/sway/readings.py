@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from levilab.errors import DataError
 from levilab.formats.columns import NoSuchColumn, TableError
 from levilab.formats.table import read_run_readings, read_table, refuse
 from levilab.formats.understanding import Request, plan_of
+from levilab.pipelines.options import SwayOptions
 from levilab.pipelines.sources import Readings
 from levilab.runs.run import STATES
 
@@ -31,6 +33,8 @@ NEEDED = QUANTITIES[:3]
 _FIELD = ("time_s", "flux_density_x_t", "flux_density_y_t")
 #: How the names of a film's track and of its spin end.
 _TRACKS, _SPIN = ".tracks.csv", ".spin.csv"
+#: Columns of a film from beside; the spin falls by this much at least [Hz]; order of its polynomial; fewest pictures.
+_SIDE, _FALLS_HZ, _BENDS, _FEWEST = ("time_s", "height_m", "spin_frequency_hz"), 0.2, 6, 100
 #: A top that is farther from the axis has left the field [m]: beyond, the unit is most likely another one.
 _FARTHEST_M = 0.5
 
@@ -71,7 +75,9 @@ def read_track_file(path: Path, options: InputOptions) -> SwayReadings:
     except NoSuchColumn as missing:
         raise (_field_alone(path) or missing) from None
     readings = _readings(table)
-    return readings if readings.spin is not None else _with_spin_beside(path, readings)
+    readings = readings if readings.spin is not None else _with_spin_beside(path, readings)
+    side = options.side if isinstance(options, SwayOptions) else None
+    return _with_heights(path, readings, side) if side else readings
 
 
 def _field_alone(path: Path) -> NoSuchColumn | None:
@@ -95,6 +101,25 @@ def _with_spin_beside(path: Path, readings: SwayReadings) -> SwayReadings:
         return readings
     table = read_table(beside, quantities=("time_s", "spin_frequency_hz"), needed=("time_s", "spin_frequency_hz"))
     return _with_spin(readings, table)
+
+
+def _with_heights(path: Path, readings: SwayReadings, side: Path) -> SwayReadings:
+    """Return the part of a track for which a film from beside has the heights; a spin that falls tells both clocks."""
+    of_side = read_table(side, quantities=_SIDE, needed=_SIDE)
+    time, height, spin = (of_side.column(name) for name in _SIDE)
+    if readings.spin is None or not np.ptp(readings.spin) > _FALLS_HZ:
+        raise DataError(f"{path}: a spin that falls is expected, by which the clock of {side.name} is compared")
+    falls = np.polynomial.Polynomial.fit(readings.time, readings.spin, _BENDS)
+    even = np.linspace(readings.time[0], readings.time[-1], readings.time.size)
+    met = (spin < falls(even[0])) & (spin > falls(even[-1]))
+    if met.sum() < _FEWEST:
+        raise DataError(f"{side}: its spins are others than those of {path.name}: films of the same time are expected")
+    late = float(np.median(np.interp(-spin[met], -falls(even), even) - time[met]))
+    both = (readings.time >= time[0] + late) & (readings.time <= time[-1] + late)
+    part = {name: getattr(readings, name)[both] for name in ("time", "x", "y", "spin")}
+    told = f"{side.name} begins at {time[0] + late:.2f} s of {path.name}, by the spin, and gives its heights"
+    height = np.interp(part["time"], time + late, height)
+    return replace(readings, **part, height=height, warnings=(*readings.warnings, told))
 
 
 def _with_spin(readings: SwayReadings, table: Table) -> SwayReadings:

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -123,6 +124,26 @@ def test_the_spin_of_a_film_stands_beside_its_track(found, tmp_path):
     track = write(tmp_path / "a.tracks.csv", ("time_s", "x_m", "y_m"), metres)
     measured = analyze(track, device=DEVICE).runs[0].geometry.measured
     assert measured.value == pytest.approx(found.runs[0].geometry.measured.value, rel=1e-4)
+
+
+def test_a_film_from_beside_gives_the_heights_and_its_spin_the_time(found, tmp_path):
+    t, x, spin = (np.array([float(r[name]) for r in rows_of(TRACK)]) for name in ("t [s]", "x [mm]", "spin [Hz]"))
+    seen = (t > 8) & (t < 72)
+    z = 0.3 * np.sin(2 * np.pi * 1.12 * t) + 0.03 * np.random.default_rng(1).standard_normal(t.size)
+    rows = [tuple(f"{one:.6f}" for one in row) for row in zip(t - 7.4, x / 1e3, z / 1e3, spin, strict=True)]
+    titles = ("time_s", "x_m", "z_m", "spin_frequency_hz")
+    side = write(tmp_path / "side.tracks.csv", titles, [row for row, inside in zip(rows, seen, strict=True) if inside])
+    both = analyze(TRACK, device=DEVICE, side=side)
+    (note,) = both.all_warnings
+    assert re.search(r"side\.tracks\.csv begins at (8\.0\d|7\.9\d) s of track\.csv", note)  # 0.1 Hz/s, and 1 mHz
+    swings, alone = both.runs[0].swings, found.runs[0].swings
+    assert swings[1].vertical.value == pytest.approx(1.12, abs=1e-3)
+    assert swings[1].vertical.u < 0.1 * alone[1].vertical.u
+    geometry = both.runs[0].geometry
+    assert abs(geometry.measured.value - TRUE_HZ) < 3 * geometry.measured.u
+    other = write(tmp_path / "other.csv", titles, [(*row[:3], "55.0") for row in rows[:200]])
+    with pytest.raises(DataError, match="films of the same time are expected"):
+        analyze(TRACK, device=DEVICE, side=other)
 
 
 def test_a_run_in_which_nothing_was_counted_has_no_spin(tmp_path):
