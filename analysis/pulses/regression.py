@@ -65,7 +65,8 @@ class Grid:
         A flank between two samples may lie anywhere between them, and residuals do not show it where turns are nearly
         whole numbers of samples.  So the error of a rounded time is carried to the frequency, for all places of the
         flank between samples and all drifts up to one sample along the record; of those that would leave no larger
-        residuals than these, the mean square is the least variance.
+        residuals than these, the mean square is the least variance.  Where every rounding would leave larger ones, the
+        flanks are seen to a part of a sample, by which the smallest of these errors is multiplied.
 
         Args:
             times: of the turns, shape (n,) [s].
@@ -78,8 +79,9 @@ class Grid:
         rounded = ((place - np.rint(place)) * rounding).reshape(-1, times.size)
         shifts = rounded @ carried
         left = np.sqrt(np.mean((rounded - shifts @ powers.T) ** 2, axis=1))
-        possible = left <= max(UNLIKE * seen + UNSEEN * rounding, float(left.min()))
-        return float(np.mean(shifts[possible, 1] ** 2))
+        most, least = UNLIKE * seen + UNSEEN * rounding, float(left.min())
+        part = min(most / least, 1.0) if least else 1.0
+        return part**2 * float(np.mean(shifts[left <= max(most, least), 1] ** 2))
 
 
 @dataclass(frozen=True)

@@ -172,6 +172,21 @@ def test_flanks_between_samples_are_in_the_uncertainty(spin, method):
         assert found.frequency.u < 1.1 * spin / (TIME[-1] * RATE)
 
 
+def test_pulses_of_three_samples_that_show_their_flanks_have_no_u_of_whole_samples():
+    """A sample is the mean light of its interval, and shows where in it a flank lies: u was 28 times the scatter."""
+    random, errors, rate = np.random.default_rng(20261128), [], 1000
+    time = np.arange(2 * rate) / rate
+    for _ in range(200):
+        spin = random.uniform(29, 31)
+        away = ((spin * time + random.uniform()) % 1 - 0.5) * rate / spin  # [samples]
+        samples = np.clip(2.0 - np.abs(away), 0, 1) + 0.01 * random.standard_normal(time.size)
+        found = spin_of_trace(samples, rate, degree=2).frequency
+        errors.append((found.value - spin, found.u))
+    error, u = np.array(errors).T
+    assert np.median(u) < 10 * 1.4826 * np.median(np.abs(error))  # 7.5: the places in the mean pulse are no finer
+    assert np.std(error / u) < 1.15  # three standard errors
+
+
 @pytest.mark.parametrize("method", ["auto", "edges"])
 @pytest.mark.parametrize("spin", [20.0, 25.0, 29.8507])
 def test_few_sharp_pulses_without_noise_have_the_samples_in_their_uncertainty(spin, method):
