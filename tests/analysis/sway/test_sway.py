@@ -11,7 +11,7 @@ from analysis.stability import SymmetricTop, modes
 from analysis.sway import Known, Swings, geometric_magnetism, mirrored, slow_swings, swings_of
 from analysis.sway.lines import NoSwings
 from analysis.sway.orbit import NoSwing
-from analysis.sway.vertical import Vertical
+from analysis.sway.vertical import Vertical, beside, of_heights, of_places
 from levilab.simulator import preset, simulate
 
 RING = Ring(1.40e-3, 0.0, 0.0, 0.030, 0.055)
@@ -74,25 +74,32 @@ def test_the_vertical_swing_is_that_of_the_lines_beside(fresh):
     assert swings_of(times, places)[0].vertical.value == pytest.approx(1.23, abs=0.004)
 
 
-@pytest.mark.parametrize(("beside", "rising"), [(0.0, 5e-5), (2e-5, 0.0), (0.0, 0.0)])
-def test_the_vertical_swing_has_its_uncertainty(fresh, beside, rising):
-    times = np.arange(2400) / 120
+@pytest.mark.parametrize("strength", [0.0, 4e-4, 4e-3])
+@pytest.mark.parametrize("seen", ["heights", "places"])
+def test_the_vertical_swing_has_its_uncertainty(fresh, seen, strength):
+    """Lines that are not there, at the limit of the noise, and clear: 100 trials each."""
+    late, expected, noise, trials = (np.arange(120) - 59.5) / 6, Vertical(1.198, 0.03), 1e-3, 100
+    waves = np.exp(2j * np.pi * np.outer(late, (-0.5945, 0.7400)))
     pulls, u = [], []
-    for _ in range(8):
-        rise = fresh.normal(1.198, 0.03)  # that of the usual field
-        places = swing(times, (-0.5945, 0.7400)) + 1e-4 * (fresh.normal(size=2400) + 1j * fresh.normal(size=2400))
-        for frequency in (0.74 - rise, rise - 0.5945, 0.74 + rise, -0.5945 - rise):
-            places += beside * np.exp(2j * np.pi * frequency * times + 1j * fresh.uniform(0, 2 * np.pi))
-        heights = 0.073 + rising * np.cos(2 * np.pi * rise * times + 1) + 2e-4 * fresh.normal(size=2400)
-        found = swings_of(times, places, heights)[0].vertical
+    for _ in range(trials):
+        rise = fresh.normal(*expected)
+        first = fresh.uniform(0, 2 * np.pi, 4)
+        if seen == "heights":
+            heights = strength * np.cos(2 * np.pi * rise * late + first[0]) + noise * fresh.normal(size=late.size)
+            found = of_heights(late, heights, expected, 0.7400 + 0.5945)
+        else:
+            places = waves @ [4e-3, 6e-3] + noise * fresh.normal(size=(2, late.size)).T @ [1, 1j]
+            places += beside(waves, np.exp(2j * np.pi * rise * late)) @ (strength / 2 * np.exp(1j * first))
+            found = of_places(late, places, waves, np.ones((late.size, 1)), expected)
         pulls.append((found.value - rise) / found.u)
         u.append(found.u)
-    if rising:  # bound of Cramér and Rao of a sine of 50 µm in noise of 200 µm, whose amplitude is known to 12 %
-        assert np.mean(u) == pytest.approx(np.sqrt(6 / 2400) * (2e-4 / 5e-5) / (np.pi * 20), rel=4 * 0.12 / np.sqrt(8))
-    elif not beside:  # nothing shows it
-        assert np.mean(u) == pytest.approx(0.03, rel=0.1)
-    assert abs(np.mean(pulls)) < 4 / np.sqrt(8)  # 4 standard errors
-    assert 0.2 < np.std(pulls) < 2  # 4 of a standard deviation from 8
+    assert abs(np.mean(pulls)) < 3 / np.sqrt(trials)  # three standard errors, as of the standard deviation
+    assert np.std(pulls) == pytest.approx(1.0, abs=3 / np.sqrt(2 * trials))
+    if not strength:  # nothing shows it
+        assert np.mean(u) == pytest.approx(expected.u, rel=0.05)
+    if strength == 4e-3:  # bound of Cramér and Rao: one line, of which heights show one part and places both
+        alone = np.sqrt(6 / late.size) * noise / strength / (np.pi * 20)
+        assert np.mean(u) == pytest.approx(alone if seen == "heights" else alone * np.sqrt(0.5), rel=0.15)
 
 
 def test_heights_that_are_all_alike_say_nothing():
