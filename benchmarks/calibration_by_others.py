@@ -24,7 +24,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import expit
 
-from analysis.spindown.tilt import RELEASE, RELEASE_U, THESIS_TOP, TILT2
+from analysis.spindown.tilt import SHARE, SHARE_U, THESIS_TOP, TILT2
 from levilab.benchmark.simulator.motion import A2, B2, MU, G, K
 from levilab.benchmark.simulator.taylor import VARIABLES, heyoka_system
 from levilab.crosscheck.calibration import by_ranks
@@ -176,7 +176,7 @@ def draw_top(by: np.random.Generator) -> Drawn:
     """Draw tilt and nutation; β, which says where it floats; ν_r and κ, which say its moments of inertia."""
     top = THESIS_TOP
     tilt = math.atan(math.sqrt(by.exponential(TILT2)))
-    share, turn = max(by.normal(RELEASE, RELEASE_U), 0.0), np.exp(1j * by.uniform(0, 2 * math.pi))
+    share, turn = max(by.normal(SHARE, SHARE_U), 0.0), np.exp(1j * by.uniform(0, 2 * math.pi))
     beta = float(np.clip(by.normal(top.beta, top.beta_u), *BETAS))
     height = float(brentq(lambda z: (f := on_axis(z))[1] ** 2 / (f[0] * f[2]) - beta, 0.0705, 0.0755))
     flux, slope, _ = np.abs(on_axis(height))
@@ -184,7 +184,10 @@ def draw_top(by: np.random.Generator) -> Drawn:
     kappa = by.normal(top.kappa, top.kappa_u)
     i3 = pull / (kappa * rate**2)
     mass, first = abs(MU) * ALONG * slope / G, by.uniform(*FIRST_HZ)
-    angle = math.sqrt(share) * math.tan(tilt) / ((2 * math.pi * first / rate) ** 2 - 1) * turn
+    # set free upright, spinning about its axis: nutation and precession make up for the lean and its rate
+    root = math.sqrt(1 - 4 * kappa * (1 - kappa) * (rate / (2 * math.pi * first)) ** 2)
+    lean = math.tan(tilt) / ((2 * math.pi * first / rate) ** 2 - 1)
+    angle = math.sqrt(share) * lean * (1 - 2 * kappa + root) / (2 * root) * turn
     return Drawn(height, mass, (1 - kappa) * i3, i3, pull, tilt, (angle.real, angle.imag), first)
 
 

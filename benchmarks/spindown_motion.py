@@ -4,33 +4,61 @@
 
 - counts of 60 tops in full motion, at random (mass, inertia, tilt of the moment, law of drag and its constants, first
   spin, start, place of the tape), with the virtual counter until they fall, without and with noise added;
+- 48 runs of the bench for practice, driven from 30 to 33 Hz, and 60 of `levilab crosscheck motion`, driven to 40 Hz;
+- readings whose tilt, nutation, noise and correlation are drawn from the analysis's own priors, 500 of each kind: were
+  the mean pull of these not 0, the analysis would be wrong, and not only its priors;
 - readings of a top that only spins, 500 of each kind: u stated or not, neighbours correlated by 0, 0.3 and 0.7; and
   uncorrelated ones with a tilt allowed for;
 - readings that no law describes, 100 of each kind.
 
 It prints and keeps ``benchmarks/results/spindown_motion.json``: pulls (estimate − truth)/u, and what was said wrongly.
-``--seed`` draws others.
+``--seed`` draws others, but for the driven tops.  `of_priors` is the part of a mean pull that a normal prior makes of
+tops that differ from its mean: Σ (∂estimate/∂mean of the prior) (mean − truth)/u over A, a, κ, β and the nutation.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
+import tempfile
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyvisa
+from scipy.optimize import least_squares
+from scipy.stats import kstest, norm
 
+from analysis.spindown import drag
 from analysis.spindown.drag import spin
-from analysis.spindown.fit import SpinDown, fit_spin_down
-from analysis.spindown.verdict import CHANGED
+from analysis.spindown.fit import CountModel, SpinDown, fit_spin_down
+from analysis.spindown.posterior import RHO, STATED_FREEDOM
+from analysis.spindown.readings import check_readings
+from analysis.spindown.selection import weigh
+from analysis.spindown.tilt import THESIS_TOP, CountedLaw, count_of
+from analysis.spindown.verdict import CHANGED, EXCLUDED
 from instruments.clock import VirtualClock
 from instruments.virtual.bench.visa_library import library_for
+from levilab.acquisition.table import settings_of, with_settings
+from levilab.crosscheck.mock import acquire_mock
+from levilab.crosscheck.subjects.motion import draw_scene
+from levilab.live.practice.seeds import keys_of_seed
+from levilab.pipelines.spindown.readings import release_of
 from levilab.simulator import preset
+from levilab.simulator.field import flux_density, flux_gradient
+from levilab.simulator.kernels.motion import R
 from levilab.simulator.laws import LAWS
-from levilab.world.bench import virtual_bus
+from levilab.simulator.model import base_field
+from levilab.simulator.start import start_of
+from levilab.world.bench import scene_world, virtual_bus, virtual_wiring
 from levilab.world.motion_world import MotionWorld
+
+if TYPE_CHECKING:
+    from analysis.spindown.tilt import Release
+    from levilab.acquisition.loop import AcquisitionRequest
+    from levilab.simulator.scene import Scene
 
 RESULTS = Path(__file__).parent / "results" / "spindown_motion.json"
 T = 10.0 * np.arange(20)
@@ -78,12 +106,13 @@ def pull(run: SpinDown, law: str, name: str, truth: float) -> float:
     return float("nan") if found.value is None or not found.u else (found.value - truth) / found.u
 
 
-def summary(rows: list[list[float]]) -> dict[str, Any]:
+def summary(rows: list[list[float]], *quantities: str) -> dict[str, Any]:
     """Return mean, standard deviation, tails and coverage of pulls, a column for each quantity."""
     p = np.ma.masked_invalid(rows)
     far = np.abs(p)
     shares = {"within_1": far < 1, "beyond_2": far > 2, "beyond_3": far > 3}
     return {
+        "quantities": quantities,
         "pull_mean": p.mean(axis=0).round(2).tolist(),
         "pull_sd": p.std(axis=0, ddof=1).round(2).tolist(),
     } | {name: share.mean(axis=0).round(4).tolist() for name, share in shares.items()}
@@ -105,22 +134,123 @@ def motion(counts: list[tuple[dict[str, Any], np.ndarray, np.ndarray]], noise_hz
         u.append([(run.fit(law).parameters[names[0]].u or c) / c, run.fit("power").parameters["exponent"].u])
         excluded, described = excluded + (law in run.verdict.excluded), described + run.verdict.describes
     return {
-        "noise_hz": noise_hz, "tops": len(counts), "true_law_excluded": excluded, "described": described,
+        "noise_hz": noise_hz, "tops": len(counts), "true_law_excluded": excluded / len(counts),
+        "described": described,
         "median_u_relative_c_n": np.nanmedian(u, axis=0).round(4).tolist(),
-    } | summary(pulls)  # fmt: skip
+    } | summary(pulls, "C", "n", "δ")  # fmt: skip
 
 
-def only_spins(rho: float, u: float | None, seed: int, runs: int, *, tilt: bool = False) -> dict[str, Any]:
+#: A run of the bench for practice, `levilab.live.practice.experiments`.
+PRACTICE = {
+    "drive_waveform": "SQU", "ramp_hz_per_s": 0.1, "drive_frequency_hz": 33.0, "hold_s": 10.0, "interval_s": 2.0,
+    "reading_u_hz": 0.012,
+}  # fmt: skip
+
+
+def driven(scenes: dict[int, Scene], settings: dict[str, Any]) -> dict[str, Any]:
+    """Return pulls of C and n of tops that a drive has raised, by seed, as `levilab acquire spin` does it."""
+    pulls, explained = [], []
+    for seed, scene in scenes.items():
+        time, counted, release = _acquire(scene, seed, settings)
+        found = fit_spin_down(time, counted, settings["reading_u_hz"], release=release)
+        pulls.append([
+            pull(found, "disc", "c32", scene.drag.constants[0]), pull(found, "power", "exponent", 1.5)
+        ])  # fmt: skip
+        explained.append([of_priors(found, name, scene) for name in ("disc", "power")])
+    return {"tops": len(pulls), "of_priors": np.mean(explained, axis=0).round(2).tolist()} | summary(pulls, "C", "n")
+
+
+def _acquire(scene: Scene, seed: int, settings: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, Release | None]:
+    """Return times [s] and counts [Hz] of a run with the top of a scene, and how that was released."""
+
+    def in_world(request: AcquisitionRequest) -> AcquisitionRequest:
+        own: Any = settings_of(request.config, "spin")
+        config = with_settings(request.config, "spin", own.model_copy(update=settings))
+        world = scene_world(scene, VirtualClock, lambda _: None, seed=seed)
+        return replace(request, config=config, wiring=lambda: virtual_wiring(world, config.limits))
+
+    with tempfile.TemporaryDirectory() as folder:
+        run = acquire_mock("spin", seed, Path(folder), in_world)
+        readings = run.readings()
+        return readings.column("time_s"), readings.column("spin_frequency_hz"), release_of(run.events())
+
+
+def of_priors(found: SpinDown, name: str, scene: Scene) -> float:
+    """Return the part of the pull of a law's last constant that the priors make, see above.
+
+    What the top nutates is fitted to its counts, with all else as it is in its scene.
+    """
+    law, readings = drag.LAWS[name], check_readings(found.time, found.frequency, found.u)
+    best = found.model.fit(law, readings)
+    counted, after = best.counted, best.posterior
+    assert counted is not None
+    assert after is not None
+    across, along = scene.top.moment_tilt
+    one, three = scene.top.inertia_transverse_kg_m2, scene.top.inertia_axial_kg_m2
+    flux, slope, bend = _on_axis(scene)
+    kappa, beta, s = 1 - one / three, slope**2 / (flux * bend), (across / along) ** 2
+    resonance = math.sqrt(abs(scene.moment) * along * flux / (three - one)) / (2 * math.pi * readings.reference_hz)
+    disc = drag.LAWS["disc"].dimensionless(
+        [found.frequency[0], scene.drag.constants[0]], readings.reference_hz, readings.duration
+    )
+    top = replace(counted.top, kappa=kappa, beta=beta)
+    fitted = least_squares(
+        lambda q: readings.x - count_of(
+            drag.LAWS["disc"], readings.tau, np.array([q[0], disc[1], s, resonance, q[1]]), top
+        ),
+        [disc[0], 1e-3], x_scale=1e-3,
+    )  # fmt: skip
+    gap = (counted.last / resonance) ** 2 - 1
+    alone = counted.shape(np.array([s / gap**2, math.log(gap), 0.0, kappa, beta, 1.0]))[2]
+    truth = np.array([s / gap**2, math.log(gap), 0.0, kappa, beta, fitted.x[1] / alone])
+    expected, u = counted.expected
+    p = len(law.parameters)
+    own = np.sqrt(after.covariance[p - 1, p - 1])
+    return float(after.covariance[p - 1, p:] / u**2 @ (expected - truth) / own)
+
+
+def _on_axis(scene: Scene) -> tuple[float, float, float]:
+    """Return B, |B′| and B″ where the top floats [T, T/m, T/m²]."""
+    place, field, step = np.asarray(start_of(scene)[R], dtype=float), base_field(scene), np.array([0, 0, 1e-5])
+    slopes = [float(flux_gradient(field, place + sign * step)[2, 2]) for sign in (-1, 1)]
+    return abs(float(flux_density(field, place)[2])), abs(sum(slopes)) / 2, abs(slopes[1] - slopes[0]) / 2e-5
+
+
+def over_the_priors(u: float | None, seed: int, runs: int) -> dict[str, Any]:
+    """Return pulls of C and n of a disc where all that the analysis has a prior for is drawn from that."""
+    rng = np.random.default_rng(seed)
+    law, unit, pulls = drag.LAWS["disc"], 30.0, []
+    apart = np.abs(np.subtract.outer(np.arange(T.size), np.arange(T.size)))
+    for _ in range(runs):
+        first, constant, away = rng.uniform(36, 42), 2.34e-4 * rng.uniform(0.85, 1.15), rng.normal(size=6)
+        counted = spin("disc", T, first, constant)
+        for _ in range(8):  # the prior knows the last reading, which depends on what is drawn
+            top = CountedLaw(law, first / unit, counted[-1] / unit, unit)
+            expected, deviation = top.expected
+            q = [*law.dimensionless([first, constant], unit, T[-1]), *(expected + deviation * away)]
+            counted = unit * top.spin(T / T[-1], np.array(q))
+        size = NOISE_HZ if u is None else u * np.sqrt(STATED_FREEDOM / rng.chisquare(STATED_FREEDOM))
+        noise = np.linalg.cholesky(rng.choice(RHO) ** apart) @ rng.normal(size=T.size)
+        run = fit_spin_down(T, counted + size * noise, u, laws=["disc", "power"], keep_outliers=True)
+        pulls.append([pull(run, "disc", "c32", constant), pull(run, "power", "exponent", 1.5)])
+    ranks = norm.cdf(np.array(pulls))
+    chances = [round(float(kstest(column, "uniform").pvalue), 3) for column in ranks.T]
+    return {"reading_u_hz": u, "runs": runs, "ranks_uniform_p": chances} | summary(pulls, "C", "n")
+
+
+def only_spins(
+    rho: float, u: float | None, seed: int, runs: int, *, tilt: bool = False, time: np.ndarray = T
+) -> dict[str, Any]:
     """Return pulls of the first spin, C and n of a disc, with noise whose neighbours are correlated.
 
     tilt: whether the fit allows for a tilt, which is not there.
     """
     rng = np.random.default_rng(seed)
-    root = np.linalg.cholesky(rho ** np.abs(np.subtract.outer(np.arange(T.size), np.arange(T.size))))
-    truth = spin("disc", T, 40.0, 2.34e-4)
+    root = np.linalg.cholesky(rho ** np.abs(np.subtract.outer(np.arange(time.size), np.arange(time.size))))
+    truth = spin("disc", time, 40.0, 2.34e-4)
     rows, excluded, described, chances = [], 0, 0, []
     for _ in range(runs):
-        run = fit_spin_down(T, truth + NOISE_HZ * root @ rng.normal(size=T.size), u, tilt=tilt)
+        run = fit_spin_down(time, truth + NOISE_HZ * root @ rng.normal(size=time.size), u, tilt=tilt)
         wanted = (("disc", "start_frequency", 40.0), ("disc", "c32", 2.34e-4), ("power", "exponent", 1.5))
         rows.append([pull(run, *each) for each in wanted])
         excluded, described = excluded + ("disc" in run.verdict.excluded), described + run.verdict.describes
@@ -131,9 +261,25 @@ def only_spins(rho: float, u: float | None, seed: int, runs: int, *, tilt: bool 
         if size <= runs
     }
     return {
-        "rho": rho, "reading_u_hz": u, "runs": runs, "true_law_excluded": excluded / runs,
+        "rho": rho, "reading_u_hz": u, "readings": time.size, "last_hz": round(float(truth[-1]), 1),
+        "runs": runs, "true_law_excluded": excluded / runs,
         "not_described": 1 - described / runs, "sets_with_a_run_named": sets,
-    } | summary(rows)  # fmt: skip
+    } | summary(rows, "ν₀", "C", "n")  # fmt: skip
+
+
+def excluded_at(rho: float, seed: int, runs: int, *, known: bool) -> float:
+    """Return how often the disc's law is excluded, of a disc with correlated noise whose ρ is known or not."""
+    rng, model, count = np.random.default_rng(seed), CountModel(tilt=False, top=THESIS_TOP, release=None), 0
+    root = np.linalg.cholesky(rho ** np.abs(np.subtract.outer(np.arange(T.size), np.arange(T.size))))
+    truth = spin("disc", T, 40.0, 2.34e-4)
+    for _ in range(runs):
+        readings = check_readings(T, truth + NOISE_HZ * root @ rng.normal(size=T.size), None)
+        fits = {
+            name: model.fit(drag.LAWS[name], readings, np.array([rho]) if known else RHO).statistics
+            for name in ("disc", "mixed", "power")
+        }
+        count += (weigh(fits)[0]["disc"].difference or 0.0) > EXCLUDED
+    return count / runs
 
 
 def _sets(values: list[float], size: int) -> list[list[float]]:
@@ -182,7 +328,20 @@ if __name__ == "__main__":
     found["only_spins"] = [
         only_spins(rho, u, asked.seed, asked.runs) for rho in (0.0, 0.3, 0.7) for u in (None, NOISE_HZ)
     ]
-    found["tilt_allowed_for"] = [only_spins(0.0, u, asked.seed, asked.runs, tilt=True) for u in (None, NOISE_HZ)]
+    found["tilt_allowed_for"] = [
+        only_spins(0.0, u, asked.seed, asked.runs, tilt=True, time=time)
+        for time in (T, np.linspace(0, T[-1], 100), T[:12])
+        for u in (None, NOISE_HZ)
+    ]
+    found["over_the_priors"] = [over_the_priors(u, asked.seed, asked.runs) for u in (None, NOISE_HZ)]
+    usual = preset("practice")
+    practice = {seed: usual.changed(keys_of_seed(usual, seed)) for seed in (*range(100, 124), *range(200, 224))}
+    found["driven_to_33_hz"] = driven(practice, PRACTICE)
+    found["driven_to_40_hz"] = driven({k: draw_scene(k) for k in range(30_000, 30_060)}, {"reading_u_hz": None})
+    found["excluded_at_rho_0.7"] = {
+        name: excluded_at(0.7, asked.seed, 4 * asked.runs, known=known)
+        for name, known in (("known", True), ("not known", False))
+    }
     found["no_law"] = [no_law(u, asked.seed, asked.odd) for u in (None, NOISE_HZ)]
     print(json.dumps(found, indent=1))
     RESULTS.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")

@@ -15,7 +15,7 @@ from analysis.spindown.lawfit import LawFit, Solution, fit_law, solution
 from analysis.spindown.posterior import INDEPENDENT, RHO
 from analysis.spindown.readings import Readings, check_readings
 from analysis.spindown.selection import NO_FIT, Statistics, weigh
-from analysis.spindown.tilt import THESIS_TOP, Top
+from analysis.spindown.tilt import THESIS_TOP, Release, Top
 from analysis.spindown.verdict import Verdict, verdict
 from analysis.uncertainty import ROUNDING, Estimate
 
@@ -41,16 +41,16 @@ class CountModel:
     Attributes:
         tilt: whether the count has the tilt of the top.
         top: the top that is counted.
-        released_hz: see `fit_spin_down`.
+        release: see `fit_spin_down`.
     """
 
     tilt: bool
     top: Top
-    released_hz: float | None
+    release: Release | None
 
     def fit(self, law: DragLaw, readings: Readings, rho: Array = RHO) -> Solution:
         """Return the best point of one law."""
-        return solution(law, readings, tilt=self.tilt, top=self.top, released_hz=self.released_hz, rho=rho)
+        return solution(law, readings, tilt=self.tilt, top=self.top, release=self.release, rho=rho)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +118,7 @@ def fit_spin_down(
     laws: Iterable[str] = tuple(LAWS),
     keep_outliers: bool = False,
     tilt: bool = True,
-    released_hz: float | None = None,
+    release: Release | None = None,
     gate: float | None = None,
     top: Top = THESIS_TOP,
 ) -> SpinDown:
@@ -132,8 +132,8 @@ def fit_spin_down(
         laws: names from `analysis.spindown.drag.LAWS`.
         keep_outliers: fit gross outliers too, instead of leaving them out. Both ways a remark names them.
         tilt: whether the count has the tilt of the top (see `analysis.spindown.tilt`); False: it is known to have none.
-        released_hz: the spin at which it was set free, or a drive took hold of it [Hz]; the slower, the more it
-            nutates. None: that of the first reading.
+        release: how the top came to its first reading: the slower it was set free, and the longer it was driven, the
+            more it nutates. None: set free at the first reading.
         gate: over which each reading is a mean [s]; None: not known.  The fits say what it does, and are not changed.
         top: whose count it is.
 
@@ -152,9 +152,7 @@ def fit_spin_down(
     """
     chosen = _check_names("drag law", laws, LAWS)
     given = check_readings(time, spin_frequency, u)
-    if released_hz is not None and not 0 < released_hz < np.inf:
-        raise AnalysisError(f"released_hz = {released_hz:g}: a spin above 0 Hz is expected")
-    model = CountModel(tilt, top, released_hz)
+    model = CountModel(tilt, top, release)
     outliers = _search_outliers(given, model)
     while True:
         readings = given if keep_outliers or not len(outliers) else given.without(outliers)

@@ -15,7 +15,7 @@ from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.posterior import RHO, Posterior, posterior
 from analysis.spindown.readings import Readings
 from analysis.spindown.selection import Statistics, statistics
-from analysis.spindown.tilt import MORE, THESIS_TOP, CountedLaw, Top, count_of
+from analysis.spindown.tilt import MORE, THESIS_TOP, CountedLaw, Release, Top, count_of
 from analysis.uncertainty import ROUNDING, Estimate, propagate
 
 Array = NDArray[np.float64]
@@ -29,6 +29,8 @@ _SHARES = (1.0, 0.5, 0.25)
 _MOST = 3000
 #: Of a step: the longest in a, and in A in units of its prior u.  The tilt bends more than linearly beyond.
 _LONGEST_GAP, _LONGEST_TILT = 0.25, 0.5
+#: Of ln of the spin that the air takes from a driven top: after ten minutes the nutation no longer grows, or it falls.
+_MOST_LOST = 2.0
 MAX_STATED_FACTOR = 3.0  # u(ln c) above which "known to a factor" says nothing
 
 
@@ -235,7 +237,7 @@ def solution(
     *,
     tilt: bool = False,
     top: Top = THESIS_TOP,
-    released_hz: float | None = None,
+    release: Release | None = None,
     rho: Array = RHO,
 ) -> Solution:
     """Return the best point of one law: the mean of what is known after the readings.
@@ -245,7 +247,7 @@ def solution(
         readings: what it is fitted to.
         tilt: whether the count has the tilt of the top.
         top: whose count it is.
-        released_hz: at which it was set free, or a drive took hold of it; None: the spin of the first reading.
+        release: see `fit_spin_down`.
         rho: correlations of neighbouring readings' noise that are possible.
     """
     few = readings.means(_MOST)
@@ -253,9 +255,7 @@ def solution(
     q, converged = solve(
         lambda q: (law.spin(tau, q) - few.x) * weight, lambda q: law.gradient(tau, q) * weight, _start(law, few)
     )
-    unit = readings.reference_hz
-    released = released_hz and released_hz / unit
-    with_tilt = CountedLaw(law, float(readings.x[0]), float(readings.x[-1]), unit, top, released) if tilt else None
+    with_tilt = _with_tilt(law, readings, q, top, release) if tilt else None
     form: DragLaw | CountedLaw = with_tilt or law
     expected, u = with_tilt.expected if with_tilt else (np.empty(0), np.empty(0))
     start = np.concatenate([q, expected])
@@ -265,6 +265,18 @@ def solution(
             break
     left, slopes = _of_readings(form, readings, q)
     return Solution(law, with_tilt, readings, q, converged and close, left, slopes, found)
+
+
+def _with_tilt(law: DragLaw, readings: Readings, q: Array, top: Top, release: Release | None) -> CountedLaw:
+    """Return a law with the tilt; q: of the law alone, by which the air slowed the top while it was driven."""
+    first, last, unit = float(readings.x[0]), float(readings.x[-1]), readings.reference_hz
+    if release is None:
+        return CountedLaw(law, first, last, unit, top)
+    released = release.spin_hz / unit
+    middle = np.array([np.sqrt(released * first)])
+    per_duration = float(law.slowing(middle, q)[0] / middle[0])
+    lost = max(per_duration, 0.0) * release.driven_s / readings.duration
+    return CountedLaw(law, first, last, unit, top, released, min(lost, _MOST_LOST))
 
 
 def _search(

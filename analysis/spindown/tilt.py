@@ -11,10 +11,18 @@ about the vertical, with x = (Ω/2πν_r)², κ = 1 − I₁/I₃:
 - balance:   the field exerts no torque about the vertical, so d/dt[Ω(1 − κ sin²θ)] = −f(Ω cos θ) cos θ, where the drag
              f acts on the axial spin ω₃ = Ω cos θ.
 
-A top that was driven up goes on nutating.  Its amplitude changes as A² ~ e^∓φ/sinh φ, cosh φ = ν/ν_s, the upper
-sign for the nutation, the lower for the precession (slowly varying solution of I₁N̈ − iI₃ω₃Ṅ − PN = 0), and what each
-adds to the count, A²/2 times its frequency, has one shape: K/√((ν/ν_s)² − 1).  The spin of a top that just sleeps is
-ν_s = 2√(I₁P)/2πI₃ = 2√(κ(1 − κ)) ν_r.
+A top nutates, too.  Its amplitude changes as A² ~ e^∓φ/sinh φ, cosh φ = ν/ν_s, the upper sign for the nutation, the
+lower for the precession (slowly varying solution of I₁N̈ − iI₃ω₃Ṅ − PN = 0), and what each adds to the count, A²/2 times
+its frequency, has one shape: K/√((ν/ν_s)² − 1).  The spin of a top that just sleeps is
+ν_s = 2√(I₁P)/2πI₃ = 2√(κ(1 − κ)) ν_r.  How much of it there is follows from the release:
+
+- A top that is set free spins about its axis, which stands upright, where its moment would have it lean by θ.  Nutation
+  (f, amplitude α) and precession (p) make up for −θ, and for the −2πiνθ of its rate: α = θ(ν − p)/(f − p).  What the
+  precession adds to the count is 3 to 6 % of what the nutation adds, and is left out.
+- A drive feeds the nutation.  The air slows the top about its axis (the torque −D along N); the drive turns it about
+  the vertical by the torque T, which has no part across, but its pull on the transverse moment, which nods with the
+  axis, has one: TN/2.  Beside I₃ω̇₃ = T − D this leaves TN/2 in the equation of N, so that K grows at the rate
+  (T/I₃ω₃)/tanh φ: by e^(φ − φ₀) with the spin, and by what the air meanwhile takes, threefold within 4 min.
 
 With η = tan θ/δ and s = δ² these read x(η) = (1 + 1/η)(1 + βs(η + η²/2))√(1 + sη²): everything is an explicit
 function of η, and depends on s alone, so that s = 0 is an ordinary point, and a fit may come from either side of it.
@@ -34,7 +42,7 @@ Array = NDArray[np.float64]
 PARAMETERS = ("moment_tilt", "resonance", "wobble")
 UNITS = ("rad", "Hz", "Hz")
 MORE = len(PARAMETERS)
-#: The same, and κ, β and the share of the nutation (RELEASE): what the model has beside the law's own parameters.
+#: The same, and κ, β and the share of the nutation: what the model has beside the law's own parameters.
 UNCERTAIN = MORE + 3
 
 #: Mean of δ²: makers of magnets give 3° as the largest error of direction (95 % of a Rayleigh distribution).
@@ -58,11 +66,10 @@ STANDING = np.array([
     [1.60, 1.000, 0.040, 1.03, 1.06],
 ])  # fmt: skip
 
-#: A top that is set free, or that a drive takes hold of, stands upright, where its moment would have it lean by the
-#: synchronous tilt: so it nutates by the angle α, α² = RELEASE δ²/((ν/ν_r)² − 1)², as a pendulum that is let go beside
-#: its place.  A drive adds a tenth (0.2 mT across 18 mT are 0.011 rad, δ is 0.03), the hand adds to α or takes
-#: from it: 0.6 is a guess, half of the share.  This was not checked at a bench.
-RELEASE, RELEASE_U = 1.1, 0.6
+#: Share of the nutation that a top has by the way it was released (`Release`).  Switching a drive on adds a tenth
+#: (0.2 mT across 18 mT are 0.011 rad, δ is 0.03), the hand adds to it or takes from it, and what the air takes from a
+#: nutation is left out: 0.6 is a guess.  This was not checked at a bench.
+SHARE, SHARE_U = 1.1, 0.6
 #: u of K/ν_ref beside it: 95 % of the nutations of calm tops are below 0.02 rad, which move the rim by 0.3 mm, as much
 #: as the eye sees from 1 m; K/ν_ref = 1.2 α² there.
 CALM_U = 0.00016
@@ -77,7 +84,7 @@ _GRID = np.linspace(0.0, 1.0, _NODES)
 _EDGE = 0.01
 # Counts at so many times are worked out at once: for few readings numpy's calls cost more than their numbers.
 _AT_ONCE = 20_000
-#: Steps of A, a, K/ν_ref, κ, β and RELEASE for slopes by differences.
+#: Steps of A, a, K/ν_ref, κ, β and the share for slopes by differences.
 _STEPS = (1e-4, 1e-3, 1e-4, 1e-3, 1e-2, 1e-2)
 _LARGEST_TILT2 = 0.3  # tan²θ: far beyond what a top survives
 # Times at which the wobble is worked out; between them it is a straight line, good to 1e-5 Hz.
@@ -107,21 +114,35 @@ class Top:
 THESIS_TOP = Top()
 
 
+@dataclass(frozen=True)
+class Release:
+    """How a top came to its first reading.
+
+    Attributes:
+        spin_hz: at which it was set free, or at which a drive took hold of it [Hz].
+        driven_s: how long the drive then turned it [s].
+    """
+
+    spin_hz: float
+    driven_s: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class CountedLaw:
     """A drag law as a counter sees it: with the tilt and the nutation of the top, and what is known of them beforehand.
 
     The additional parameters are A, tan²θ at the last reading by linear theory, and a, by which the last reading
     stands above the resonance, x = 1 + exp(a): these two hardly depend on each other, δ and ν_r do.
-    The third is K/ν_ref beyond that of a release.  κ, β and RELEASE follow; κ and β keep the values that are expected,
-    and only add to uncertainties.
+    The third is K/ν_ref beyond that of a release.  κ, β and the share of that follow; κ and β keep the values that are
+    expected, and only add to uncertainties.
 
     Attributes:
         law: of the drag.
         first, last: readings, in units of ν_ref.
         reference_hz: ν_ref [Hz].
         top: whose count it is.
-        released: the spin at which it was set free, or a drive took hold of it, in units of ν_ref.
+        released: the spin at which it was set free, or a drive took hold of it, in units of ν_ref; None: the first one.
+        lost: ln of the spin that the air would have taken from it while a drive turned it.
     """
 
     law: DragLaw
@@ -130,6 +151,7 @@ class CountedLaw:
     reference_hz: float
     top: Top = THESIS_TOP
     released: float | None = None
+    lost: float = 0.0
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -143,35 +165,34 @@ class CountedLaw:
 
     @property
     def expected(self) -> tuple[Array, Array]:
-        """A, a, K/ν_ref, κ, β, RELEASE before the readings, and their standard uncertainties, shape (6,) each."""
+        """A, a, K/ν_ref, κ, β and the share before the readings, and their standard uncertainties, shape (6,) each."""
         top = self.top
         last = max(self.last * self.reference_hz / top.resonance_hz, float(STANDING[0, 0]))
         resonance, resonance_u, tilt2, tilt2_u = (np.interp(last, STANDING[:, 0], row) for row in STANDING.T[1:])
         x = (last / resonance) ** 2
         gap = x - 1
-        value = np.array([TILT2 * tilt2 / gap**2, np.log(gap), 0.0, top.kappa, top.beta, RELEASE])
+        value = np.array([TILT2 * tilt2 / gap**2, np.log(gap), 0.0, top.kappa, top.beta, SHARE])
         gap_u = 2 * resonance_u / resonance * x / gap
-        return value, np.array([tilt2_u * value[0], gap_u, CALM_U, top.kappa_u, top.beta_u, RELEASE_U])
+        return value, np.array([tilt2_u * value[0], gap_u, CALM_U, top.kappa_u, top.beta_u, SHARE_U])
 
     def shape(self, q: Array) -> tuple[float, float, float]:
-        """Return δ², ν_r/ν_ref, and K/ν_ref, from A, a, K/ν_ref beyond that of a release, κ, β and RELEASE."""
+        """Return δ², ν_r/ν_ref, and K/ν_ref, from A, a, K/ν_ref beyond that of a release, κ, β and the share."""
         a = min(max(float(q[1]), -5.0), 40.0)
         s = min(max(float(q[0]) * float(np.exp(min(2 * a, 8.0))), -0.01), 0.1)
         resonance = self.last / float(np.sqrt(1 + np.exp(a)))
         return s, resonance, float(q[2]) + float(q[5]) * s * self._nutation(resonance, float(q[3]))
 
     def _nutation(self, resonance: float, kappa: float) -> float:
-        """Return K/ν_ref over δ², of a top that was released upright.
-
-        It nutates by α = δ/((ν/ν_r)² − 1) at the frequency f = ν(1 + w)/2(1 − κ), w = √(1 − (ν_s/ν)²); while a drive
-        changes its spin fα² stays the same, and K = fα²/2 √((ν/ν_s)² − 1) at the first reading.
-        """
+        """Return K/ν_ref over δ² after the release; the top of the file derives it."""
         sleeping, slowest = 2 * float(np.sqrt(kappa * (1 - kappa))) * resonance, _SLOWEST_START * resonance
         first = max(self.first, slowest)
         released = max(self.released or first, slowest)
-        alpha2 = 1 / ((released / resonance) ** 2 - 1) ** 2
-        frequency = released * (1 + float(np.sqrt(1 - (sleeping / released) ** 2))) / (2 * (1 - kappa))
-        return frequency * alpha2 / 2 * float(np.sqrt((first / sleeping) ** 2 - 1))
+        w = float(np.sqrt(1 - (sleeping / released) ** 2))
+        frequency = released * (1 + w) / (2 * (1 - kappa))
+        alpha = (1 - 2 * kappa + w) / (2 * w) / ((released / resonance) ** 2 - 1)
+        phi = np.arccosh(np.array([released, first]) / sleeping)
+        grown = float(phi[1] - phi[0]) + self.lost / float(np.tanh(phi.mean()))
+        return frequency * alpha**2 / 2 * float(np.sqrt((released / sleeping) ** 2 - 1)) * float(np.exp(grown))
 
     def spin(self, tau: Array, q: Array) -> Array:
         """Return the counted frequency, shape (n,)."""

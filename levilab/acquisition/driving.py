@@ -212,8 +212,9 @@ def drive_up_and_let_go(session: Session[D]) -> None:
         have_a_top(session, "Spin the top and let it float.", len(session.rows), within_s=_BY_HAND_S)
         session.event(RunEvent.COASTS, "the top was spun by hand and spins down freely")
         return
+    began = session.now()
     drive_until(session, lambda _: None)
-    session.event(RunEvent.DRIVE_OFF, "drive off, the top spins down freely")
+    session.event(RunEvent.DRIVE_OFF, "drive off, the top spins down freely", driven_s=round(session.now() - began, 1))
 
 
 def drive_off(session: Session[D]) -> None:

@@ -18,7 +18,7 @@ from analysis.spindown.fall import times_of_fall
 from analysis.spindown.fit import fit_spin_down
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.uncertainty import Estimate
-from levilab.pipelines.spindown.readings import released_at
+from levilab.pipelines.spindown.readings import release_of
 from levilab.pipelines.spindown.words import law_names
 from levilab.present.numbers import plain, with_uncertainty
 from levilab.runs.events import RunEvent
@@ -132,7 +132,8 @@ def spin_down(
     time, spin, u = columns["time_s"], columns["spin_frequency_hz"], columns.get("spin_frequency_u_hz")
     used = np.isfinite(spin) & (np.isfinite(u) if u is not None else True)
     time, spin = time[used], spin[used]
-    found = fit_spin_down(time, spin, None if u is None else u[used] / np.sqrt(size), released_hz=released_at(events))
+    u = None if u is None else u[used] / np.sqrt(size)
+    found = fit_spin_down(time, spin, u, release=release_of(events))
     best = found.fit(found.best)
     last, duration = float(time[-1]), float(time[-1] - time[0])
     end = _times_of_fall(best, last, duration)

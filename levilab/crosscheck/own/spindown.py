@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from analysis.spindown.fit import SpinDown
     from analysis.spindown.lawfit import LawFit
+    from analysis.spindown.tilt import Release
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 
     Array = np.ndarray[tuple[int], np.dtype[np.float64]]
@@ -48,7 +49,7 @@ class _Run:
         rho: correlation of neighbours.
         step: last digit of the readings [Hz]; 0: they are not rounded.
         gate: of the counter [s]; 0: not known.
-        tilt, released_hz: as the analysis had them.
+        tilt, release: as the analysis had them.
     """
 
     time: Array
@@ -59,7 +60,7 @@ class _Run:
     step: float
     gate: float
     tilt: bool
-    released_hz: float | None
+    release: Release | None
 
     def readings(self, random: np.random.Generator, factors: Sequence[float]) -> Array:
         """Made-up readings, the constants multiplied by factors, shape (n,) [Hz]."""
@@ -122,7 +123,7 @@ def _run(found: SpinDownAnalysis, k: int, fit: LawFit, run: SpinDown) -> _Run:
         step=step or 0.0,
         gate=gate_of(source, EXPERIMENT) or 0.0,
         tilt=fit.has_tilt,
-        released_hz=run.model.released_hz,
+        release=run.model.release,
     )
 
 
@@ -178,7 +179,7 @@ def _trial(
                 readings,
                 run.u,
                 tilt=run.tilt,
-                released_hz=run.released_hz,
+                release=run.release,
                 gate=run.gate or None,
                 top=run.fit.top,
             )

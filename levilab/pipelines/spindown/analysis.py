@@ -76,7 +76,7 @@ def fit_source(source: Source[SpinReadings], options: SpinDownOptions) -> SpinDo
             laws=options.laws or tuple(LAWS),
             keep_outliers=options.keep_outliers,
             tilt=options.tilt == "fitted" or (options.tilt == "auto" and not readings.upright),
-            released_hz=readings.released_hz,
+            release=readings.release,
             gate=gate_of(source, EXPERIMENT),
             top=top_of_device(options.device),
         )

@@ -14,6 +14,7 @@ from analysis.rotation import track_of_field
 from analysis.rotation.track import WINDOW_S as FIELD_WINDOW_S
 from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from analysis.spindown.readings import check_readings
+from analysis.spindown.tilt import Release
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, Table, read_table, refuse
@@ -55,7 +56,7 @@ LEAST_FALL = 0.01
 class SpinReadings(Readings):
     """Spin readings, each array of shape (n,): increasing `time` [s], positive `frequency` and its `u` [Hz].
 
-    released_hz: the spin at which a drive took hold of the top [Hz]; None: not known, or none did.
+    release: how the top came to its first reading; None: not known.
     upright: whether the top is known to have no tilt: it stands on a virtual bench, and only spins there.
     doubtful: whether the unit is in doubt; means over several runs leave such a run out.
     """
@@ -64,7 +65,7 @@ class SpinReadings(Readings):
     frequency: "NDArray[np.float64]"
     u: "NDArray[np.float64] | None"
     warnings: tuple[str, ...]
-    released_hz: float | None = None
+    release: Release | None = None
     upright: bool = False
     doubtful: bool = False
 
@@ -74,15 +75,20 @@ class SpinReadings(Readings):
 def read_run_readings(run: "Run", options: "InputOptions") -> SpinReadings:
     """Return the readings of a run of the experiment `spin`, which drives the top up."""
     readings = replace(
-        spin_readings(run.readings()), released_hz=released_at(run.events()), upright=run.record.world == "spin"
+        spin_readings(run.readings()), release=release_of(run.events()), upright=run.record.world == "spin"
     )
     return _between(readings, options, run.folder)
 
 
-def released_at(events: "Iterable[Mapping[str, Any]]") -> float | None:
+def release_of(events: "Iterable[Mapping[str, Any]]") -> Release | None:
     """Return the slowest spin at which a drive took hold of the top, by the events of a run; None: no drive did."""
-    drives = (event.get("frequency_hz") for event in events if event["kind"] == RunEvent.DRIVE_ON)
-    return min(filter(None, drives), default=None)
+    spins, driven_s = [], 0.0
+    for event in events:
+        if event["kind"] == RunEvent.DRIVE_ON and event.get("frequency_hz"):
+            spins.append(event["frequency_hz"])
+        elif event["kind"] == RunEvent.DRIVE_OFF:
+            driven_s = event.get("driven_s") or 0.0
+    return Release(min(spins), driven_s) if spins else None
 
 
 def read_spin_file(path: "Path", options: "InputOptions") -> SpinReadings:

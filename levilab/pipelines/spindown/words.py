@@ -337,11 +337,10 @@ def _value(estimate: Estimate) -> str:
 
 # --- remarks ------------------------------------------------------------------------------------------
 
-#: What a tilt costs that the readings do not show (decision 11).
+#: What a tilt costs that the readings do not show: docs/crosscheck.md has the numbers.
 TILT_ALLOWED = (
-    "the fits allow for a tilt of the moment, which these readings do not show: u is 1.4 to 2 times that of a plain "
-    "fit; of a top without a tilt C comes out 0.1 to 0.6 u too large on average, 0.9 u where the readings end above "
-    "25 Hz, and `tilt` = none leaves it out"
+    "the fits allow for a tilt of the moment, which these readings do not show: u is larger than that of a plain fit, "
+    "and the C of a top without a tilt comes out too large by less than one u; `tilt` = none leaves it out"
 )
 
 
