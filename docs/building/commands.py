@@ -167,6 +167,45 @@ def checks() -> str:
     )
 
 
+SPIN_DOWNS = CHECKS.with_name("spindown_motion.json")
+
+
+def spin_downs() -> str:
+    """Return the pulls of the kept study of spin-downs, in Markdown."""
+    kept = json.loads(SPIN_DOWNS.read_text(encoding="utf-8"))
+    rows = [(f"full motion, {1e3 * row['noise_hz']:.0f} mHz added", row) for row in kept["full_motion"]]
+    rows += [(f"driven from 30 to {to} Hz", kept[f"driven_to_{to}_hz"]) for to in (33, 40)]
+    rows += [(f"drawn from the priors{_stated(row)}", row) for row in kept["over_the_priors"]]
+    rows += [
+        (f"no tilt, {row['readings']} readings down to {row['last_hz']:.1f} Hz{_stated(row)}", row)
+        for row in kept["tilt_allowed_for"]
+    ]
+    rows += [(f"tilt known to be none, ρ = {row['rho']:g}{_stated(row)}", row) for row in kept["only_spins"]]
+    heads = ["tops", "runs", "mean pull of C, n", "of it by the priors", "s.d.", *(head for head, *_ in _SHARES)]
+    return f"| {' | '.join(heads)} |\n{'|---' * len(heads)}|\n" + "".join(
+        f"| {' | '.join([name, str(row.get('runs') or row['tops']), *_of_c_and_n(row)])} |\n" for name, row in rows
+    )
+
+
+#: Head of a column → the share that is in it.
+_SHARES = (("within 1 u [%]", "within_1"), ("beyond 2 u [%]", "beyond_2"), ("beyond 3 u [%]", "beyond_3"))
+
+
+def _of_c_and_n(row: Any) -> list[str]:
+    """Return the numbers of C and n of a row, a text for each column."""
+    places = [row["quantities"].index(name) for name in ("C", "n")]
+
+    def both(key: str, form: str, factor: float = 1.0) -> str:
+        return ", ".join(format(factor * row[key][k], form) for k in places) if key in row else ""
+
+    first = [both("pull_mean", "+.2f"), both("of_priors", "+.2f"), both("pull_sd", ".2f")]
+    return first + [both(key, ".0f" if key == "within_1" else ".1f", 100) for _, key in _SHARES]
+
+
+def _stated(row: Any) -> str:
+    return ", u stated" if row["reading_u_hz"] else ""
+
+
 def priors() -> str:
     """Return what the trials of the cross-check draw, in Markdown."""
     from levilab.crosscheck.priors import PRIORS
@@ -185,7 +224,7 @@ def _beyond(spread: Any, limit: float) -> str:
 
 #: Page → mark in it → what takes its place.
 MADE = {
-    "crosscheck": {"<!-- all results -->": checks, "<!-- all priors -->": priors},
+    "crosscheck": {"<!-- all results -->": checks, "<!-- all priors -->": priors, "<!-- spin-downs -->": spin_downs},
     "reference/commands": {"<!-- all commands -->": overview},
     **{page: {"<!-- commands -->": partial(reference, page)} for page in PAGES},
     "data": {"<!-- all columns -->": columns, "<!-- all laws -->": laws},
