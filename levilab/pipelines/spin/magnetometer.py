@@ -77,7 +77,7 @@ def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
     Raises:
         TableError: it does, but cannot be used.
     """
-    needed = next((pair for pair in NEEDED if _holds(path, options, pair)), None)
+    needed = _needed(path, options)
     if needed is None:
         return None
     table = read_table(
@@ -114,15 +114,24 @@ def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
     return record if record.duration > 0 and record.rate > SLOWEST_RATE else None
 
 
-def _holds(path: Path, options: InputOptions, needed: tuple[str, ...]) -> bool:
-    """Return whether a file holds these columns.  Raises SeveralRuns."""
+def _needed(path: Path, options: InputOptions) -> tuple[str, str] | None:
+    """Return the pair of columns that makes a file a record; None where it has none.  Raises SeveralRuns."""
+    try:  # one look at a file with one table, which most files are
+        found = _columns(path, options, ("time_s",))
+    except SeveralRuns:  # of which some may be records
+        return next((pair for pair in NEEDED if _columns(path, options, pair)), None)
+    return next((pair for pair in NEEDED if {*pair} <= found), None)
+
+
+def _columns(path: Path, options: InputOptions, needed: tuple[str, ...]) -> frozenset[str]:
+    """Return the names of the columns of a file that holds the needed ones, else none.  Raises SeveralRuns."""
     try:
-        plan_of(path, Request(options.columns or {}, QUANTITIES, needed, guess=False))
+        plan = plan_of(path, Request(options.columns or {}, QUANTITIES, needed, guess=False))
     except SeveralRuns:
         raise
     except (TableError, OSError):  # another reader says why
-        return False
-    return True
+        return frozenset()
+    return frozenset(column.name for column in plan.columns)
 
 
 # --- as the spin of a train of pulses has it ---
