@@ -628,7 +628,8 @@ async function listRuns(chosen) {
 function showChoices() {
   for (const run of listed.runs) {
     if (run.name === seen.run && data.about) run.status = data.about.status;
-    const text = [`${run.started_utc.slice(0, 16).replace("T", " ")} ${run.title ? phrase(run.title) : run.name}`, run.group, run.status === "finished" ? "" : STATES[run.status] || run.status];
+    const status = run.status === "finished" ? "" : STATES[run.status] || run.status;
+    const text = [run.title ? phrase(run.title) : run.name, run.group, run.started_utc.slice(0, 16).replace("T", " "), status];
     const row = [...by("run").options].find(({value}) => value === run.name);
     if (row) put(row, {textContent: text.filter(Boolean).join(", ")});
   }

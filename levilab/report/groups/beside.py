@@ -337,16 +337,11 @@ _WITHIN_2_U = 0.954
 
 
 def finding(of: Class) -> str:
-    """Return the mean of the class and whether its groups agree, in one sentence."""
+    """Return the mean of the class, in one line."""
     if not of.quantities:
         return Text("{groups}: no quantity has a value with u", groups=how_many(len(of.groups), "group"))
     first = of.quantities[0]
-    return Text(
-        "{mean}, mean of {groups}: {agreement}",
-        mean=_mean(first),
-        groups=_count(of, first),
-        agreement=_agreement(first),
-    )
+    return Text("{mean}, mean of {groups}", mean=_mean(first), groups=_count(of, first))
 
 
 def verdict(of: Class) -> str:
@@ -389,7 +384,12 @@ def statistics_of_agreement(of: Class) -> str:
 
 
 def _scenes(of: Class) -> list[str]:
-    """Return a sentence where the virtual benches of the runs had several scenes, whose tops are not comparable."""
+    """Return a sentence where the virtual benches of the runs had several scenes, whose tops are not comparable.
+
+    Where the truth of each group is known, its result stands beside that, and needs no other group.
+    """
+    if all(truth is not None for one in of.quantities for truth in one.truths):
+        return []
     records = [source.run.record for source in of.found.sources if source.run]
     scenes = {(record.configuration.get("scene") or {}).get("name", "") for record in records if record.synthetic}
     if len(scenes) < 2:

@@ -102,14 +102,19 @@ def test_two_runs_of_a_group_are_no_two_groups(of_three, tmp_path):
     assert "mean of 3 runs of 2 groups" in finding(compared(again))
 
 
-def test_a_run_given_twice_and_runs_of_several_scenes_are_named(of_three, tmp_path):
-    root = with_changes(of_three, tmp_path, "Group 2", {"configuration": {"scene": {"name": "practice"}}})
+def test_a_run_given_twice_is_named(of_three, tmp_path):
+    root = with_changes(of_three, tmp_path, "Group 2", {})
     run, *_ = sorted(root.glob("2*"))
     shutil.copytree(run, root / "copy")
-    page = write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")
-    assert "holds the same readings as" in page
-    assert "several scenes of the virtual bench (a spin alone and practice)" in page
-    assert "several scenes" not in verdict(compared(of_three))
+    assert "holds the same readings as" in write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")
+
+
+def test_runs_of_several_scenes_are_named_where_a_truth_is_not_known(of_three, tmp_path):
+    changed = {"configuration": {"scene": {"name": "practice"}}}
+    known = with_changes(of_three, tmp_path / "known", "Group 2", changed)
+    assert "several scenes" not in verdict(compared(known))  # each beside its own truth
+    unknown = with_changes(of_three, tmp_path / "unknown", "Group 2", changed | {"seed": None})
+    assert "several scenes of the virtual bench (a spin alone and practice)" in verdict(compared(unknown))
 
 
 @pytest.mark.parametrize(("value", "u"), [(1.0, float("nan")), (1.0, 0.0), (1.0, None), (float("nan"), 1.0)])
