@@ -497,7 +497,7 @@ def export(
 
     Args:
         data: one of them; readings, traces in volts and seconds, and the result with its uncertainties are written.
-        output: the file; its ending chooses the format: .nc (netCDF), .h5 (HDF5), .csv, .zip (a data package).
+        output: the file; its ending chooses the format: .nc (netCDF), .h5 (HDF5), .csv, .xlsx, .zip (a data package).
         creator: who measured; by default the run's group.
         licence: under which others may use the data, as "CC-BY-4.0".
         force: replace files that are there.

@@ -14,7 +14,7 @@ import tomllib
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from levilab.computer import computer
-from levilab.errors import LevilabError
+from levilab.errors import LevilabError, UsageError
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -95,6 +95,23 @@ def parse_toml(text: str) -> dict[str, Any]:
         raise ValueError(_TOO_LARGE) from None
     _refuse_oddities(table, finite=False)
     return table
+
+
+#: Ends of names of files that people give where a folder is expected.
+_OF_FILES = frozenset({".png", ".pdf", ".svg", ".jpg", ".html", ".json", ".csv", ".txt", ".xlsx", ".nc", ".h5", ".zip"})
+
+
+def check_folder(name: str, folder: Path | None) -> None:
+    """Raise UsageError where a folder that is to be made has the name of a file.
+
+    Args:
+        name: of the argument.
+        folder: None is none.
+    """
+    if folder and folder.suffix.lower() in _OF_FILES and not folder.is_dir():
+        how = "a folder is expected, in which the files have names of their own"
+        other = "levilab report writes .html and .pdf, levilab export .nc, .h5, .csv, .xlsx and .zip"
+        raise UsageError(name, f"{how}; {other}", value=folder)
 
 
 def _hint(text: str, said: str) -> str:

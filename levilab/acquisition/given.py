@@ -16,8 +16,8 @@ from levilab.bench.config import Limits
 from levilab.errors import UsageError
 from levilab.present.units import split
 from levilab.settings import hint_about
-from levilab.simulator.keys import parse_setting
-from levilab.texts.text import Text
+from levilab.simulator.keys import SceneError, parse_setting
+from levilab.texts.text import Text, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -56,7 +56,10 @@ def with_given_settings(
     texts = dict(_key_and_text(now, experiment, setting) for setting in given)
     if not texts:
         return now
-    values = {name: parse_setting(f"{name}={text}")[1] for name, text in texts.items()}
+    try:
+        values = {name: parse_setting(f"{name}={text}")[1] for name, text in texts.items()}
+    except SceneError as error:
+        raise UsageError("settings", f"{experiment}.{text_of(error)}; {_where(experiment)}") from None
     table = now.model_dump(mode="json", exclude_unset=True)  # defaults may still be suited to a scene
     try:
         return type(now).model_validate(table | values)

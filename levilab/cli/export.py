@@ -17,8 +17,16 @@ def _named_path(path: Path | None) -> Path | None:
     return existing_path(path)
 
 
+_ONE = (
+    "one run, file or sweep is exported at a time, into one file; levilab analyze spindown … --table FILE.csv writes a "
+    "row for each of many"
+)
+
+
 def _named_file(file: Path | None) -> Path | None:
     """Return the name of a file in one of the formats that can be written.  Raises UsageError, CannotWrite."""
+    if file and file.suffix.lower() not in ENDINGS and file.exists():
+        raise UsageError("PATH", _ONE, value=f"… {file}")
     if file and file.suffix.lower() not in ENDINGS:
         raise UsageError("out", f"a name that ends in {', '.join(ENDINGS)} is expected", value=file)
     return writable(file)
@@ -56,6 +64,8 @@ def export_data(
     from levilab.report.export.write import export
 
     assert path  # else it was refused
+    if out and file:
+        raise UsageError("PATH", _ONE, value=f"… {file}")
     options = read_options(given, typed=True)
     target = out or file or Path(f"{path.stem if path.is_file() or path.suffix == '.zarr' else path.name}.zip")
     with interruptible("nothing is written"):

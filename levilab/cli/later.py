@@ -13,6 +13,24 @@ from levilab.cli.importing import importing
 
 #: Names that options had once → those that they have.
 _FORMER = {"--output": "--out"}
+#: What other programs have options for: their names, the option that our command has then, and what to do.
+_OF_FILES = (
+    (
+        {"unit", "units", "einheit", "rpm", "hz", "time", "t", "frequency", "f", "col", "x", "y", "usecols"},
+        "columns",
+        'a unit goes with its column, by title or number: --columns "t=1,f=2 [rpm]"',
+    ),
+    (
+        {"sep", "delimiter", "separator", "decimal", "skiprows", "skip", "header", "encoding"},
+        "columns",
+        "separator, decimal mark, titles and encoding are found in the file: levilab open FILE shows how it is read",
+    ),
+    (
+        {"sheet", "sheet-name", "blatt", "tab"},
+        "columns",
+        "a sheet is named as if the file were a folder: my.xlsx/Sheet2",
+    ),
+)
 #: How similar a name must be to be suggested, from 0 to 1.
 _ALIKE = 0.6
 
@@ -115,6 +133,11 @@ def _explain_unknown(error: Any, name: str, command: Any) -> None:
 
     word = error.option_name.lstrip("-")
     known = [one.lstrip("-") for one in error.possibilities or ()]
+    own = {one.name for one in command.params}
+    for words, needed, advice in _OF_FILES:
+        if word in words and needed in own:
+            error.message, error.possibilities = f"{error.message}; {advice}", []
+            return
     error.possibilities = [f"--{one}" for one in get_close_matches(word, known, cutoff=_ALIKE)]
     if error.possibilities or not any(one.name == "settings" for one in command.params):
         return

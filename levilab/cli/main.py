@@ -30,8 +30,12 @@ class Commands(typer.core.TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Return the command that was named.  Fails where a file or a folder stands in its place."""
-        if args and args[0] not in self.commands and os.path.exists(args[0]):  # noqa: PTH110 - without pathlib's import
-            ctx.fail(f"{args[0]} is a file or a folder, and no command: take levilab analyze {args[0]}")
+        if args and args[0] not in self.commands:
+            name, *rest = args
+            if os.path.exists(name):  # noqa: PTH110 - without pathlib's import
+                ctx.fail(f"{name} is a file or a folder, and no command: take levilab analyze {name}")
+            if meant := _MEANT.get(name.casefold()) or _of_another_command(name.casefold()):
+                ctx.fail(f"No such command '{name}': take levilab {' '.join([meant, *rest])}")
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
@@ -44,6 +48,24 @@ class Commands(typer.core.TyperGroup):
         except KeyboardInterrupt:  # what can be lost is said by the command itself
             message("levilab: interrupted")
             raise typer.Exit(exit_codes.INTERRUPTED) from None
+
+
+#: What other programs call a command → ours.
+_MEANT = {
+    **dict.fromkeys(("fit", "plot", "analyse", "evaluate", "auswerten"), "analyze"),
+    **dict.fromkeys(("load", "read", "import", "show"), "open"),
+    **dict.fromkeys(("convert", "save"), "export"),
+    **dict.fromkeys(("measure", "record", "run", "messen"), "acquire"),
+    **dict.fromkeys(("gui", "demo", "app", "start"), "live --mock"),
+}
+
+
+def _of_another_command(name: str) -> str:
+    """Return the command below which a name stands; empty: it is none."""
+    from levilab.cli.acquire import EXPERIMENT_HELP
+    from levilab.pipelines.options import KINDS
+
+    return f"analyze {name}" if name in KINDS else f"acquire {name}" if name in EXPERIMENT_HELP else ""
 
 
 def _refused_value(error: typer.BadParameter) -> object:
@@ -168,7 +190,8 @@ COMMANDS = {
             r"""Write a run, file or sweep for other programs: readings, traces in volts and seconds, results with u.
 
             The ending of the name chooses: .nc is netCDF with the CF conventions, .h5 the same as HDF5 (needs
-            levilab\[hdf5]), .csv a table and one more for each trace and the result, .zip a data package.  The result
+            levilab\[hdf5]), .csv a table and one more for each trace and the result, .xlsx a sheet for each, .zip a
+            data package.  The result
             is the one that levilab analyze wrote; what has none is analyzed.""",
             "levilab export sample_data/spin-down-1 -o spin-down.nc, or -o spin-down.zip --licence CC-BY-4.0",
         ),

@@ -75,6 +75,15 @@ def writable(path: Path | None) -> Path | None:
     return path
 
 
+def folder(path: Path | None) -> Path | None:
+    """Return the name of a folder that files are written into.  Raises UsageError for the name of a file."""
+    if path is not None:
+        from levilab.files import check_folder
+
+        check_folder("out", path)
+    return path
+
+
 def existing_paths(paths: list[Path] | None) -> list[Path] | None:
     """Return paths, each of which is there.  Raises DataError before anything is imported that takes long."""
     if not paths:

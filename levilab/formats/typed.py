@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 #: Units in which people type a quantity, with their factors to the first one, that of results and of keys.
 TYPED: tuple[Mapping[str, float], ...] = (
     *UNITS.values(),
-    {"kg": 1.0, "g": 1e-3, "mg": 1e-6},
+    {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "gram": 1e-3, "grams": 1e-3, "gramm": 1e-3},
     {"rad": 1.0, "mrad": 1e-3, "°": math.pi / 180, "deg": math.pi / 180, "grad": math.pi / 180},
     {"Vpp": 1.0, "mVpp": 1e-3},
     {"K": 1.0, "mK": 1e-3},

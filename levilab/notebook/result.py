@@ -17,7 +17,7 @@ import numpy as np
 import levilab
 from analysis.numbers import how_many
 from levilab.errors import UsageError, unquote
-from levilab.files import CannotWrite, as_json, replace_atomically
+from levilab.files import CannotWrite, as_json, check_folder, replace_atomically
 from levilab.notebook.fit import FIT, METHODS, FittedModel, axes_of
 from levilab.notebook.labels import dataset_of_contents, head_as_html
 from levilab.notebook.names import Exportable, bare
@@ -546,6 +546,7 @@ class AnalysisResult(Exportable):
         place, found = Path(folder), self.found
         if place.suffix.lower() in FORMATS and not place.is_dir():
             raise UsageError("folder", f"a folder is expected; export({place.name!r}) writes such a file", value=folder)
+        check_folder("folder", place)
         written = []
         for path in self.copies:
             copy = _copy(path, place)

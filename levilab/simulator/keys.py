@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from typing import TYPE_CHECKING, Any
 
@@ -79,10 +80,14 @@ def parse_setting(setting: str) -> tuple[str, Any]:
     key, text = key.strip(), text.strip()
     if not (key and equals):
         raise SceneError(f"{setting!r}: KEY=VALUE is expected, such as top.mass_kg=0.025 or drag.law=stokes")
-    return key, _value(text, unit_of_key(key))
+    return key, _value(key, text)
 
 
-def _value(text: str, unit: str) -> Any:
+#: A number with letters behind it.
+_WITH_UNIT = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)\s*[^\W\d_]+")
+
+
+def _value(key: str, text: str) -> Any:
     try:
         table = parse_toml(f"value = {text}")
         if table.keys() == {"value"}:  # a line break in the text would begin another key
@@ -91,10 +96,13 @@ def _value(text: str, unit: str) -> Any:
         pass
     except ValueError as error:
         raise SceneError(f"{short_text(text)!r}: {error}") from None
+    unit = unit_of_key(key)
     listed = text.startswith("[") and text.endswith("]")
     try:  # .5 and 5. are numbers, too, but not in TOML
         return [read_number(one, unit) for one in text[1:-1].split(",")] if listed else read_number(text, unit)
-    except ValueError:
+    except ValueError as error:
+        if unit and _WITH_UNIT.fullmatch(text):
+            raise SceneError(f"{key} = {error}") from None
         return text
 
 

@@ -1,3 +1,3 @@
 """How the names of exports end; nothing heavy is imported, so that a wrong one is refused at once."""
 
-ENDINGS = (".nc", ".h5", ".csv", ".zip")
+ENDINGS = (".nc", ".h5", ".csv", ".xlsx", ".zip")

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import io
+import re
 import zipfile
 from dataclasses import dataclass, replace
+from datetime import datetime
 from importlib.util import find_spec
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from levilab.errors import LevilabError, UsageError
 from levilab.files import CannotWrite, check_writable, replace_atomically, writing
-from levilab.present.numbers import list_in_words
 from levilab.report.export.contents import attributes_of, variables_of
 from levilab.report.export.endings import ENDINGS
 from levilab.runs.package import field, package, resource
@@ -20,6 +21,8 @@ from levilab.software import how_to_install
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
     from pathlib import Path
+
+    import pandas as pd
 
     from levilab.report.export.contents import Column, Contents, Table
 
@@ -64,7 +67,7 @@ def export(
     """
     form = FORMATS.get(out.suffix.lower())
     if form is None:
-        raise UsageError("out", f"a name that ends in {list_in_words([*FORMATS])} is expected", value=out)
+        raise UsageError("out", f"a name that ends in {', '.join(ENDINGS)} is expected", value=out)
     form.check()
     _refuse_to_replace([out], force=force)
     with writing(f"{out}: could not be written"):
@@ -138,6 +141,26 @@ def _csv(contents: Contents, out: Path) -> dict[Path, bytes]:
     return {out: _as_csv(first)} | {out.with_suffix(f".{table.name}.csv"): _as_csv(table) for table in others}
 
 
+def _xlsx(contents: Contents, out: Path) -> dict[Path, bytes]:
+    """Return a spreadsheet with a sheet for each table."""
+    import pandas as pd
+
+    buffer = io.BytesIO()
+    plain = {"strings_to_formulas": False, "strings_to_urls": False}  # what people typed is no formula
+    with pd.ExcelWriter(buffer, engine="xlsxwriter", engine_kwargs={"options": plain}) as book:
+        book.book.set_properties({"title": contents.title, "created": _NO_DAY})  # the same bytes each time
+        for table in _tables(contents):
+            if len(table.columns[0].values) >= _MOST_ROWS:
+                raise UsageError("out", f"{table.name} has more rows than a spreadsheet: .csv, .nc or .h5", value=out)
+            _frame(table).to_excel(book, sheet_name=re.sub(r"[\[\]:*?/\\]", "-", table.name)[:31], index=False)
+    return {out: buffer.getvalue()}
+
+
+#: Rows of a sheet of Excel.
+_MOST_ROWS = 1 << 20
+_NO_DAY = datetime(1980, 1, 1)  # noqa: DTZ001 - of the format
+
+
 def _zip(contents: Contents, out: Path) -> dict[Path, bytes]:
     """Return a data package: CSV, the files of the run, and datapackage.json, which describes them with units."""
     tables = {f"{table.name}.csv": (table, _as_csv(table)) for table in _tables(contents)}
@@ -174,14 +197,23 @@ def _field(column: Column) -> dict[str, str]:
     return field(column.name, column.unit, column.source or column.meaning, kind)
 
 
-def _as_csv(table: Table) -> bytes:
-    """Return a table as CSV: all digits, what is not known is empty."""
+def _frame(table: Table) -> pd.DataFrame:
     import pandas as pd
 
-    frame = pd.DataFrame({column.name: column.values for column in table.columns})
-    return frame.to_csv(index=False, lineterminator="\n").encode(errors="replace")
+    return pd.DataFrame({column.name: column.values for column in table.columns})
+
+
+def _as_csv(table: Table) -> bytes:
+    """Return a table as CSV: all digits, what is not known is empty."""
+    return _frame(table).to_csv(index=False, lineterminator="\n").encode(errors="replace")
 
 
 FORMATS: Mapping[str, Format] = MappingProxyType(
-    dict(zip(ENDINGS, (Format(_netcdf), Format(_hdf5, _check_hdf5), Format(_csv), Format(_zip)), strict=True))
+    dict(
+        zip(
+            ENDINGS,
+            (Format(_netcdf), Format(_hdf5, _check_hdf5), Format(_csv), Format(_xlsx), Format(_zip)),
+            strict=True,
+        )
+    )
 )

@@ -256,6 +256,22 @@ def test_a_result_that_cannot_be_written_is_shown(levilab, tmp_path):
     assert "--no-save" in done.stderr.splitlines()[-1]
 
 
+@pytest.mark.parametrize(
+    ("typed", "says"),
+    [
+        ("spindown my.csv", "No such command 'spindown': take levilab analyze spindown my.csv"),
+        ("fit my.csv", "No such command 'fit': take levilab analyze my.csv"),
+        ("trace --mock", "take levilab acquire trace --mock"),
+        ("analyze my.csv --unit rpm", '--columns "t=1,f=2 [rpm]"'),
+        ("open my.csv --sheet 2", "my.xlsx/Sheet2"),
+    ],
+)
+def test_what_other_programs_call_a_command_or_an_option_is_told_ours(typed, says, tmp_path):
+    done = command(*typed.split(), cwd=tmp_path)
+    assert done.status == 2
+    assert says in " ".join(line.strip("│ ") for line in done.err.splitlines())
+
+
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
 def test_an_old_code_page_costs_no_number_its_exponent(tmp_path, encoding):
     """As PYTHONIOENCODING and an old Windows have it: such streams refuse what they cannot carry."""

@@ -57,6 +57,23 @@ def test_traces_are_in_volts_and_seconds(tmp_path):
         assert float(trace["trace_time_s"] + trace["sample"][-1]) == pytest.approx(head["time_s"], abs=2 * head["dt_s"])
 
 
+def test_a_spreadsheet_has_a_sheet_for_each_table_and_no_formula_of_a_person(tmp_path):
+    table = Table("=1+1/x", (Column("note", np.array(["=2+3"]), "1", ""), Column("x_m", np.array([0.25]), "m", "")), "")
+    export(lambda: Contents("x", "x", tables=(table,)), tmp_path / "x.xlsx")
+    assert pd.read_excel(tmp_path / "x.xlsx", sheet_name="=1+1-x").iloc[0].tolist() == ["=2+3", 0.25]
+    written(RUN, tmp_path / "run.xlsx")
+    sheets = pd.read_excel(tmp_path / "run.xlsx", sheet_name=None)
+    assert list(sheets) == ["readings", "spindown", "result"]
+    assert sheets["readings"]["spin_frequency_hz"].iloc[0] == 39.93
+
+
+def test_hdf5_is_opened_by_xarray_with_what_the_extra_brings(tmp_path):
+    pytest.importorskip("h5netcdf")
+    written(RUN, tmp_path / "run.h5")
+    with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as data:
+        assert data["spin_frequency_hz"].sel(time_s=190.0).item() == 21.75
+
+
 def test_hdf5_has_the_same_variables_over_scales(tmp_path):
     for ending in ("nc", "h5"):
         written(RUN, tmp_path / f"run.{ending}")
@@ -164,7 +181,7 @@ def test_traces_of_unlike_lengths_are_one_behind_the_other_as_cf_has_it(tmp_path
 @pytest.mark.parametrize(
     ("source", "name", "said"),
     [
-        ("spin-down-1", "run.xlsx", "ends in .nc, .h5, .csv, .zip is expected"),
+        ("spin-down-1", "run.docx", "ends in .nc, .h5, .csv, .xlsx, .zip is expected"),
         ("spin-down-1", "there.zip", "is there already: give another name with `out`, or `force` to replace it"),
         (".", "run.zip", "one is exported at a time: name one of them"),
         ("README.md", "run.zip", "README.md"),
