@@ -96,7 +96,7 @@ def find_side(pictures: Array) -> Side:
     if part is None:
         raise NoTop(moving=0.0)
     picture = np.median(pictures, axis=0)
-    rows, columns = _grown(picture, *part)
+    rows, columns = _grown(picture, np.std(pictures, axis=0), *part)
     wide, high = (columns.stop - columns.start) / 2, (rows.stop - rows.start) / 2
     middle = (columns.start + columns.stop - 1) / 2, (rows.start + rows.stop - 1) / 2
     for less in np.arange(0.0, high - _LEAST_HEIGHT / 2):
@@ -106,17 +106,21 @@ def find_side(pictures: Array) -> Side:
     raise NoTop(moving=4 * wide * high / pictures[0].size)
 
 
-def _grown(picture: Array, rows: slice, columns: slice) -> tuple[slice, slice]:
-    """Return the part of a picture, round one that changes, that is as bright as that, unlike the rest."""
+def _grown(picture: Array, scatter: Array, rows: slice, columns: slice) -> tuple[slice, slice]:
+    """Return the part of a picture that is as bright as where the mark passes, unlike the rest; without a stem."""
     from scipy.ndimage import find_objects, label
 
-    top, outside = float(np.median(picture[rows, columns])), float(np.median(picture))
+    passes = scatter[rows, columns] > scatter[rows, columns].max() / 2
+    top, outside = float(np.median(picture[rows, columns][passes])), float(np.median(picture))
     parts, _ = label(np.abs(picture - top) < abs(outside - top) / 2)
     inside = np.bincount(parts[rows, columns].ravel())
     if inside[1:].max(initial=0) == 0:
         return rows, columns
-    rows, columns = find_objects(parts)[int(np.argmax(inside[1:]))]
-    return rows, columns
+    number = 1 + int(np.argmax(inside[1:]))
+    rows, columns = find_objects(parts)[number - 1]
+    widths = np.count_nonzero(parts[rows, columns] == number, axis=1)
+    wide = np.flatnonzero(widths > widths.max() / 2)  # a stem is narrower
+    return slice(rows.start + int(wide[0]), rows.start + int(wide[-1]) + 1), columns
 
 
 def _with_size(side: Side, pictures: Array) -> Side:

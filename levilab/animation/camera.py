@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 #: Radius of the rim, of the base, and of a dot on the stem; thickness of the top, and its height above the base [m].
 RIM, BASE, DOT, THICK, HEIGHT = 0.015, 0.046, 0.001, 0.008, 0.07
+#: Radius of the stem, which a camera beside the top sees [m].
+STEM = 0.0015
 #: Brightness of table, base, top, its hub and its mark.
 TABLE, DARK, TOP, HUB, MARK = 190.0, 60.0, 140.0, 40.0, 235.0
 #: Angle of the mark, to either side [rad].
@@ -53,7 +55,7 @@ class Camera:
         noise: standard deviation of a pixel, of 255.
         parts: of an exposure that are added up.
         away: where the middle of the base is in the picture, from its middle [pixels].
-        stem: height of a light dot on the stem above the rim; 0: there is none [m].
+        stem: height of a light dot on the stem above the rim; 0: there is none; from beside, of the stem alone [m].
         distance: of the camera from the rim at its mean height; infinite: no perspective [m].
         pose: ABOVE or BESIDE.
     """
@@ -164,7 +166,7 @@ class Pictures:
         camera = self._camera
         x0, y0 = camera.middle
         centre = np.array(camera.pose)[:2] @ self._flight.pose_at(np.array([time]))[0][0] / camera.scale
-        reach = RIM / camera.scale + 8
+        reach = max(RIM, camera.stem) / camera.scale + 8
         left, up = round(x0 + centre[0] - reach), round(y0 - centre[1] - reach)
         size = round(2 * reach)
         columns, rows = np.arange(left, left + size), np.arange(up, up + size)
@@ -190,7 +192,10 @@ class Pictures:
         d = d @ body
         soft = camera.blur * camera.scale
         inside, top = (self._side if camera.pose == BESIDE else self._face)(o, d, soft)
-        if camera.stem:
+        if camera.stem and camera.pose == BESIDE:
+            inside = np.maximum(inside, np.minimum(STEM - np.abs(o[..., 0] * d[..., 1] - o[..., 1] * d[..., 0]),
+                                                   camera.stem / 2 - np.abs(o[..., 2] - camera.stem / 2)))  # fmt: skip
+        elif camera.stem:
             nearest = o - (0, 0, camera.stem)
             nearest = nearest - np.sum(nearest * d, axis=2, keepdims=True) / np.sum(d * d, axis=2, keepdims=True) * d
             top += (MARK - top) * _edge((DOT - np.linalg.norm(nearest, axis=2)) / soft)

@@ -11,7 +11,7 @@ from analysis.film.side import Side, find_side, fit_side
 from levilab.animation.camera import BESIDE, RIM, THICK, Camera, Pictures
 from support.flights import level_flight
 
-CAMERA = Camera(pose=BESIDE, away=(5.3, -45))
+CAMERA = Camera(pose=BESIDE, away=(5.3, -45), stem=0.02)
 LEVEL = level_flight(1.0, 31.0)
 #: It leans to the right by 10 mrad and rises and falls.
 FLIGHT = replace(LEVEL, rise=5e-4 * np.sin(5 * LEVEL.times), lean=np.tile([0.01, 0.0], (LEVEL.times.size, 1)))
