@@ -32,7 +32,7 @@ from levilab.pipelines.row import Column, Quantity, columns_of, entry
 from levilab.pipelines.spin.magnetometer import findings_of, spin_of_line, track_middle
 from levilab.pipelines.spin.readings import Records, track_of_record
 from levilab.pipelines.spin.words import finding_text
-from levilab.present.numbers import with_uncertainty
+from levilab.present.numbers import with_decimals, with_uncertainty
 from levilab.texts.note import Note
 from levilab.texts.text import Sentences, Text
 
@@ -421,15 +421,29 @@ def _columns(spins: Sequence[SpinFrequency]) -> tuple[Array, Array, Array]:
     return time, frequency, u
 
 
+#: Decimals of the time that a spin holds for, at least and at most [s].
+_LEAST_DECIMALS, _MOST_DECIMALS = 3, 9
+
+
+def shown_time(spin: SpinFrequency) -> str:
+    """Return the time that a spin holds for [s], to the digit in which the slope makes a third of u.
+
+    The spin of a top that slows by 0.15 Hz/s, known to 1 µHz, holds for a time to the microsecond.
+    """
+    slope, u = abs(spin.chirp.value or 0.0), spin.frequency.u or 0.0
+    needed = math.ceil(math.log10(1.5 * slope / u)) if slope > 0 and u > 0 else 0  # half of the last digit is lost
+    return with_decimals(spin.reference_time, min(max(needed, _LEAST_DECIMALS), _MOST_DECIMALS))
+
+
 def in_a_sentence(run: SpinRun) -> str:
     """Return what the data say of one input."""
     spin, series = run.spin, run.series
     folds = run.line.folds[1:] if run.line and run.line.doubtful else ()
     at = Text(
-        "{spin:n}{others} at {time:.4g} s",
+        "{spin:n}{others} at {time:n} s",
         spin=with_uncertainty(spin.frequency),
         others=Text(" or {folds:.2f} Hz", folds=tuple(fold.frequency for fold in folds)) if folds else "",
-        time=spin.reference_time,
+        time=shown_time(spin),
     )
     drive = _about_drive(run)
     if len(series) == 1:

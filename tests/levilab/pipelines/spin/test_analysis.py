@@ -17,7 +17,7 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions, SpinOptions
 from levilab.pipelines.spin import words
-from levilab.pipelines.spin.analysis import Series, drive_offset
+from levilab.pipelines.spin.analysis import Series, drive_offset, in_a_sentence
 from levilab.pipelines.spin.document import SPIN
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spin.report import meaning, spin_part, spin_tables
@@ -339,7 +339,7 @@ def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data):
     frequencies, pulses, _ = spin_tables(found)
     assert dict(zip(frequencies.heads, frequencies.rows[0].cells, strict=True))["of"] == "record 3 of 5"
     assert pulses.title.endswith("those of the one above")
-    assert "28.111(31) Hz at 20.32 s, record 3 of 5. Its slope through all records is −0.0879(17) Hz/s." in found.text
+    assert "28.111(31) Hz at 20.322 s, record 3 of 5. Its slope through all records is −0.0879(17) Hz/s." in found.text
     part = spin_part(found)
     assert part.lead == "5 records used"
     assert "It loses 0.313(6) % of its spin a second" in part.result[0].text
@@ -359,3 +359,15 @@ def test_of_a_single_record_the_slope_is_its_own(sample_data):
     single = [run for run in found.runs if not run.which]
     assert single
     assert all(run.trend is None for run in single)
+
+
+def test_the_time_that_is_said_moves_the_spin_by_less_than_its_u(tmp_path):
+    times = np.arange(300.0) / 39.4
+    times += 0.002 * times**2  # it slows by 0.16 Hz/s
+    path = tmp_path / "pulses.csv"
+    path.write_text("time_s\n" + "".join(f"{t:.9f}\n" for t in times), encoding="utf-8")
+    found = SPIN.analyze([path], SpinOptions())
+    spin = found.runs[0].spin
+    (said,) = re.findall(r" at ([\d.]+) s", in_a_sentence(found.runs[0]))
+    assert abs((float(said) - spin.reference_time) * spin.chirp.value) < spin.frequency.u / 2
+    assert len(said) < 14
