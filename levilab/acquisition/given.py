@@ -140,8 +140,9 @@ def _refuse_unknown(now: ExperimentSettings, experiment: str, name: str) -> None
     if name in known:
         return
     near = [f"{experiment}.{one}" for one in get_close_matches(name, known, cutoff=0.5)]
-    meant = f", did you mean {' or '.join(near)}?" if near else ";"
-    raise UsageError("settings", f"there is no such setting{meant} {_where(experiment)}", value=f"{experiment}.{name}")
+    meant = Text(", did you mean {names:s}?", names=" or ".join(near)) if near else ";"
+    said = Text("there is no such setting{meant} {where}", meant=meant, where=_where(experiment))
+    raise UsageError("settings", said, value=f"{experiment}.{name}")
 
 
 def _refusal(

@@ -14,7 +14,7 @@ from levilab.cli.importing import importing
 from levilab.cli.later import Later, NamedLast
 from levilab.cli.options import Json, Language, flag, option, place, quantity
 from levilab.cli.output import message, print_json, result
-from levilab.texts.text import Text, in_language, speak
+from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
     from levilab.bench.config import BenchConfig
@@ -103,11 +103,10 @@ def acquire_experiment(
     list_settings: Annotated[
         bool, flag("List the settings that --set changes, with units and ranges, and exit.", "--settings")
     ] = False,
-    language: Language = "en",
+    language: Language = "en",  # noqa: ARG001 - its callback speaks it
     as_json: Json = False,
 ) -> None:
     """Carry out an experiment."""
-    speak(language)
     if not list_settings:
         look_at_files(bench, resume, out, scene, virtual=mock, named=bool(counter or scope))
     shorthands = {"drive": drive, "drive_frequency_hz": spin}

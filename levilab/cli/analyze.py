@@ -15,7 +15,7 @@ from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError
 from levilab.pipelines.options import KINDS, OPTIONS, Option, options_of, read_options, typed_name
-from levilab.texts.text import speak
+from levilab.texts.text import Text, text_of
 
 if TYPE_CHECKING:
     from levilab.pipelines.document import Analysis
@@ -123,10 +123,9 @@ def _command(kind: str) -> Callable[..., None]:
             bool, flag("Keep the rows of an earlier --table; analyze what is new, changed or failed.", "--resume")
         ] = False,
         as_json: Json = False,
-        language: Language = "en",
+        language: Language = "en",  # noqa: ARG001 - its callback speaks it
         **given: Any,
     ) -> None:
-        speak(language)
         if table is not None:
             writing = Writing(table, cores=cores, resume=resume, save=bool(save))
             _tabulate(kind, paths or (), read_options(given, typed=True), writing, out=out, as_json=as_json)
@@ -266,7 +265,8 @@ def _analyze_as(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping
     try:
         return analysis.analyze(paths, analysis.options_from(given))
     except DoesNotSuit as error:
-        raise DoesNotSuit(f"{error}{_advice(analysis, paths, given, error)}") from error
+        advice = _advice(analysis, paths, given, error)
+        raise DoesNotSuit(Text("{why}{advice}", why=error, advice=advice) if advice else text_of(error)) from error
 
 
 #: The analysis that reads any table with a column of frequencies.
@@ -289,7 +289,7 @@ def _advice(tried: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, A
             continue
         names = [one.name for one in found if one.name not in needs_more]
         if names and tried not in found:
-            return f"; levilab analyze {' or '.join(names)} {path} reads it"
+            return Text("; levilab analyze {names:s} {path:s} reads it", names=" or ".join(names), path=str(path))
     return ""
 
 
@@ -316,7 +316,7 @@ def write_and_print(
         if save:
             failure, written = _save(analysis, found, out)
             failures += [failure] if failure else []
-            messages += [f"wrote {path}" for path in written]
+            messages += [Text("wrote {path:s}", path=str(path)) for path in written]
     if as_json:
         more = {"left_out": left_out_of(said)} if left_out_of(said) else {}
         documents = [analysis.document(found, out or found.output_folder) | more for analysis, found in results]

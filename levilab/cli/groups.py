@@ -8,7 +8,6 @@ from levilab.cli.options import HEADING, Language, Paths, among, argument, flag,
 from levilab.cli.output import interruptible, message, result
 from levilab.pipelines.options import OF_REPORT, read_options
 from levilab.report.worksheets.sheets import SHEETS
-from levilab.texts.text import speak
 
 
 @takes_options(OF_REPORT, HEADING)
@@ -17,14 +16,13 @@ def of_class(
     out: Annotated[
         Path, place("FILE", "The file to write; its ending is .html, .pdf or .xlsx.", callback=writable)
     ] = Path("class.html"),
-    language: Language = "en",
+    language: Language = "en",  # noqa: ARG001 - its callback speaks it
     **given: Any,
 ) -> None:
     """Put the groups of a class beside each other."""
     from levilab.report.groups.document import write_class
     from levilab.report.reproduction import Heading
 
-    speak(language)
     heading = Heading(**{one.name: given.pop(one.name) for one in HEADING})
     with interruptible("nothing is written"):
         written = write_class(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from levilab.errors import UsageError, list_known
+from levilab.texts.text import speak
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection
@@ -130,10 +131,22 @@ def named_scene(scene: str | None) -> str:
 
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else on standard output.")]
+
+
+def _speak(language: str) -> str:
+    """Speak a language before the other options are read, which may be refused.  Raises UsageError."""
+    speak(language)
+    return language
+
+
 #: Not the machine's own: a script that reads messages finds the same on each.
 Language = Annotated[
-    str, typer.Option("--language", metavar="CODE", envvar="LEVILAB_LANGUAGE", help="Of what people read: en or de.")
-]
+    str,
+    typer.Option(
+        "--language", metavar="CODE", envvar="LEVILAB_LANGUAGE", help="Of what people read: en or de.",
+        is_eager=True, callback=_speak,
+    ),
+]  # fmt: skip
 #: The heading of a report: name → metavar and help.
 _HEADING = {
     "title": ("TEXT", "In place of the report's own title."),

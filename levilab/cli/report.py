@@ -7,7 +7,6 @@ from levilab.cli.analyze import takes_options
 from levilab.cli.options import HEADING, Json, Language, Paths, argument, existing_path, flag, option, place, writable
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.pipelines.options import OF_REPORT, read_options
-from levilab.texts.text import speak
 
 
 @takes_options(OF_REPORT, HEADING)
@@ -39,11 +38,10 @@ def report(
     short: Annotated[
         bool, flag("Answer, values, figure and notes alone; of a few spin-downs one page.", "--short")
     ] = False,
-    language: Language = "en",
+    language: Language = "en",  # noqa: ARG001 - its callback speaks it
     **given: Any,
 ) -> None:
     """Write the report."""
-    speak(language)
     from levilab.report.page import write_report
     from levilab.report.reproduction import Heading
 

@@ -29,6 +29,7 @@ from levilab.formats.titles import (
     without_runs_of_blanks,
 )
 from levilab.texts.note import of_file
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from levilab.formats.kinds import Kind
@@ -62,8 +63,8 @@ class TableError(DataError):
 
     def __init__(self, path: Path, message: str, *, line: int | None = None) -> None:
         self.path, self.line, self.message = path, line, message
-        place = f"{shorten(str(path), 200)}, line {line}" if line is not None else shorten(str(path), 200)
-        super().__init__(f"{place}: {message}")
+        at = "{path:s}: {message}" if line is None else "{path:s}, line {line}: {message}"
+        super().__init__(Text(at, path=shorten(str(path), 200), line=line, message=message))
 
 
 class NoTable(TableError, DoesNotSuit):

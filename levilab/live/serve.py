@@ -20,7 +20,7 @@ from levilab.live.practice.bench import PracticeBench
 from levilab.live.server import Hall, application
 from levilab.live.share import address_in_network
 from levilab.runs.find import RECORD, must_take_runs, run_or_folder
-from levilab.texts.text import ENGLISH, language_of
+from levilab.texts.text import ENGLISH, Text, language_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping
@@ -227,8 +227,10 @@ def _listening(host: str, port: int) -> socket.socket:
     except OSError as error:
         opened.close()
         taken = error.errno in {errno.EADDRINUSE, errno.EACCES}
-        why = "is in use, perhaps by another live view" if taken else f"cannot be listened at ({error.strerror})"
-        raise CannotShow(f"port {port} {why}: close that, or choose another `port`, as 0 for any") from error
+        why = "is in use, perhaps by another live view"
+        why = why if taken else Text("cannot be listened at ({why})", why=str(error.strerror))
+        advice = "port {port} {why}: close that, or choose another `port`, as 0 for any"
+        raise CannotShow(Text(advice, port=port, why=why)) from error
     return opened
 
 

@@ -30,6 +30,7 @@ from levilab.runs.find import RECORD, find_runs, no_such_path
 from levilab.runs.run import READINGS, Run
 from levilab.texts.note import Note, of_file
 from levilab.texts.note import kind_of as kind_of_text
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -504,7 +505,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
     kinds = [SkippedRuns(kind, count) for kind, count in sorted(others.items())]
     if not found:
         left_out = tuple(one for one in remarks if isinstance(one, LeftOut))
-        text = f"{root}: {_nothing_found(needs, kinds, broken, left_out)}"
+        text = Text("{path:s}: {why}", path=str(root), why=_nothing_found(needs, kinds, broken, left_out))
         if not broken:
             raise NothingSuits(text, left_out)
         raise NoneUsable(text, tuple(map(str, broken))) if broken else DoesNotSuit(text)
@@ -594,4 +595,5 @@ def _nothing_found(
     seen += [files_by_kind(left_out)] if any(one.kind is not OTHER for one in left_out) else []
     if not seen:
         return "holds no run and no data file; name a run folder, a data file, or a folder with some of them"
-    return f"no {needs.runs} to analyze in this folder (found only {'; '.join(seen)}); name a run folder or a data file"
+    only = "no {runs} to analyze in this folder (found only {found}); name a run folder or a data file"
+    return Text(only, runs=needs.runs, found=Sentences(*seen, between="; "))

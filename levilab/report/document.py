@@ -74,14 +74,14 @@ def document_of(
     if results:
         blocks.append(reproduction(results, asked))
     counts = count_inputs(sources)
-    subjects = ", ".join([*(part.subject for part in parts), *(one.title.lower() for one in others)])
+    first, *more = [*(part.subject for part in parts), *(one.title.lower() for one in others)]
     return Document(
         title=parts[0].heading if alone else _title(counts, others),
-        lead=_lead(results[0][1], parts[0]) if alone else subjects[:1].upper() + subjects[1:],
+        lead=_lead(results[0][1], parts[0]) if alone else Text("{parts}", parts=(first[:1].upper() + first[1:], *more)),
         blocks=tuple(blocks),
         banner=banner,
         contents=True,
-        subject=f"{subjects}{', ' if counts else ''}{counts}",
+        subject=Sentences(first, *more, counts, between=", "),
     )
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from levilab.errors import DataError
 from levilab.files import CannotWrite
 from levilab.formats.texts import SPREADSHEETS, TEXTS, locate, name_files
+from levilab.texts.text import Text
 
 RECORD = "run.json"
 #: Where runs are, unless a person says otherwise.
@@ -64,9 +65,11 @@ def no_such_path(path: Path) -> DataError:
     near = difflib.get_close_matches(wanted, sorted(one.name for one in folder.iterdir()), n=1, cutoff=0.8)
     ends = (*TEXTS, *SPREADSHEETS)
     files = name_files(folder, ends) if path.suffix.casefold() in ends else ""
-    there = f"its data files are {files}" if files else "check the name; levilab runs lists the runs of a folder"
-    advice = f"did you mean {folder / near[0]}?" if near else there
-    return DataError(f"{path}: there is no such file or folder in {folder.resolve()}: {advice}")
+    check = "check the name; levilab runs lists the runs of a folder"
+    there = Text("its data files are {files:s}", files=files) if files else check
+    advice = Text("did you mean {path}?", path=folder / near[0]) if near else there
+    said = "{path}: there is no such file or folder in {folder}: {advice}"
+    return DataError(Text(said, path=path, folder=folder.resolve(), advice=advice))
 
 
 def existing(paths: list[Path] | None) -> list[Path]:

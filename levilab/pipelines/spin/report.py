@@ -16,6 +16,7 @@ from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
 from levilab.present.numbers import column, enumeration, how_many, plain, short_name, with_decimals, with_uncertainty
 from levilab.present.tables import Table, table
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -40,10 +41,10 @@ def meaning(analysis: SpinAnalysis) -> tuple[str, ...]:
     """Return the sentences, of each input."""
     several = len(analysis.runs) > 1
     made = (
-        (source.name, " ".join(_sentences(run)))
+        (source.name, Sentences(*_sentences(run)))
         for source, run in zip(analysis.sources[:_MOST], analysis.runs[:_MOST], strict=True)
     )
-    return tuple(f"{name}: {text}" if several else text for name, text in made if text)
+    return tuple(Text("{name:s}: {text}", name=name, text=text) if several else text for name, text in made if text)
 
 
 @dataclass(frozen=True)
@@ -76,13 +77,20 @@ def _sentences(run: SpinRun) -> Iterator[str]:
     frequency = spin.frequency
     if not frequency.value:
         return
-    at = f" at {spin.reference_time:.3g} s" if len(run.series) > 1 else ""
-    yield f"The top turns with {with_uncertainty(frequency)}{at}, {60 * frequency.value:.0f} times a minute."
+    turns = "The top turns with {spin:n}{at}, {rpm:.0f} times a minute."
+    at = Text(" at {time:.3g} s", time=float(spin.reference_time)) if len(run.series) > 1 else ""
+    yield Text(turns, spin=with_uncertainty(frequency), at=at, rpm=60 * frequency.value)
     if run.swing and run.swing[1] > _SEEN:
         far, units = run.swing
         yield (
-            f"That is one {run.series.of} of {len(run.series)}: they scatter about a line by {digits(far)} Hz, "
-            f"{digits(units)} times their uncertainties, so the spin itself swings, as that of a driven top does."
+            Text(
+                "That is one {of} of {n}: they scatter about a line by {hz:n} Hz, {times:n} times their "
+                "uncertainties, so the spin itself swings, as that of a driven top does.",
+                of=run.series.of,
+                n=len(run.series),
+                hz=digits(far),
+                times=digits(units),
+            )
         )
     yield from _about_line(run)
     if (change := _change(run)) is None:
@@ -94,8 +102,11 @@ def _sentences(run: SpinRun) -> Iterator[str]:
             yield "With such noise no other method would find it much better."
         elif not run.line:
             yield (
-                f"The uncertainty is {digits(ratio)} times the least that any method could reach with such noise: the "
-                "pulses themselves scatter, or the samples lie far apart."
+                Text(
+                    "The uncertainty is {times:n} times the least that any method could reach with such noise: "
+                    "the pulses themselves scatter, or the samples lie far apart.",
+                    times=digits(ratio),
+                )
             )
 
 
@@ -104,10 +115,11 @@ def _about_line(run: SpinRun) -> Iterator[str]:
     if run.line and run.line.sense:
         # beside the top a dipole's field turns against the dipole
         way = "clockwise" if run.line.sense > 0 else "counterclockwise"
-        yield f"Seen from above it turns {way}, if the phone lay beside it with its screen up."
+        yield Text("Seen from above it turns {way}, if the phone lay beside it with its screen up.", way=way)
     if run.transverse and run.transverse.value:
-        text = f"The part of its moment that turns is {with_uncertainty(run.transverse)}"
-        yield f"{text}: the moment leans by {with_uncertainty(run.tilt)} from the axis." if run.tilt else f"{text}."
+        yield Text("The part of its moment that turns is {moment:n}.", moment=with_uncertainty(run.transverse))
+        if run.tilt:
+            yield Text("The moment leans by {tilt:n} from the axis.", tilt=with_uncertainty(run.tilt))
 
 
 def _about_change(change: _Change, frequency: float) -> Iterator[str]:
@@ -117,8 +129,12 @@ def _about_change(change: _Change, frequency: float) -> Iterator[str]:
     if abs(change.slope) < _SEEN * change.u:
         most = (abs(change.slope) + 2 * change.u) / frequency
         yield (
-            f"In {digits(change.lasts_s)} s no change of its spin shows beyond the uncertainty: it loses or gains less "
-            f"than {digits(100 * most)} % a second."
+            Text(
+                "In {time:n} s no change of its spin shows beyond the uncertainty: it loses or gains less "
+                "than {percent:n} % a second.",
+                time=digits(change.lasts_s),
+                percent=digits(100 * most),
+            )
         )
         yield (
             "A free top loses some 0.3 % a second to the air: a longer record shows that, or one more a while later."
@@ -126,14 +142,14 @@ def _about_change(change: _Change, frequency: float) -> Iterator[str]:
             else "That is less than air takes from a free top: does a drive hold it?"
         )
     elif share > 0:
-        yield f"It gains {lost} of its spin a second: something drives it."
+        yield Text("It gains {lost:n} of its spin a second: something drives it.", lost=lost)
     elif _AIR[0] < -share < _AIR[1]:
-        yield f"It loses {lost} of its spin a second, as a free top does in air."
+        yield Text("It loses {lost:n} of its spin a second, as a free top does in air.", lost=lost)
     else:
         why = "more than air takes: does it touch something, or does a drive brake it?" if -share > _AIR[1] else (
             "less than air takes from a free top: does a drive hold it?"
         )  # fmt: skip
-        yield f"It loses {lost} of its spin a second, {why}"
+        yield Text("It loses {lost:n} of its spin a second, {why}", lost=lost, why=why)
 
 
 #: Values of a series that are printed; result.json has all.
@@ -192,7 +208,7 @@ def line_table(analysis: SpinAnalysis) -> Table:
         for (source, run), row in zip(of_lines, cells, strict=True)
         if run.line
     ]
-    title = "The line" + (", of several windows that of the one above" if several else "")
+    title = "The line, of several windows that of the one above" if several else "The line"
     heads = ("input", "kind of record", *(one.head for one in quantities), "noise [µT]", "S/N\n[dB]")
     return table(title, heads, rows, numbers=heads[2:])
 
@@ -214,7 +230,7 @@ def pulse_table(analysis: SpinAnalysis) -> Table:
         if not run.line
     ]
     numbers = ("pulses", "missing", "doubled", "scatter\n[µs]", "S/N\n[dB]")
-    title = "The pulses" + (", of several records or windows those of the one above" if several else "")
+    title = "The pulses, of several records or windows those of the one above" if several else "The pulses"
     return table(title, ("input", "kind of record", *numbers), rows, numbers=numbers)
 
 
@@ -227,8 +243,9 @@ def series_table(source: Source[Records], run: SpinRun, most: int) -> Table:
         (*clocks[k], with_decimals(series.time[k], 2), f"{series.frequency[k]:.4f}", plain(1e3 * float(series.u[k]), 2))
         for k in range(0, len(series), step)
     ]
-    which = "each" if step == 1 else f"every {step}th"
-    return table(f"Frequency against time, {which} of {len(series)} {series.of}s", heads, rows, numbers=heads)
+    which = "each" if step == 1 else Text("every {step}th", step=step)
+    title = Text("Frequency against time, {which} of {n} {of}", which=which, n=len(series), of=f"{series.of}s")
+    return table(title, heads, rows, numbers=heads)
 
 
 # --- readings as columns of tables for programs ---
@@ -257,7 +274,7 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
         heading="Spin frequency of a top",
         lead=_count_pulses(analysis),
         result=(
-            Paragraph(" ".join(meaning(analysis)), "What it means."),
+            Paragraph(Sentences(*meaning(analysis)), "What it means."),
             Tabular("spin-frequencies", frequency_table(analysis), _FREQUENCIES, first_column_wraps=True),
         ),
         figure=FigureText(
@@ -287,14 +304,14 @@ def _count_pulses(analysis: SpinAnalysis) -> str:
         if run.which:
             counts[run.series.of] = counts.get(run.series.of, 0) + len(run.series)
     said = [how_many(count, name) for name, count in counts.items()]
-    return f"{enumeration(said)} used"
+    return Text("{counts} used", counts=enumeration(said))
 
 
-_FREQUENCIES = (
-    f"{VALUE_U} The spin is that at the time "
-    "given, its slope the change of the spin in a second. bound: no method does better with this noise (Cramér–Rao). "
-    "Of several records or windows this table, that of the pulses and the budgets are of the one in the middle; the "
-    "text gives the slope through all."
+_FREQUENCIES = Sentences(
+    VALUE_U,
+    "The spin is that at the time given, its slope the change of the spin in a second. bound: no method does better "
+    "with this noise (Cramér–Rao). Of several records or windows this table, that of the pulses and the budgets are of "
+    "the one in the middle; the text gives the slope through all.",
 )
 _QUALITY = {
     "spin-pulses": (
@@ -310,11 +327,14 @@ _QUALITY = {
 
 def _in_words(source: Source[Records], run: SpinRun, *_: object) -> tuple[str, ...]:
     records, count = source.readings, len(source.readings)
-    of = f"{run.which}: " if run.which else ""
-    if run.line:
-        return f"{records.kind}; {count} samples", f"{of}{run.line.turns} turns"
-    what = "pulse times" if records.pulses else f"samples of {records.channel}"
-    return f"{records.kind}; {count} {what}", f"{of}{run.spin.pulses} pulses, {run.spin.missing} missing"
+    found = (
+        Text("{n} turns", n=run.line.turns)
+        if run.line
+        else Text("{n} pulses, {missing} missing", n=run.spin.pulses, missing=run.spin.missing)
+    )
+    of = Text("{which}: {found}", which=run.which, found=found) if run.which else found
+    what = "samples" if run.line else "pulse times" if records.pulses else f"samples of {records.channel}"
+    return Text("{kind}; {n} {what}", kind=records.kind, n=count, what=what), of
 
 
 def _series(source: Source[Records], run: SpinRun, *_: object) -> tuple[Block, ...]:

@@ -13,6 +13,7 @@ from analysis.numbers import digits
 from analysis.spindown.combine import Combined
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown
+from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from levilab.pipelines.budget import bench_clock, direct_row, gate_of, setting_of, time_base
 from levilab.pipelines.document import Analysis, number, statistics_of, value_of, values_of
 from levilab.pipelines.options import SpinDownOptions
@@ -64,10 +65,12 @@ def budget_of_run(source: Source[SpinReadings], run: SpinDown, options: SpinDown
 
 def _parameters(run: SpinDown) -> list[tuple[LawFit, str]]:
     best = run.fit(run.best)
-    wanted = [(best, name) for name in best.parameters if _is_determined(best, name)]
+    determined = [(best, name) for name in best.parameters if _is_determined(best, name)]
+    wanted = [one for one in determined if one[1] not in WOBBLE]
+    wobble = [one for one in determined if one[1] in WOBBLE]  # the last, as the readings tell little of it
     as_good = [(run.fit(law), name) for law in _as_good(run.verdict, run.fits) for name in LAWS[law].constants]
     others = [fit for fit in run.fits if fit.name == _POWER and fit is not best]
-    return wanted + as_good + [(fit, _EXPONENT) for fit in others]
+    return [*wanted, *as_good, *((fit, _EXPONENT) for fit in others), *wobble]
 
 
 def _as_good(verdict: Verdict, fits: Sequence[LawFit | CombinedLaw]) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -529,9 +529,12 @@ def _count(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
         "neighbouring readings resemble each other they say as much as fewer independent ones."
     )
     shown = Tabular("spindown-count", found, explained)
-    if len(found.rows) <= MOST_COUNTS:
+    is_shown = analysis.combined.tilt is None or is_seen(analysis.combined.tilt)
+    if len(found.rows) <= MOST_COUNTS and is_shown:
         return (shown,)
-    return (Details("What the counter sees of the wobble, run by run", (shown,)),)
+    folded = (replace(shown, table=replace(found, title="")),)
+    on_paper: Literal["whole", "out"] = "whole" if is_shown else "out"
+    return (Details("What the counter sees of the wobble, run by run", folded, on_paper=on_paper),)
 
 
 def _run_by_run(analysis: SpinDownAnalysis) -> tuple[Block, ...]:

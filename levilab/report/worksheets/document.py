@@ -99,6 +99,7 @@ def worksheet(sheet: Sheet, language: Language, seeds: Mapping[str, int]) -> Doc
     spoken = "" if language.code == ENGLISH else f" --language {language.code}"
     live = (Code(f"levilab live --mock --seed {seed}{spoken} --out class"),) * (sheet.clicks == "with_clicks")
     clicks = Paragraph(words[sheet.clicks], f"{words['clicks']}:")
+    questions = (Question(f"{k}.", task) for k, task in enumerate(texts.tasks, start=1))
     return Document(
         title=texts.title,
         lead=words["worksheet"],
@@ -107,7 +108,7 @@ def worksheet(sheet: Sheet, language: Language, seeds: Mapping[str, int]) -> Doc
             Paragraph(texts.aim),
             Section(words["commands"], (Code("\n".join(sheet.commands(group, seed, spoken))), clicks, *live)),
             Section(words["seeds"], (Paragraph(told), Listing("seeds", listed, rows_in_a_piece=5))),
-            Section(words["tasks"], tuple(Question(f"{k}.", task) for k, task in enumerate(texts.tasks, start=1))),
+            Section(words["tasks"], (Paragraph(words["notation"]), *questions)),
         ),
         language=language.code,
     )

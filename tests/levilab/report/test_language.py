@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 import pytest
@@ -10,6 +11,7 @@ from matplotlib.figure import Figure
 from levilab.present.style import as_png
 from levilab.report.page import write_report
 from levilab.texts.text import Text, speak
+from support.pages import Page
 from support.paths import SAMPLE_DATA
 
 if TYPE_CHECKING:
@@ -31,6 +33,21 @@ def test_a_german_report_has_german_headings_and_answer(tmp_path: Path) -> None:
     for said in (">Ergebnis<", "Am besten passt das Scheibengesetz", "--language de", 'lang="de"'):
         assert said in page
     assert ">Result<" not in page
+
+
+#: English words that no German sentence has, and that no path, command or name of an instrument has, either.
+_ENGLISH = re.compile(r"(?<![-/.])\b(?:the|of|and|is|are|not|each|from|by|with|which|its|than|but|where)\b(?![-/.])")
+
+
+@pytest.mark.usefixtures("german")
+@pytest.mark.parametrize("run", ["spin-down-1", "lower-limits", "precession-sweep", "field-scan"])
+def test_no_english_sentence_is_left_in_a_german_report(tmp_path: Path, run: str) -> None:
+    """Up to the bench and its events, of which the samples, which are older than their templates, speak English."""
+    page = Page(write_report([SAMPLE_DATA / run], tmp_path / "report.html").read_text(encoding="utf-8"))
+    text, bench, _ = page.text.rpartition("Was womit gemessen wurde")
+    assert bench
+    left = [text[max(found.start() - 50, 0) : found.end() + 50] for found in _ENGLISH.finditer(text)]
+    assert left == []
 
 
 @pytest.mark.usefixtures("german")
