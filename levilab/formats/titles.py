@@ -323,8 +323,8 @@ def read_title(text: str) -> Title:
     bare = _BARE_UNIT.fullmatch(text)
     if bare and not found:  # Laufzeit s, Frequenz Hz
         return _title_of_name(bare["name"], bare["unit"]) or Title(None, bare["unit"])
-    # a title may be a unit alone, as sec; m, h, T and G are symbols of quantities, too
-    units = [unit for _, unit in found] or [text] * (len(text) > 1 or text == "s")
+    # a title may be a unit alone, as sec or 1/min; m, h, T and G are symbols of quantities, too
+    units = [*[text] * (len(text) > 1 or text == "s"), *(unit for _, unit in found)]
     return Title(None, next((unit for unit in units if is_unit(unit)), found[0][1] if found else None))
 
 

@@ -91,7 +91,7 @@ def rows(form):
         (rows("{t} s   {f} Hz"), None),
         ("Zeit Frequenz\n" + rows("{t} s {f} Hz"), None),
         ("sec,Hz\n" + rows("{t},{f}"), None),
-        ("s;Hz\n" + rows("{t};{f}"), None),
+        ("s;1/s\n" + rows("{t};{f}"), None),
         ("t (s)," + ",".join(map(str, INSTANTS)) + "\nf (Hz)," + ",".join(map(str, SPINS)) + "\n", None),
         ("Zeit;s;" + ";".join(map(str, INSTANTS)) + "\nFrequenz;Hz;" + ";".join(map(str, SPINS)) + "\n", None),
         ("\t".join(map(str, INSTANTS)) + "\n" + "\t".join(map(str, SPINS)) + "\n", None),

@@ -60,9 +60,9 @@ def test_traces_are_in_volts_and_seconds(tmp_path):
 def test_a_spreadsheet_has_a_sheet_for_each_table_and_no_formula_of_a_person(tmp_path):
     table = Table("=1+1/x", (Column("note", np.array(["=2+3"]), "1", ""), Column("x_m", np.array([0.25]), "m", "")), "")
     export(lambda: Contents("x", "x", (table,), {}), tmp_path / "x.xlsx")
-    assert pd.read_excel(tmp_path / "x.xlsx", sheet_name="=1+1-x").iloc[0].tolist() == ["=2+3", 0.25]
+    assert pd.read_excel(tmp_path / "x.xlsx", sheet_name="=1+1-x", engine="calamine").iloc[0].tolist() == ["=2+3", 0.25]
     written(RUN, tmp_path / "run.xlsx")
-    sheets = pd.read_excel(tmp_path / "run.xlsx", sheet_name=None)
+    sheets = pd.read_excel(tmp_path / "run.xlsx", sheet_name=None, engine="calamine")
     assert list(sheets) == ["readings", "spindown", "result"]
     assert sheets["readings"]["spin_frequency_hz"].iloc[0] == 39.93
 
