@@ -552,7 +552,11 @@ def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion):
     assert 22.5 < spins.iloc[-1] < 26
     assert run.record.configuration["scene"] == preset("spindown").as_table()
     assert "full motion" in str(run.record.synthetic_how)
-    disc = SPINDOWN.analyze([run.folder], SpinDownOptions()).runs[0].fit("disc").parameters["c32"]
+    found = SPINDOWN.analyze([run.folder], SpinDownOptions()).runs[0]
+    release = found.model.release
+    assert release.spin_hz == pytest.approx(30, abs=1)
+    assert 200 < release.driven_s < 300  # 10 Hz at 0.05 Hz/s, 20 s of holding, and as long to take hold
+    disc = found.fit("disc").parameters["c32"]
     # 0.3 % of its own uncertainty, and what nutation from the drive leaves (docs/decisions/0011)
     assert disc.value == pytest.approx(2.34e-4, rel=0.009)
 
