@@ -84,6 +84,8 @@ _NEAREST = 0.3
 _STANDS = 1.0
 #: The nearest choice is the one that was meant if it is nearer than the next one by this factor.
 _NEARER = 0.5
+#: A spin that describes the whole film worse, by this factor of u, is none.
+_WORSE = 10.0
 #: A slope of the spin counts from this number of standard uncertainties on.
 _FALLS = 3.0
 #: A top that is farther out than this many times its usual distance from its mean place, and stays so, falls.
@@ -385,7 +387,12 @@ def _turn(
         choices.sort(key=lambda f: abs(abs(f) - (options.near or 0.0)))
         off = [abs(abs(f) - options.near) for f in choices[:2]]
         choices = choices[:1] if off[0] < _NEARER * off[1] else choices
-    turning = turning_of(times, phases.phase, phases.u, rows, start=choices[0])
+    turnings = {f: turning_of(times, phases.phase, phases.u, rows, start=f) for f in choices}
+    best = min(one.u_frequency for one in turnings.values())
+    choices = [
+        f for f in choices if turnings[f].u_frequency < _WORSE * best
+    ]  # the whole film tells more than its middle
+    turning = turnings[choices[0]]
     by_slope = len(choices) > 1 and abs(turning.chirp) > _FALLS * turning.u_chirp
     falling = [f for f in choices if f * turning.chirp < 0] if by_slope else []
     seen_from_above = tuple(-f for f in choices)
@@ -393,7 +400,7 @@ def _turn(
     if played_slowly or (len(choices) > 1 and len(falling) != 1):
         return None, seen_from_above, ""
     if falling and falling[0] != choices[0]:
-        turning = turning_of(times, phases.phase, phases.u, rows, start=falling[0])
+        turning = turnings[falling[0]]
     return turning, seen_from_above, ""
 
 
