@@ -167,7 +167,7 @@ class ColumnsError(UsageError):
 
 
 #: What stands before the name of a quantity in the option `columns`: a comma, a semicolon; a blank before a short one.
-_BETWEEN = re.compile(rf"[,;](?=\s*[^\W\d]\w*\s*=)|\s+(?=(?:{'|'.join(SHORTHANDS)})\s*=)")
+_BETWEEN = re.compile(rf"[,;](?=\s*[^\W\d]\w*\s*=)|\s+(?=(?:time|frequency|{'|'.join(SHORTHANDS)})\s*=)")
 
 
 def parse_columns(given: object) -> dict[str, str]:
