@@ -215,7 +215,11 @@ def _frame_of_xarray(data: Any, names: tuple[str, ...]) -> pd.DataFrame:
     if len(data.dims) != 1:
         raise UsageError("data", "one dimension is expected", value=f"an object of xarray over {', '.join(data.dims)}")
     (dimension,) = data.dims
-    named = data.to_dataset(name=data.name or names[1]) if hasattr(data, "to_dataset") else data
+    if hasattr(data, "to_dataset"):
+        bare = split(names[1])[0] if "units" in data.attrs else names[1]
+        named = data.to_dataset(name=data.name or bare)
+    else:
+        named = data
     frame = named.to_dataframe().reset_index()
     titles = {}
     for name in frame.columns:

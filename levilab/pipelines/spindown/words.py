@@ -340,7 +340,7 @@ def _value(estimate: Estimate) -> str:
 #: What a tilt costs that the readings do not show: docs/crosscheck.md has the numbers.
 TILT_ALLOWED = (
     "the fits allow for a tilt of the moment, which these readings do not show: u is larger than that of a plain fit, "
-    "and the C of a top without a tilt comes out too large by less than one u; `tilt` = none leaves it out"
+    "and of a top without a tilt C comes out too large and n too small, by less than one u; `tilt` = none leaves it out"
 )
 
 

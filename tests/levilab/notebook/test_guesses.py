@@ -186,6 +186,9 @@ GUESSES: dict[str, Callable[[Any], object]] = {
         lambda last: last == 190.0
     ),
     "levilab.analyze(run.to_xarray()).ndata": lambda n: n == 20,
+    "levilab.analyze(xr.DataArray(60 * f, {'time': t}, 'time', attrs={'units': 'rpm'})).data.iloc[0, 2] / f[0]": (
+        lambda ratio: ratio == pytest.approx(1)
+    ),
     "levilab.analyze(list(zip(t, f))).ndata": lambda n: n == 20,
     "levilab.analyze(np.column_stack([t, f])).ndata": lambda n: n == 20,
     "levilab.analyze({'t': t, 'f': f}).ndata": lambda n: n == 20,
