@@ -132,13 +132,13 @@ def key(sheet: Sheet, language: Language, seeds: Mapping[str, int], found: Class
         banner=Banner("SYNTHETIC.", f"{words['numbers']} {words['synthetic']}"),
         blocks=(
             Section(words["answers"], tuple(answers)),
-            Section(words["numbers"], tuple(_numbers(language, seeds, found))),
+            Section(words["numbers"], tuple(_numbers(sheet, language, seeds, found))),
         ),
         language=language.code,
     )
 
 
-def _numbers(language: Language, seeds: Mapping[str, int], found: Class) -> Iterator[Tabular]:
+def _numbers(sheet: Sheet, language: Language, seeds: Mapping[str, int], found: Class) -> Iterator[Tabular]:
     """Yield each group's values with u: first those with the truths of its seed beside them, then those without."""
     words = language.words
     known = [one for one in found.quantities if any(truth is not None for truth in one.truths)]
@@ -159,7 +159,8 @@ def _numbers(language: Language, seeds: Mapping[str, int], found: Class) -> Iter
                 heads.append(words["mark"])
             rows = [tuple(row) for row in zip(*columns, strict=True)]
             shown = table("", heads, rows, numbers=[head for head in heads[1:] if head != words["mark"]])
-            yield Tabular(about.replace("_", "-"), shown, words[about], first_column_wraps=True)
+            said = [words[about], *[words["about_clicks"]] * (part is known and sheet.clicks == "with_clicks")]
+            yield Tabular(about.replace("_", "-"), shown, " ".join(said), first_column_wraps=True)
 
 
 def write_worksheets(

@@ -10,6 +10,7 @@ import pytest
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.report.groups.beside import class_of
+from levilab.report.worksheets.document import key as key_of
 from levilab.report.worksheets.document import measure, read_language, write_worksheets
 from levilab.report.worksheets.sheets import SHEETS, TOPS
 from levilab.texts.text import languages
@@ -75,8 +76,12 @@ def test_a_key_has_the_values_and_truths_of_each_seed_and_the_worksheet_none(tmp
     seeds = {"Gruppe 1": 7, "Gruppe 2": 8}
     sheet, key = write_worksheets(["spin"], tmp_path, seeds, language="de")
     assert (sheet.name, key.name) == ("spin-de.html", "spin-key-de.html")
-    found = measure(SHEETS["spin"], seeds).quantities[0]
+    measured = measure(SHEETS["spin"], seeds)
+    found = measured.quantities[0]
     page = Page(key.read_text(encoding="utf-8")).text
+    english = read_language("en")
+    assert "Who clicked" in str(key_of(SHEETS["spin"], english, seeds, measured))
+    assert "Who clicked" not in str(key_of(SHEETS["limit"], english, seeds, measured))  # whose sheet has no clicks
     assert all(f"{one.value * 1e4:.3f}"[:4].replace(".", ",") in page for one in found.estimates if one)
     assert all(f"{truth * 1e4:.3f}"[:4].replace(".", ",") in page for truth in found.truths if truth)
     assert "SYNTHETISCH." in page
