@@ -28,6 +28,11 @@ def export_data(data: Any, output: str | PathLike[str], **options: Any) -> list[
 def _contents(data: Any) -> Contents:
     """Return what is exported.  Raises UsageError, DataError."""
     if isinstance(data, AnalysisResult):
+        if len(data.inputs) > 1:
+            expected = (
+                "one input is exported at a time, levilab.export(PATH, …); to_dataframe() and to_xarray() have all"
+            )
+            raise UsageError("data", expected, value=f"a result of {len(data.inputs)} inputs")
         return contents_of_results(data.found.sources[0].path, None, [(data.analysis, data.found)])
     if isinstance(data, SimulatedMotion):
         return data.contents

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import DataError, UsageError
+from levilab.notebook.motion import SimulatedMotion
 from levilab.notebook.result import AnalysisResult
+from levilab.notebook.sweep import SimulatedMap
 from levilab.report.page import write_report
 from levilab.runs.find import find_run
 from levilab.runs.run import Run
@@ -17,7 +19,7 @@ from levilab.runs.run import Run
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    Reported = Run | AnalysisResult | str | PathLike[str]
+    Reported = Run | AnalysisResult | SimulatedMotion | SimulatedMap | str | PathLike[str]
 
 
 def report_on(data: Any, output: str | PathLike[str], *, tables: bool, crosscheck: bool) -> Path:
@@ -48,9 +50,14 @@ def _paths(item: Reported) -> list[Path]:
         return [source.path for source in item.found.sources]
     if isinstance(item, Run):
         return [item.folder]
+    if isinstance(item, SimulatedMotion | SimulatedMap):
+        folder = item.folder if isinstance(item, SimulatedMotion) else item.path
+        if folder is None:
+            raise UsageError("data", "a report needs its folder: simulate or sweep with out=FOLDER", value=repr(item))
+        return [folder]
     if isinstance(item, str | PathLike):
         return [find_run(Path(item))]
-    raise UsageError("data", "runs, results or paths are expected", value=type(item).__name__)
+    raise UsageError("data", "runs, results, motions, maps or paths are expected", value=type(item).__name__)
 
 
 def _options(item: Reported) -> Mapping[str, Any]:

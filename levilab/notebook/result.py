@@ -64,6 +64,19 @@ _STATISTICS = {
 }
 
 
+class _Name(str):
+    """A value's name in a loop over a result; taken for the result of an input, it says where that is."""
+
+    __slots__ = ()
+
+    @bare
+    def __getitem__(self, key: Any) -> str:
+        if isinstance(key, str):
+            expected = "a loop over a result gives names of its values: for one in result.by_input.values(): one['c32']"
+            raise UsageError("name", expected, value=f"{self}[{key!r}]")
+        return super().__getitem__(key)
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class AnalysisResult(Exportable):
     """What an analysis found of one or several inputs.  Nothing is written unless `save` is called.
@@ -282,7 +295,7 @@ class AnalysisResult(Exportable):
         return name in self.values
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self.values)
+        return map(_Name, self.values)
 
     def _ipython_key_completions_(self) -> list[str]:
         return [*self.values]

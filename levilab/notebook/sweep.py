@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,7 +13,7 @@ from levilab.errors import UsageError
 from levilab.notebook.labels import dataset_of, head_as_html
 from levilab.notebook.names import Exportable, bare
 from levilab.notebook.quantity import Named
-from levilab.notebook.scene import chosen_scene, in_seconds, whole_key
+from levilab.notebook.scene import chosen_scene, in_seconds, warn_of, whole_key
 from levilab.present.html import facts_as_html, fold
 from levilab.report.export.contents import attributes_of, contents_of
 from levilab.sweeps.adaptive import is_adaptive, run_adaptive
@@ -25,7 +25,6 @@ from levilab.sweeps.store import Store
 from levilab.sweeps.summary import axes_lines, columns_table, headline, summarise
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
     from os import PathLike
 
     import numpy as np
@@ -51,8 +50,6 @@ class SimulatedMap(Exportable):
     store: Store
 
     also: ClassVar[Mapping[str, Any]] = {
-        "sel": lambda found: found.to_xarray().sel,
-        "isel": lambda found: found.to_xarray().isel,
         "df": "to_dataframe()",
         "data": "to_xarray()",
         "coords": "axes",
@@ -122,6 +119,28 @@ class SimulatedMap(Exportable):
             data[axis.name].encoding["_FillValue"] = None  # CF: coordinates are never missing
         return data
 
+    @bare
+    def sel(self, at: Mapping[str, Any] | None = None, /, **named: Any) -> xarray.Dataset:
+        """Return the points at values of axes, by keys or their last parts, spin_hz=24; options are xarray's."""
+        return self._part("sel", {**(at or {}), **named})
+
+    @bare
+    def isel(self, at: Mapping[str, Any] | None = None, /, **named: Any) -> xarray.Dataset:
+        """Return the points at places on axes, counted from 0; see `sel`."""
+        return self._part("isel", {**(at or {}), **named})
+
+    def _part(self, how: str, at: Mapping[str, Any]) -> xarray.Dataset:
+        whole = {name: [key for key in self.axes if f".{key}".endswith(f".{name}")] for name in at}
+        keys = {name: found[0] if len(found) == 1 else name for name, found in whole.items()}
+        part = getattr(self.to_xarray(), how)
+        try:
+            return cast("xarray.Dataset", part(**{keys[name]: value for name, value in at.items()}))
+        except (KeyError, ValueError, IndexError, TypeError):
+            asked = ", ".join(f"{name} = {value}" for name, value in at.items())
+            axes = "; ".join(f"{key} = {', '.join(map(str, values))}" for key, values in self.axes.items())
+            nearest = ", or method='nearest'" if how == "sel" else ""
+            raise UsageError(how, f"values of an axis are expected{nearest}: {axes}", value=asked) from None
+
     def plot(self, column: str | None = None) -> Figure:
         """Draw an observable, by default the first one: a curve over one axis, a map over more.  Raises UsageError."""
         from levilab.notebook.figure import draw_column, drawn  # with matplotlib
@@ -179,6 +198,9 @@ def sweep_scene(
         SceneError, SimulationError: a scene of the sweep cannot be simulated.
     """
     chosen = chosen_scene(scene, settings, {})
+    warn_of(chosen)
+    if not isinstance(axes, Mapping | Sequence):
+        raise UsageError("sweep", "keys with their values are expected, as {'spin_hz': [20, 30]}", value=axes)
     named: Mapping[str, Any] = axes if isinstance(axes, Mapping) else {}
     spans = [] if named else [parse_axis(text) for text in ([axes] if isinstance(axes, str) else axes)]
     spans += [_axis(whole_key(chosen, key), values) for key, values in {**named, **by_name}.items()]

@@ -329,6 +329,12 @@ def _crossings(field: stability.AxialField, top: stability.SymmetricTop, weights
     return place
 
 
+def doubts_of(scene: Scene) -> list[str]:
+    """Return what makes a motion worthless if it is right: a mass that was meant in grams."""
+    found = stability_of(scene) if scene.top.mass_kg > HEAVIEST_KG else None
+    return [advice(found)] if found and not found.floating else []
+
+
 def advice(found: Stability) -> str:
     """Return why a top does not float, and which one does."""
     if found.top.moment == 0:

@@ -223,6 +223,11 @@ GUESSES: dict[str, Callable[[Any], object]] = {
         lambda survived: survived == [0, 1]
     ),
     "round(result['c32'], 5)": lambda number: number == 0.00024,
+    "swept.sel(spin_hz=30).survived.item() == swept.isel(spin_hz=-1).survived.item()": bool,
+    "swept.sel(spin_hz=24, method='nearest')['start.spin_hz'].item()": lambda spin: spin == 20,
+    "levilab.report([result, levilab.simulate('undriven', 0.5, out=new)], new / 'r.html', crosscheck=False)": (
+        lambda path: "Simulated motion" in path.read_text(encoding="utf-8")
+    ),
     "levilab.report(result, new / 'r.html', crosscheck=False)": lambda path: path.stat().st_size > 20_000,
 }
 #: Wrong guesses → what the error says instead.
@@ -238,7 +243,13 @@ REFUSED = {
     "levilab.sweep('undriven', spin_hz=30)": "texts with units",
     "levilab.sweep('undriven', mass=[0.0249, 0.0253])": "did you mean top.mass_kg?",
     "levilab.sweep('undriven', mass_kg=[24.9, 25.0, 25.3])": "Were grams meant?",
-    "levilab.report(5)": "runs, results or paths are expected",
+    "levilab.report(5)": "runs, results, motions, maps or paths are expected",
+    "levilab.report([result, motion])": "simulate or sweep with out=FOLDER",
+    "levilab.sweep('undriven', 1)": "as {'spin_hz': [20, 30]}",
+    "levilab.export(levilab.analyze([folder / 'spin-down-1', folder / 'spin-down-2']), 'e.nc')": "to_xarray() have all",
+    "[one['c32'] for one in result]": "for one in result.by_input.values()",
+    "swept.sel(spin_hz=24)": "method='nearest': start.spin_hz = 20.0, 30.0",
+    "swept.sel(spin=20)": "start.spin_hz = 20.0, 30.0",
     "levilab.runs(folder / 'none')": "there is no such folder",
     "levilab.analyze((t, f), tilt=None)": "tilt = None: 'none' in quotation marks is expected, or 'auto' or 'fitted'",
     "levilab.analyze(frame, columns=['a', 'b'])": 'as {"t": "Zeit", "f": 3}',
@@ -324,6 +335,7 @@ def names() -> dict[str, Any]:
         "run": run,
         "result": levilab.analyze(run),
         "motion": levilab.simulate("undriven", 1),
+        "swept": levilab.sweep("undriven", spin_hz=[20, 30], duration=0.1),
         "frame": run.to_dataframe(),
         "folder": SAMPLE_DATA,
         "t": T,
@@ -352,6 +364,19 @@ def test_a_wrong_guess_is_told_the_right_one(typed: str, names: dict[str, Any]) 
 def test_a_doubt_is_a_warning_at_the_line_that_asked_so_that_a_loop_notices_it(names: dict[str, Any]) -> None:
     with pytest.warns(DoubtWarning, match=r"the spin is about .* Hz, a Levitron spins at 20 to 60 Hz") as seen:
         levilab.analyze((T, 60 * names["f"]))
+    assert [Path(one.filename).name for one in seen] == [Path(__file__).name]
+
+
+@pytest.mark.parametrize(
+    "compute",
+    [
+        lambda: levilab.simulate("undriven", 0.1, mass_kg=25),
+        lambda: levilab.sweep("undriven", spin_hz=[20, 30], duration=0.1, settings={"top.mass_kg": 25}),
+    ],
+)
+def test_a_mass_in_grams_is_such_a_warning(compute: Callable[[], object]) -> None:
+    with pytest.warns(DoubtWarning, match=r"Were grams meant\?  25 g are top.mass_kg = 0.025") as seen:
+        compute()
     assert [Path(one.filename).name for one in seen] == [Path(__file__).name]
 
 
