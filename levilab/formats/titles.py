@@ -106,12 +106,12 @@ _TIME_OF_TURNS = re.compile(
 #: A symbol after its name says nothing more, as in Zeit t, Drehzahl n.
 SYMBOLS = ("t", "f", "n", "nu", "ν", "omega", "ω", "z", "h", "b")
 # Titles that begin so hold something from which a frequency is yet to be worked out.
-_INVERSE, _OVER_TIME = (
+_INVERSE, OVER_TIME = (
     "say its unit in the title, as in period [ms]",
     "say in which time in the title, as in turns in 10 s",
 )
 NEARLY_FREQUENCIES = dict.fromkeys(("period", "periode", "période", "umlauf"), _INVERSE) | dict.fromkeys(
-    ("turns", "umdreh", "umdr", "rotations", "revolutions", "tours"), _OVER_TIME
+    ("turns", "umdreh", "umdr", "rotations", "revolutions", "tours"), OVER_TIME
 )
 # A bare "u" belongs to the spin frequency; the others need their quantity's name in it (u_z, z_err …).
 BARE_UNCERTAINTIES = (

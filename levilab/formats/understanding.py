@@ -37,6 +37,7 @@ from levilab.formats.titles import (
     LISTED,
     NEED_UNITS,
     OTHER_SENSORS,
+    OVER_TIME,
     QUANTITIES,
     Title,
     as_a_period,
@@ -475,7 +476,7 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
         )
     for name in needed:
         if name not in {column.name for column in chosen}:
-            raise no_column(path, name, header, _which_columns(layout, [name]))
+            raise _total_of_turns(path, name, layout) or no_column(path, name, header, _which_columns(layout, [name]))
     behind, notes = _behind(path, layout, chosen, quantities)
     chosen = tuple(sorted((*chosen, *behind), key=lambda column: CANONICAL.index(column.name)))
     return Plan(path, text, layout, header, chosen, part.own, (*warnings, *doubts, *notes))
@@ -551,6 +552,18 @@ def _in_one_word(columns: Iterable[str]) -> str:
 def _key(name: str) -> str:
     """Return the key of a canonical column in the option `columns`."""
     return next((short for short, long in SHORTHANDS.items() if long == name), name)
+
+
+def _total_of_turns(path: Path, name: str, layout: Layout) -> NoSuchColumn | None:
+    """Return the error for a table that has no spin but turns counted since the beginning, which only grow."""
+    for k, title in enumerate(layout.header if name == _SPIN else ()):
+        numbers = _numbers(layout, k)
+        if nearly_a_frequency(title) == OVER_TIME and len(numbers) > 2 and all(b > a for a, b in pairwise(numbers)):
+            what = f"'{shorten(title)}' only grows, as turns do that are counted since the beginning"
+            do = "write the mean spin between two readings, turns / time from the one to the other, as f [Hz] at the "
+            do += "middle of their times; in Python analyze(((t[1:] + t[:-1]) / 2, np.diff(n) / np.diff(t)))"
+            return NoSuchColumn(path, f"{what}: {do}; if each is of a time of its own, {OVER_TIME}")
+    return None
 
 
 def no_column(path: Path, name: str, header: Sequence[str], doubt: Doubt | None = None) -> NoSuchColumn:

@@ -374,6 +374,8 @@ def test_an_unreadable_file_is_reported(error, words, table_file, monkeypatch):
         ("t,period\n0,25\n1,26\n2,27\n", {}, "'period' could become one: say its unit in the title"),
         ("t,T\n0,25\n1,26\n2,27\n", {}, "if T is the time of a turn say its unit, as T [ms]"),
         ("t,turns\n0,400\n1,390\n2,380\n", {}, "say in which time in the title, as in turns in 10 s"),
+        ("t,Umdrehungen gezählt\n10,399\n20,785\n30,1156\n", {}, "write the mean spin between two readings"),
+        ("t,turns\n10,399\n20,785\n30,1156\n", {}, "np.diff(n) / np.diff(t)))"),
         ("t,spin (ms)\n0,25\n1,26\n2,27\n", {}, "column 'spin (ms)' is in ms, which is no unit of frequency: correct"),
         ("t,spin (ms)\n0,25\n1,26\n2,27\n", {"f": "2"}, "times of a turn call the column period [ms]"),
         ("t [V],f\n0,25\n1,26\n2,27\n", {"t": "1"}, "V, which is none of time: say which unit it is, as NAME [s]"),
