@@ -19,7 +19,7 @@ SpinDownKind = Literal[
     "no u",
     "understated",  # scatter in units of the stated u
     "overstated",  # the same
-    "few readings",  # the laws that no AICc compares; number of readings
+    "few readings",  # the laws that no AICc compares; number of readings, whether BIC compares them: 0 or 1
     "correlated",  # correlation, its u, number of readings
     # of several spin-downs
     "changed",  # number of the run from 1 on, number of runs, probability of such a change anywhere

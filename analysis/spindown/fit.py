@@ -338,7 +338,8 @@ def comparison_remarks(fits: Mapping[str, Statistics], best: str, *, mixed: bool
             said.append(Remark("overstated", best, values=ratio))
     undefined = [name for name, each in fits.items() if each.aicc is None]
     if undefined:
-        said += [Remark("few readings", name=", ".join(undefined), values=(fit.n,))]
+        by_bic = len(undefined) == len(fits) and fit.sigma_known
+        said += [Remark("few readings", name=", ".join(undefined), values=(fit.n, by_bic))]
     return said
 
 

@@ -17,7 +17,7 @@ from levilab.pipelines.budget import gate_of
 from levilab.pipelines.field.device import THESIS, inertias
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.readings import SpinReadings
-from levilab.pipelines.spindown.words import TILT_ALLOWED, is_seen, remark, verdict_of_all
+from levilab.pipelines.spindown.words import TILT_ALLOWED, is_seen, remark, verdict_in_doubt, verdict_of_all
 from levilab.present.numbers import enumeration
 
 if TYPE_CHECKING:
@@ -38,11 +38,15 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
     @property
     def text(self) -> str:
         """What the data say, in a few sentences."""
-        return verdict_of_all(self.combined, self.runs)
+        return verdict_in_doubt(self.combined) if self._is_doubtful else verdict_of_all(self.combined, self.runs)
+
+    @property
+    def _is_doubtful(self) -> bool:
+        return all(source.readings.doubtful for source in self.sources)
 
     def about_all(self) -> Iterable[str]:
         """Yield remarks on the means, on the laws that are not excluded, and on what was asked for."""
-        if all(source.readings.doubtful for source in self.sources):
+        if self._is_doubtful:
             return
         yield from (*map(remark, self.combined.remarks), *self._left_out(), *self._of_laws(self.combined.fits))
         if self.options.laws:

@@ -171,6 +171,12 @@ def verdict_of_all(found: Combined, runs: Sequence[SpinDown]) -> str:
     return _verdict(found, found.fits, {fit.name: fit.constants for fit in found.fits}, found.tilt, runs)
 
 
+def verdict_in_doubt(found: Combined) -> str:
+    """Return what all runs say about the laws where no unit is sure."""
+    said = "The unit comes first: as it was read the {law} law is nearest, with constants as wrong as it."
+    return Text(said, law=law_names([found.best]))
+
+
 def is_seen(tilt: Estimate | None) -> bool:
     """Return whether readings show a tilt of the moment, and not only what was known of it beforehand."""
     return tilt is not None and tilt.value is not None and bool(tilt.u) and tilt.value > SEEN * (tilt.u or 0.0)
@@ -437,7 +443,11 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyT
             times=digits(of.values[0]),
         ),
         "few readings": lambda of: Text(
-            "{n:.0f} readings are too few to compare {laws} by AICc: record more readings", n=of.values[0], laws=of.name
+            "{n:.0f} readings are too few for AICc: BIC compares the laws, as sure as the stated uncertainties are"
+            if of.values[1]
+            else "{n:.0f} readings are too few to compare {laws} by AICc: record more readings",
+            n=of.values[0],
+            laws=of.name,
         ),
         "correlated": lambda of: Text(
             "neighbouring residuals resemble each other: their correlation is {r:.2f} ± {u:.2f}, so {n:.0f} readings "

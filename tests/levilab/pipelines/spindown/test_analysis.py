@@ -177,12 +177,26 @@ def test_another_unit_taken_for_hertz_is_doubted(tmp_path, unit, factor):
         SPINDOWN.analyze([path], SpinDownOptions())
     assert error.value.doubt.choices[0].columns == {"t": "1", "f": f"2 [{unit}]"}
     np.savetxt(path, np.c_[t, factor * nu], delimiter=",", header="t,f [Hz]", comments="")
-    (source,) = SPINDOWN.analyze([path], SpinDownOptions()).sources  # stated: a note
+    found = SPINDOWN.analyze([path], SpinDownOptions())  # stated: a note
+    (source,) = found.sources
     assert source.readings.doubtful
+    assert found.text.startswith("The unit comes first: as it was read the")  # and no "fits best … known to"
     assert f"f=NAME [{unit}]" in source.warnings[0]
     stated = SPINDOWN.analyze([path], SpinDownOptions(columns={"t": "t", "f": f"f [{unit}]"}))
     assert stated.runs[0].frequency[0] == pytest.approx(40, abs=0.1)
     assert not stated.sources[0].readings.doubtful
+
+
+@pytest.mark.parametrize(("u", "compared"), [(0.001, "BIC compares the laws"), (None, "too few to compare")])
+def test_few_readings_are_compared_as_their_note_says(tmp_path, u, compared):
+    """Exact falls of the disc law: their verdict excludes laws where u is stated alone, and the note says by what."""
+    t = np.array([0.0, 30.0, 60.0, 90.0])
+    path = tmp_path / "four.csv"
+    np.savetxt(path, np.c_[t, 39.93 / (1 + 1.87e-3 * t) ** 2], fmt="%.3f", delimiter=",", header="t,f", comments="")
+    found = SPINDOWN.analyze([path], SpinDownOptions(reading_u=u))
+    assert ("exclude" in found.text) == (u is not None)
+    (note,) = (note for note in found.all_warnings if "4 readings" in note)
+    assert compared in note
 
 
 def test_hertz_taken_for_another_unit_are_doubted(tmp_path):
