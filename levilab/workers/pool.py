@@ -13,6 +13,7 @@ import os
 import sys
 import threading
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import resource_tracker
 from multiprocessing.context import SpawnContext, SpawnProcess
 from types import ModuleType
@@ -40,6 +41,14 @@ class Pool(ProcessPoolExecutor):
 
     def __init__(self, count: int) -> None:
         super().__init__(count, mp_context=_Context(), initializer=_begin)
+
+    def check(self) -> None:
+        """Raise BrokenProcessPool if a process died.
+
+        Until Python 3.12 a future that is submitted at that very moment is never ended, and so never learns it.
+        """
+        if broken := getattr(self, "_broken", False):  # no public attribute tells it
+            raise BrokenProcessPool(str(broken))
 
     def end_at_once(self) -> None:
         """End all worker processes at once, in the middle of their tasks."""

@@ -6,7 +6,7 @@ import contextlib
 import itertools
 import queue
 from collections import deque
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -31,6 +31,8 @@ MAX_BREAKS_IN_COMPANY = 2
 MAX_FRUITLESS_POOLS = 5
 #: Interval at which a waiting caller wakes up [s]: on Windows Ctrl-C does not end a wait.
 WAKE_UP_S = 0.25
+#: Time in which a pool that broke ends its futures [s]; one that it forgets (`Pool.check`) is of a task to start again.
+_END_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -234,9 +236,10 @@ def _after_a_break(
 ) -> Iterator[Done[T, Any]]:
     """Yield the results from before the pool broke, and queue the other tasks again."""
     lost = []
+    wait(under_way, timeout=_END_S)
     for future, attempt in under_way.items():
         try:
-            outcome = _outcome_of(future, pool, executor)  # waits: the pool gives every future its end
+            outcome = _outcome_of(future, pool, executor) if future.done() else None
         except BrokenExecutor:
             outcome = None
         if outcome is None:

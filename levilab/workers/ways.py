@@ -86,7 +86,7 @@ def processes(count: int | None = None) -> Workers:
         UsageError: the count makes no sense.
     """
     number = min(_count_of(count), MAX_PROCESSES)
-    return Workers(partial(Pool, number), number, "worker processes", end_at_once=Pool.end_at_once)
+    return Workers(partial(Pool, number), number, "worker processes", end_at_once=Pool.end_at_once, check=Pool.check)
 
 
 def cores() -> int:

@@ -9,12 +9,13 @@ import signal
 import subprocess
 import sys
 import threading
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 
 import pytest
 
 from levilab.errors import LevilabError, UsageError, WorkersLost
-from levilab.workers import Workers, packing, processes, results_of, this_process, threads
+from levilab.workers import Workers, packing, processes, results, results_of, this_process, threads
+from levilab.workers.pool import Pool
 from support import tasks
 from support.worker_sockets import DEADLINE_S, assert_dead, listening, worker_at_work
 
@@ -129,6 +130,41 @@ def test_a_task_that_kills_its_worker_is_an_error_and_the_others_are_done():
 def test_workers_that_always_die_end_the_work():
     with pytest.raises(WorkersLost, match="died 5 times in a row before one gave a result"):
         list(results_of(tasks.die_at_three, [3] * 20, processes(1)))
+
+
+@pytest.mark.parametrize("forgotten", [1, 2])
+def test_futures_that_a_broken_pool_forgets_are_submitted_again(forgotten, monkeypatch):
+    monkeypatch.setattr(results, "_END_S", 0.05)
+    opened = []
+
+    class Forgetful(ThreadPoolExecutor):
+        """The first of them gives no end to the last of its tasks, and says that it is broken when it is asked."""
+
+        def __init__(self):
+            super().__init__(1)
+            opened.append(self)
+
+        def submit(self, *call):
+            self.given = getattr(self, "given", 0) + 1
+            return Future() if self is opened[0] and self.given > 2 - forgotten else super().submit(*call)
+
+        def check(self):
+            if self is opened[0]:
+                raise BrokenExecutor("a process died")
+
+    ways = Workers(Forgetful, 1, elsewhere=False, in_flight=2, check=Forgetful.check)
+    found = sorted(done.result for done in results_of(tasks.noise, range(2), ways))
+    assert found == sorted(tasks.noise(n) for n in range(2))
+    assert len(opened) == 2
+
+
+def test_a_pool_whose_process_died_says_so_when_it_is_asked():
+    with Pool(1) as pool:
+        pool.check()
+        with pytest.raises(BrokenExecutor):
+            pool.submit(tasks.die_at_three, 3).result()
+        with pytest.raises(BrokenExecutor):
+            pool.check()
 
 
 def test_ctrl_c_ends_workers_in_the_middle_of_a_task():
