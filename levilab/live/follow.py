@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import time
 from collections import deque
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,7 @@ from levilab.runs.run import EVENTS, READINGS, Run, RunRecord
 from levilab.texts.text import text_from
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
     from pathlib import Path
 
     from numpy.typing import NDArray
@@ -173,10 +174,10 @@ def _event(line: bytes, number: int) -> dict[str, Any]:
         event = json.loads(line)
         time_s, kind, text = event["time_s"], str(event["kind"]), str(event["text"])
         time_s = float(time_s) if time_s is not None else None
-        utc, top, frequency = str(event.get("utc", "")), event.get("top"), event.get("frequency_hz")
-        text = text_from(event.get("says"), text)
+        utc, top = str(event.get("utc", "")), event.get("top")
+        text, release = text_from(event.get("says"), text), _release_in(event)
     except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
-        time_s, kind, text, utc, top, frequency = None, "damaged", "a line of events.jsonl is damaged", "", None, None
+        time_s, kind, text, utc, top, release = None, "damaged", "a line of events.jsonl is damaged", "", None, {}
     if time_s is not None and not np.isfinite(time_s):
         time_s = None
     shown = {
@@ -185,10 +186,11 @@ def _event(line: bytes, number: int) -> dict[str, Any]:
         "kind": kind[:60],
         "text": text if len(text) <= _MOST_CHARACTERS else text[:_MOST_CHARACTERS],
     }
-    known = isinstance(frequency, float) and np.isfinite(frequency)
-    return {
-        "n": number,
-        **shown,
-        "top": top if isinstance(top, int) else None,
-        "frequency_hz": frequency if known else None,
-    }
+    return {"n": number, **shown, "top": top if isinstance(top, int) else None, **release}
+
+
+def _release_in(event: Mapping[str, Any]) -> dict[str, float]:
+    """Return the numbers of an event that the running fit needs (`release_of`).  Raises OverflowError."""
+    numbers = {name: event.get(name) for name in ("frequency_hz", "driven_s")}
+    known = {name: float(value) for name, value in numbers.items() if isinstance(value, int | float)}
+    return {name: value for name, value in known.items() if math.isfinite(value)}

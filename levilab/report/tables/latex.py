@@ -167,7 +167,7 @@ def to_latex(text: str) -> str:
     r"""Return a plain text as LaTeX, in ASCII.
 
     >>> to_latex("50 % of {x}_1 & \\input{a}")
-    '50 \\% of \\{x\\}\\_1 \\& \\textbackslash{}input\\{a\\}'
+    '50~\\% of \\{x\\}\\_1 \\& \\textbackslash{}input\\{a\\}'
     >>> to_latex("3.2(1)×10⁻³, ν_r, é and 中")
     '3.2(1)$\\times$10\\textsuperscript{$-$3}, $\\nu$\\raisebox{-.4ex}{\\scriptsize r}, e and ?'
     """

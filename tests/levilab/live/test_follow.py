@@ -1,5 +1,6 @@
 """A run folder read as it grows: torn lines, replaced files, and a memory that does not grow with it."""
 
+import json
 import os
 import sys
 import tracemalloc
@@ -9,9 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from analysis.spindown.tilt import Release
 from levilab.live.envelope import GROUPS, LATEST, Envelope, by_columns
 from levilab.live.follow import MOST_EVENTS, Followed
 from levilab.live.tail import Tail
+from levilab.pipelines.spindown.readings import release_of
 from support.live_pages import GrowingRun, spin_down
 
 
@@ -103,7 +106,16 @@ def test_events_are_kept_up_to_a_number_and_damaged_ones_named(tmp_path):
     assert len(followed.events) == MOST_EVENTS
     texts = followed.texts_after(followed.event_count - 3)
     assert [event["kind"] for event in texts] == ["damaged", "damaged", "drive on"]
-    assert (len(texts[-1]["text"]), texts[-1]["frequency_hz"]) == (600, 29.4)  # the running fit needs the frequency
+    assert (len(texts[-1]["text"]), texts[-1]["frequency_hz"]) == (600, 29.4)
+
+
+def test_the_running_fit_knows_the_release_of_a_run_as_its_analysis_does(tmp_path):
+    run = GrowingRun(tmp_path)
+    run.event("drive on", kind="drive on", frequency_hz=30)
+    run.event("drive off", kind="drive off", driven_s=240.0)
+    followed = look(Followed(run.folder))
+    lines = (run.folder / "events.jsonl").read_text("utf-8").splitlines()
+    assert release_of(followed.events) == release_of(map(json.loads, lines)) == Release(30.0, 240.0)
 
 
 def test_a_run_whose_process_is_gone_is_interrupted(tmp_path):

@@ -216,7 +216,7 @@ REFUSED = [
     ("top.mass_kg='1'", "top.mass_kg = '1': a number is expected"),
     ("top.mass_kg=0,025", "a number is expected; write a decimal point, not a comma"),
     ("drag.coefficient=2s", "for the law mixed; write the number without its unit"),
-    ("start.spin_hz=30kg", "a number is expected; write the number without its unit, which is in the key's name"),
+    ("start.spin_hz=30kg", "a number in Hz, kHz, MHz, mHz, μHz, rpm, rad/s or °/s is expected"),
     ("start.spin_hz=3e1 turns/s", "without its unit"),
     ("top.mass_kg=true", "top.mass_kg = 'True': a number is expected"),
     ("top.mass_kg=inf", "finite number"),

@@ -68,7 +68,6 @@ def test_a_spreadsheet_has_a_sheet_for_each_table_and_no_formula_of_a_person(tmp
 
 
 def test_hdf5_is_opened_by_xarray_with_what_the_extra_brings(tmp_path):
-    pytest.importorskip("h5netcdf")
     written(RUN, tmp_path / "run.h5")
     with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as data:
         assert data["spin_frequency_hz"].sel(time_s=190.0).item() == 21.75

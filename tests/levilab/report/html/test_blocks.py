@@ -75,7 +75,7 @@ def test_points_that_a_figure_does_not_have_one_by_one_answer_nothing():
 
 def test_units_are_typeset_and_code_is_not():
     shown = fragment_of([Paragraph("C₃/₂ = 2.4×10⁻⁴ (rad/s)^−½/s, -3 Hz"), Code("x^−½ -3")])
-    assert "C<sub>3/2</sub> = 2.4×10<sup>−4</sup> (rad/s)<sup>−½</sup>/s, −3 Hz" in shown
+    assert "C<sub>3/2</sub> = 2.4×10<sup>−4</sup> (rad/s)<sup>−½</sup>/s, −3\u00a0Hz" in shown
     assert "x^−½ -3" in shown
 
 
