@@ -133,8 +133,8 @@ class CountedLaw:
 
     The additional parameters are A, tan²θ at the last reading by linear theory, and a, by which the last reading
     stands above the resonance, x = 1 + exp(a): these two hardly depend on each other, δ and ν_r do.
-    The third is K/ν_ref beyond that of a release.  κ, β and SHARE follow; κ and β keep the values that are expected, and
-    only add to uncertainties.
+    The third is K/ν_ref beyond that of a release.  κ, β and SHARE follow; κ and β keep the values that are expected,
+    and only add to uncertainties.
 
     Attributes:
         law: of the drag.

@@ -130,8 +130,8 @@ def advance(  # noqa: C901
     """Integrate runs of one top at once, each from stop to stop with steps of its own, in the lanes of one register.
 
     width: a number for each lane; their count is a constant for the compiler, which must see that the rows of a block
-    do not overlap; starts: state at the first stop of each run, shape (runs, 18); stops: of all runs; drifts, kicks: the
-    composition's coefficients; states: at the stops, shape (n, 18).
+    do not overlap; starts: state at the first stop of each run, shape (runs, 18); stops: of all runs; drifts, kicks:
+    the composition's coefficients; states: at the stops, shape (n, 18).
 
     Returns the stop that each run has reached.  A state that is no number counts as outside of the escape.  When the
     first run escapes, the others end, too.

@@ -40,7 +40,7 @@ def test_every_top_moves_as_it_does_alone(kind):
 @pytest.mark.parametrize("order", [4, 6, 8])
 @pytest.mark.parametrize("longer", [2.5, 3.1, 4.0])
 def test_an_error_of_the_schemes_order_is_known_from_runs_at_any_length(order, longer):
-    # results c·lengthᵖ: the error at length 1 is c, and the estimate the factor of safety times the last difference over 2ᵖ
+    # results c·lengthᵖ: the error at length 1 is c, the estimate SAFETY_FACTOR times the last difference over 2ᵖ
     ends = [np.array([2e-9 * length**order, 0.0, 0.0]) for length in (1.0, 2.0, longer)]
     found = estimate(*ends, order, longer)
     assert found == pytest.approx(SAFETY_FACTOR * 2e-9 * (1 - 2.0**-order))
