@@ -2,6 +2,7 @@
 
 import codecs
 import os
+import re
 import sys
 from importlib import import_module
 from typing import Annotated, Any, NamedTuple, NoReturn
@@ -83,10 +84,14 @@ def explain_bad_value(text: str, seen: object = None) -> str:
     'a number greater than or equal to 10 is expected'
     >>> explain_bad_value("Value error, '5kg': a number in s, ms or h is expected", "5kg")
     "'5kg': a number in s, ms or h is expected"
+    >>> explain_bad_value("Value error, 'off' is not one of 'auto', 'none', 'fitted'.")
+    "'off' is not one of 'auto', 'none', 'fitted'. Did you mean none?"
     """
     from levilab.settings import explain_message, hint_about  # with pydantic
 
     said = explain_message(text)
+    if re.match(r"'(?:off|no|false|0)' is not one of .*'none'", said):
+        return f"{said} Did you mean none?"
     if not said.endswith(" is expected") or said.startswith(repr(seen)):
         return said
     return (f"{seen!r}: " if seen is not None else "") + said + hint_about(seen, ", which --help names")

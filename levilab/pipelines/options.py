@@ -359,6 +359,10 @@ def typed_name(name: str) -> str:
     return OPTIONS[name].typed or name
 
 
+#: What people write for none.
+_OFF = ("none", "false", "off", "no")
+
+
 def read_options(given: Mapping[str, Any], *, typed: bool = False) -> dict[str, Any]:
     """Return options as analyses take them, without those that are None.
 
@@ -374,9 +378,10 @@ def read_options(given: Mapping[str, Any], *, typed: bool = False) -> dict[str, 
     found: dict[str, Any] = {}
     for shown, value in given.items():
         one = OPTIONS[names[shown]]
-        if value is None and not typed and "none" in one.choices:  # which reads as if it were this choice
+        off = value != "none" and str(value).casefold() in _OFF
+        if off and not typed and "none" in one.choices:
             others = " or ".join(repr(choice) for choice in one.choices if choice != "none")
-            raise UsageError(shown, f"'none' in quotation marks is expected, or {others}", value="None")
+            raise UsageError(shown, f"'none' in quotation marks is expected, or {others}", value=str(value))
         if value is None:
             continue
         if one.needs and given.get(typed_name(one.needs) if typed else one.needs) is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import re
 from pathlib import Path
 
 from levilab.errors import DataError
@@ -60,6 +61,9 @@ def _identity(folder: str) -> object:
 
 def no_such_path(path: Path) -> DataError:
     """Return the error for a path that does not exist, with a name beside it that is nearly the same."""
+    if re.fullmatch(r"\[[^\[\]]+\]", str(path)):
+        said = '{unit:s}: is no path; a unit stands with its column in quotation marks: `columns` = "f=2 {unit:s}"'
+        return DataError(Text(said, unit=path))
     folder = next(place for place in (path.parent, *path.parent.parents) if place.is_dir())
     wanted = path.relative_to(folder).parts[0] if folder != path.parent else path.name
     near = difflib.get_close_matches(wanted, sorted(one.name for one in folder.iterdir()), n=1, cutoff=0.8)

@@ -111,6 +111,7 @@ FAILURES = {
     f"analyze spindown {LIMITS}": f"spindown needs a spin run; levilab analyze limit {LIMITS} reads it",
     f"analyze limit {SCOPE}": f"levilab analyze spin {SCOPE} reads it",
     "analyze spindown nowhere": "nowhere: there is no such file or folder in ",
+    "analyze spindown --columns f=2 [rpm]": 'in quotation marks: --columns "f=2 [rpm]"',
     "analyze spindown bench.tml": "did you mean bench.toml?",
     f"report {SAMPLE} -o file/page.html": "could not be written",
     "analyze spindown .": "an empty file (file: record again)",

@@ -251,6 +251,7 @@ REFUSED = {
     "swept.sel(spin_hz=24)": "method='nearest': start.spin_hz = 20.0, 30.0",
     "swept.sel(spin=20)": "start.spin_hz = 20.0, 30.0",
     "levilab.runs(folder / 'none')": "there is no such folder",
+    "levilab.analyze((t, f), tilt=False)": "tilt = False: 'none' in quotation marks is expected, or 'auto' or 'fitted'",
     "levilab.analyze((t, f), tilt=None)": "tilt = None: 'none' in quotation marks is expected, or 'auto' or 'fitted'",
     "levilab.analyze(frame, columns=['a', 'b'])": 'as {"t": "Zeit", "f": 3}',
     "levilab.analyze((t, f), weights=1 / 0.03)": "take reading_u, the standard uncertainty, 1/weights",
