@@ -96,25 +96,34 @@ def _turns_per_burst(length: float, jitter: float) -> float:
     return 1 + sum(0.5 * math.erfc((k - length) / spread) for k in later)
 
 
-def gated_starts(start: float, stop: float, period: float, closes: Array, opens: Array) -> Array:
-    """Return when cycles start behind a gate that pulses close: a cycle ends, and the next one waits for an open gate.
+def gated_trains(start: float, period: float, closes: Array, opens: Array) -> tuple[Array, Array]:
+    """Return the trains of cycles behind a gate that pulses close: a cycle ends, and the next one waits for the gate.
 
     Args:
         start: of the first cycle [s].
-        stop: of the last one, at most [s].
         period: of a cycle [s].
         closes: when pulses close the gate, shape (n,), increasing [s].
-        opens: when they open it again, shape (m,), increasing [s].
+        opens: when they open it again, shape (m,), increasing [s]; before the first closing: of a pulse under way.
 
-    >>> gated_starts(0.0, 3.5, 1.0, np.array([1.2, 1.9]), np.array([1.4, 2.5])).tolist()
-    [0.0, 1.0, 2.5, 3.5]
+    Returns:
+        When trains start and when they end [s], shape (k,) each; the last one has no end yet, ∞.
+
+    >>> starts, ends = gated_trains(0.0, 1.0, np.array([1.2, 1.9]), np.array([1.4, 2.5]))
+    >>> starts.tolist(), ends.tolist()
+    ([0.0, 2.5], [2.0, inf])
+    >>> gated_trains(0.0, 1.0, np.array([1.7]), np.array([1.5, 2.6]))[0].tolist()
+    [0.0, 1.5, 2.6]
     """
-    starts = [start]
-    while (end := starts[-1] + period) <= stop:
-        closed = np.searchsorted(closes, end, side="right") > np.searchsorted(opens, end, side="right")
-        later = opens[opens > end]
-        starts.append((float(later[0]) if later.size else np.inf) if closed else end)
-    return np.array([one for one in starts if one <= stop])
+    opens = np.append(opens[opens > start], np.inf)
+    if opens[0] < closes.min(initial=np.inf):
+        closes = np.append(start, closes)
+    starts, ends = [start], []
+    for close, again in zip(closes.tolist(), opens[np.searchsorted(opens, closes, side="right")].tolist(), strict=True):
+        end = starts[-1] + period * max(math.ceil((close - starts[-1]) / period), 1)
+        if end < again:
+            ends.append(end)
+            starts.append(again)
+    return np.array(starts), np.array([*ends, np.inf])
 
 
 def burst_starts(edges: Array, length: float) -> Array:

@@ -4,29 +4,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from instruments.virtual.generator.channel import Output
 from instruments.virtual.generator.voltage import voltage
-from levilab.world.bursts import burst_starts, gated_starts
+from levilab.world.bursts import burst_starts, gated_trains
 from levilab.world.timeline import Timeline
 
 Array = NDArray[np.float64]
-#: Cycles after which it does not matter any more when a gate that pulses close was opened.
-_REMEMBERED = 100
 Edges = Callable[[float, float, bool], Array]
 
 
 @dataclass(frozen=True)
 class _Stretch:
-    """From some time on.  output: amplitude and offset in T; origin [s]: when its phase was turns."""
+    """From some time on.
+
+    Attributes:
+        output: amplitude and offset in T.
+        origin: when its phase was turns [s].
+        cycles: behind a gate: at each time that was asked for, the start of the cycle under way, or of the last one
+            [s]: a cycle's place depends on all pulses before.
+    """
 
     output: Output
     origin: float
     turns: float
+    cycles: Timeline[float] = field(default_factory=lambda: Timeline(-math.inf, -math.inf), compare=False)
 
     def field(self, times: Array, edges: Edges | None) -> Array:
         """Return the field at times within it [T]."""
@@ -59,13 +65,17 @@ class _Stretch:
 
     def _gated_field(self, times: Array, edges: Edges) -> Array:
         """Return the field of cycles behind a gate that pulses at the trigger input close."""
-        rate, delay, last = self.output.frequency, self.output.closes or 0.0, float(times[-1])
-        before = max(self.origin, float(times[0]) - _REMEMBERED / rate)
-        first = before - (self.turns + rate * (before - self.origin)) % 1.0 / rate
-        closes, opens = (edges(max(first, self.origin), last, rising) + delay for rising in (True, False))
-        starts = gated_starts(first, last, 1 / rate, closes, opens)
-        turns = rate * (times - starts[np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)])
-        return np.where(turns < 1, voltage(self.output, turns, times), self.output.offset)
+        rate, delay, first = self.output.frequency, self.output.closes or 0.0, float(times[0])
+        start = max(self.cycles.at(first), self.origin - self.turns % 1.0 / rate)
+        since, last = max(start, self.origin) - delay, float(times[-1])
+        closes, opens = (edges(since, last, rising) + delay for rising in (True, False))
+        starts, ends = gated_trains(start, 1 / rate, closes, opens)
+        train = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
+        begun, until = float(starts[train[0]]), min(first, float(ends[train[0]]))
+        self.cycles.cut(first)
+        self.cycles.append(first, begun + max(math.ceil((until - begun) * rate - 1e-9) - 1, 0) / rate)
+        signal = voltage(self.output, rate * (times - starts[train]), times)
+        return np.where(times < ends[train], signal, self.output.offset)
 
 
 class Coil:
