@@ -167,6 +167,11 @@ class InputOptions:
     guess: bool = True
     near: float | None = None
 
+    @property
+    def of_tables(self) -> dict[str, Any]:
+        """The arguments of `levilab.formats.table.read_table` that are options."""
+        return {name: getattr(self, name) for name in ("columns", "guess", "skip_doubtful")}
+
 
 @dataclass(frozen=True)
 class RecordOptions(InputOptions):

@@ -105,14 +105,7 @@ NEEDED = ("height_m", "flux_density_t")
 
 def read_scan_file(path: Path, options: InputOptions) -> FieldReadings:
     """Return the scan in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
-    table = read_table(
-        path,
-        columns=options.columns,
-        quantities=QUANTITIES,
-        needed=NEEDED,
-        guess=options.guess,
-        skip_doubtful=options.skip_doubtful,
-    )
+    table = read_table(path, quantities=QUANTITIES, needed=NEEDED, **options.of_tables)
     return field_readings(table)
 
 

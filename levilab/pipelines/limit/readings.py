@@ -72,14 +72,7 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
     if field:
         return limits_in_field(path, field, options.near)
     try:
-        table = read_table(
-            path,
-            columns=options.columns,
-            quantities=(_TIME, *QUANTITIES),
-            needed=QUANTITIES[:1],
-            guess=options.guess,
-            skip_doubtful=options.skip_doubtful,
-        )
+        table = read_table(path, quantities=(_TIME, *QUANTITIES), needed=QUANTITIES[:1], **options.of_tables)
     except (NoTable, NoSuchColumn) as error:
         single = _single_column(path, guess=options.guess)
         if single is None:

@@ -70,14 +70,7 @@ class SweepReadings(Readings):
 
 def read_sweep_file(path: Path, options: InputOptions) -> SweepReadings:
     """Return the sweep in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
-    table = read_table(
-        path,
-        columns=options.columns,
-        quantities=QUANTITIES,
-        needed=NEEDED,
-        guess=options.guess,
-        skip_doubtful=options.skip_doubtful,
-    )
+    table = read_table(path, quantities=QUANTITIES, needed=NEEDED, **options.of_tables)
     return sweep_readings(table)
 
 

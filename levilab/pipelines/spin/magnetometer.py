@@ -80,14 +80,7 @@ def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
     needed = _needed(path, options)
     if needed is None:
         return None
-    table = read_table(
-        path,
-        columns=options.columns,
-        quantities=QUANTITIES,
-        needed=needed,
-        guess=False,
-        skip_doubtful=options.skip_doubtful,
-    )
+    table = read_table(path, quantities=QUANTITIES, needed=needed, **options.of_tables | {"guess": False})
     axes = {name: name[-3] for name in COMPONENTS if name in table.columns}
     if COMPONENTS[2] not in axes and "flux_density_t" in table.columns:
         axes["flux_density_t"] = "z"

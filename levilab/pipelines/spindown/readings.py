@@ -145,14 +145,7 @@ def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings
 
 
 def _read_spin_table(path: "Path", options: "InputOptions") -> Table:
-    table = read_table(
-        path,
-        columns=options.columns,
-        quantities=QUANTITIES,
-        needed=QUANTITIES[:2],
-        guess=options.guess,
-        skip_doubtful=options.skip_doubtful,
-    )
+    table = read_table(path, quantities=QUANTITIES, needed=QUANTITIES[:2], **options.of_tables)
     if options.channel is not None:
         note = f"{path.name}: is a table of readings and has no channels: `columns` chooses its columns"
         table = replace(table, warnings=(of_file("no channels", note), *table.warnings))

@@ -64,14 +64,7 @@ class SwayReadings(Readings):
 def read_track_file(path: Path, options: InputOptions) -> SwayReadings:
     """Return the track in a data file.  Raises DoesNotSuit for another table, DataError for what cannot be used."""
     try:
-        table = read_table(
-            path,
-            columns=options.columns,
-            quantities=QUANTITIES,
-            needed=NEEDED,
-            guess=False,
-            skip_doubtful=options.skip_doubtful,
-        )
+        table = read_table(path, quantities=QUANTITIES, needed=NEEDED, **options.of_tables | {"guess": False})
     except NoSuchColumn as missing:
         raise (_field_alone(path) or missing) from None
     readings = _readings(table)
