@@ -202,7 +202,7 @@ def _read_lines(
             row = _row(path, layout, chosen, number, line)
         except TableError as error:
             refused.append((error, line))
-            if len(refused) > _MOST_REFUSED:
+            if len(refused) > _MOST_REFUSED and not skip_doubtful:
                 break
             continue
         time = time or _time_in(layout, chosen, line)

@@ -187,15 +187,17 @@ def parse_columns(given: object) -> dict[str, str]:
     else:
         expected = 'names of quantities with their columns are expected, as {"t": "Zeit", "f": 3} or "t=Zeit,f=3"'
         raise ColumnsError("columns", expected, value=given)
-    found = dict(parts)
-    if len(found) < len(parts) or not all(name and title for name, title in parts):
+    keys = [key_of(name) for name, _ in parts]
+    quantities = [SHORTHANDS.get(key, key) for key in keys if key]
+    if len({*quantities}) < len(quantities) or not all(name and title for name, title in parts):
         expected = "NAME=COLUMN,NAME=COLUMN is expected, each NAME once, as t=Zeit,f=3"
         raise ColumnsError("columns", expected, value=f"'{shorten(str(given))}'")
-    unknown = [name for name in found if key_of(name) is None]
-    if unknown:
-        what = f"'{shorten(unknown[0])}' is no quantity known here; {', '.join(SHORTHANDS)} are, as t=Zeit,f=3"
-        raise ColumnsError("columns", what)
-    return {key_of(name) or name: title for name, title in found.items()}
+    if None in keys:
+        unknown = shorten(parts[keys.index(None)][0])
+        raise ColumnsError(
+            "columns", f"'{unknown}' is no quantity known here; {', '.join(SHORTHANDS)} are, as t=Zeit,f=3"
+        )
+    return {key: title for key, (_, title) in zip(keys, parts, strict=True) if key}
 
 
 @contextmanager

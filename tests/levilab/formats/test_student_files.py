@@ -119,6 +119,8 @@ def test_rows_that_a_person_doubts_are_left_out_on_request_and_named(tmp_path):
     table = read_table(path, skip_doubtful=True)
     assert table.column("time_s").tolist() == [0, 10, 40, 50]
     assert "2 doubtful rows are left out, as asked: lines 4, 5" in " ".join(table.warnings)
+    path.write_text("t,f\n" + "".join(f"{t},40\n{t},40?\n" for t in range(1002)), encoding="utf-8")
+    assert len(read_table(path, skip_doubtful=True)) == 1002  # beyond the lines after which an error ends the reading
 
 
 def test_a_line_with_bytes_that_are_no_text_is_left_out_with_its_number(tmp_path):

@@ -459,7 +459,7 @@ def test_the_columns_option_is_read_and_its_mistakes_are_wrong_usage():
     assert parse_columns("time=Zeit t frequency=2") == {"t": "Zeit t", "f": "2"}
     assert parse_columns({"Time": "a", "rpm": 2}) == {"t": "a", "f": "2"}
     assert parse_columns("t=1,spin_frequency_hz=f = 2, s") == {"t": "1", F: "f = 2, s"}
-    for text in ("t", "t=", "=1", "t=1,t=2", "t:1,f:2"):
+    for text in ("t", "t=", "=1", "t=1,t=2", "t:1,f:2", "f=1,Frequency=2", "t=1,time_s=2"):
         with pytest.raises(ColumnsError, match="NAME=COLUMN"):
             parse_columns(text)
     with pytest.raises(UsageError, match="no quantity known"):
