@@ -251,7 +251,7 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
         for which in ("lower", "upper"):
             texts = [group.conditions_text for group in self.groups if group.which == which]
             if len(texts) > 1:
-                several = "the {which} limits are of {n} conditions and are not put together: {conditions}"
+                several = "the {which} limits are of {n} conditions and are not combined: {conditions}"
                 yield Text(several, which=which, n=len(texts), conditions=tuple(texts))
         for group in self.groups:
             if len(group.runs) > 1:

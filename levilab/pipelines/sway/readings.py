@@ -14,6 +14,7 @@ from levilab.formats.understanding import Request, plan_of
 from levilab.pipelines.options import SwayOptions
 from levilab.pipelines.sources import Readings
 from levilab.runs.run import STATES
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -69,8 +70,7 @@ def read_track_file(path: Path, options: InputOptions) -> SwayReadings:
         raise (_field_alone(path) or missing) from None
     readings = _readings(table)
     readings = readings if readings.spin is not None else _with_spin_beside(path, readings)
-    side = options.side if isinstance(options, SwayOptions) else None
-    return _with_heights(path, readings, side) if side else readings
+    return _with_heights(path, readings, options)
 
 
 def _field_alone(path: Path) -> NoSuchColumn | None:
@@ -96,8 +96,11 @@ def _with_spin_beside(path: Path, readings: SwayReadings) -> SwayReadings:
     return _with_spin(readings, table)
 
 
-def _with_heights(path: Path, readings: SwayReadings, side: Path) -> SwayReadings:
+def _with_heights(path: Path, readings: SwayReadings, options: InputOptions) -> SwayReadings:
     """Return the part of a track for which a film from beside has the heights; a spin that falls tells both clocks."""
+    side = options.side if isinstance(options, SwayOptions) else None
+    if side is None:
+        return readings
     of_side = read_table(side, quantities=_SIDE, needed=_SIDE)
     time, height, spin = (of_side.column(name) for name in _SIDE)
     if readings.spin is None or not np.ptp(readings.spin) > _FALLS_HZ:
@@ -110,9 +113,14 @@ def _with_heights(path: Path, readings: SwayReadings, side: Path) -> SwayReading
     late = float(np.median(np.interp(-spin[met], -falls(even), even) - time[met]))
     both = (readings.time >= time[0] + late) & (readings.time <= time[-1] + late)
     part = {name: getattr(readings, name)[both] for name in ("time", "x", "y", "spin")}
-    told = f"{side.name} begins at {time[0] + late:.2f} s of {path.name}, by the spin, and gives its heights"
+    note = Text(
+        "{side:s} begins at {start:.2f} s of {track:s}, by the spin, and gives its heights",
+        side=side.name,
+        start=time[0] + late,
+        track=path.name,
+    )
     height = np.interp(part["time"], time + late, height)
-    return replace(readings, **part, height=height, warnings=(*readings.warnings, told))
+    return replace(readings, **part, height=height, warnings=(*readings.warnings, note))
 
 
 def _with_spin(readings: SwayReadings, table: Table) -> SwayReadings:
@@ -122,10 +130,11 @@ def _with_spin(readings: SwayReadings, table: Table) -> SwayReadings:
     return replace(readings, spin=spin, warnings=(*readings.warnings, *table.warnings))
 
 
-def read_motion_run(run: Run, _: InputOptions) -> SwayReadings:
+def read_motion_run(run: Run, options: InputOptions) -> SwayReadings:
     """Return the track of a film with the counter's spins, or of a simulated motion."""
     readings = _readings(read_run_readings(run.folder / STATES, QUANTITIES))
-    return readings if readings.spin is not None else _with_spin(readings, run.readings())
+    readings = readings if readings.spin is not None else _with_spin(readings, run.readings())
+    return _with_heights(run.folder, readings, options)
 
 
 def _readings(table: Table) -> SwayReadings:

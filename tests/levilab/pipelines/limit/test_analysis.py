@@ -124,7 +124,7 @@ def test_measured_and_made_up_runs_are_never_one_mean(sample_data, tmp_path):
     (measured,) = (group for group in analysis.groups if group.runs == (0, 2))
     assert measured.statistics.mean.value == pytest.approx(21.86)
     assert "not known to be SYNTHETIC" in measured.text
-    assert any("are of 2 conditions and are not put together" in text for text in analysis.all_warnings)
+    assert any("are of 2 conditions and are not combined" in text for text in analysis.all_warnings)
     assert not any("says nothing about a real top" in text for text in analysis.all_warnings)
     document = ANALYSES["limit"].document(analysis, tmp_path)
     assert [group["conditions"]["synthetic"] for group in document["groups"]] == [False, True]
@@ -224,7 +224,7 @@ def test_runs_of_other_conditions_stand_apart(sample_data, tmp_path):
     assert both.statistics.between.value == pytest.approx(8**0.5, rel=0.01)  # 4 Hz apart
     assert both.statistics.mean.u == pytest.approx(2.0, rel=0.01)  # their scatter over the root of 2
     assert "which differ by" in both.text
-    assert any("are of 3 conditions and are not put together" in text for text in analysis.all_warnings)
+    assert any("are of 3 conditions and are not combined" in text for text in analysis.all_warnings)
     values = ANALYSES["limit"].document(analysis, tmp_path)["values"]
     assert {"upper_1_mean", "upper_2_mean", "upper_3_standard_error", "upper_1_between_runs"} <= values.keys()
 

@@ -14,6 +14,7 @@ from levilab.pipelines.many.table import Row, Task, analyze_one
 from levilab.pipelines.suits import analyze_suiting
 from levilab.runs.run import RunRecord
 from levilab.runs.writer import RunWriter
+from levilab.texts.text import in_language
 from support.commands import command
 from support.paths import ROOT
 
@@ -144,6 +145,15 @@ def test_a_film_from_beside_gives_the_heights_and_its_spin_the_time(found, tmp_p
     other = write(tmp_path / "other.csv", titles, [(*row[:3], "55.0") for row in rows[:200]])
     with pytest.raises(DataError, match="films of the same time are expected"):
         analyze(TRACK, device=DEVICE, side=other)
+    places = np.column_stack([t, x / 1e3, [float(r["y [mm]"]) / 1e3 for r in rows_of(TRACK)], spin])
+    record = RunRecord(experiment="sway", status="finished", started_utc="2026-11-20T10:15:00Z")
+    with RunWriter.create(tmp_path, record) as writer:
+        writer.film(["time_s,x_m,y_m,spin_frequency_hz", *(",".join(map(str, row)) for row in places.tolist())])
+        writer.finish("finished")
+    of_run = analyze(writer.folder, device=DEVICE, side=side)
+    assert of_run.runs[0].swings[1].vertical.value == pytest.approx(swings[1].vertical.value, abs=1e-5)
+    (note,) = (one for one in of_run.all_warnings if "gives its heights" in one)
+    assert in_language(note, "de").startswith("side.tracks.csv beginnt bei ")
 
 
 def test_a_run_in_which_nothing_was_counted_has_no_spin(tmp_path):
