@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from difflib import get_close_matches
 from importlib import import_module
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
+from levilab.acquisition.experiments import NAMES
 from levilab.bench.config import Limits
 from levilab.errors import UsageError
 from levilab.present.units import split
@@ -77,7 +77,7 @@ def _key_and_text(now: ExperimentSettings, experiment: str, setting: str) -> tup
     if equals and (not field or (field == experiment and not dot)) and name in {"", experiment}:
         raise _wrong_form(experiment, setting, "the key is missing: ")
     name = name if dot else experiment
-    if not equals or not name.isidentifier() or find_spec(f"{_EXPERIMENTS}.{name}") is None:
+    if not equals or name not in NAMES:
         raise _wrong_form(experiment, setting)
     if name != experiment:
         expected = Text(

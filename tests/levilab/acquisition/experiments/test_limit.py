@@ -344,6 +344,7 @@ def test_a_series_ends_when_its_time_is_over(tmp_path):
         ("limit=3", "the key is missing: limit.KEY=VALUE is expected"),
         ("what=upper", "there is no such setting; levilab acquire limit --settings lists all"),
         ("spin.hold_s=1", "is a setting of levilab acquire spin, this is levilab acquire limit"),
+        ("__init__.x=1", "limit.KEY=VALUE is expected"),
     ],
 )
 def test_settings_on_the_command_line_that_cannot_be_are_refused(tmp_path, settings, says):
