@@ -8,6 +8,7 @@ import zipfile
 from dataclasses import dataclass, replace
 from datetime import datetime
 from importlib.util import find_spec
+from itertools import chain, count
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
@@ -149,11 +150,27 @@ def _xlsx(contents: Contents, out: Path) -> dict[Path, bytes]:
     plain = {"strings_to_formulas": False, "strings_to_urls": False}  # what people typed is no formula
     with pd.ExcelWriter(buffer, engine="xlsxwriter", engine_kwargs={"options": plain}) as book:
         book.book.set_properties({"title": contents.title, "created": _NO_DAY})  # the same bytes each time
-        for table in _tables(contents):
+        tables = _tables(contents)
+        for table, name in zip(tables, _sheet_names(table.name for table in tables), strict=True):
             if len(table.columns[0].values) >= _MOST_ROWS:
                 raise UsageError("out", f"{table.name} has more rows than a spreadsheet: .csv, .nc or .h5", value=out)
-            _frame(table).to_excel(book, sheet_name=re.sub(r"[\[\]:*?/\\]", "-", table.name)[:31], index=False)
+            _frame(table).to_excel(book, sheet_name=name, index=False)
     return {out: buffer.getvalue()}
+
+
+def _sheet_names(names: Iterable[str]) -> list[str]:
+    """Return names that Excel takes for sheets: short, without its signs, and each once, whatever their case.
+
+    >>> _sheet_names(["Readings", "readings", "'a/b'", "x" * 40, "x" * 41])[1:4]
+    ['readings 2', 'a-b', 'xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx']
+    """
+    taken: dict[str, str] = {}
+    for name in names:
+        valid = re.sub(r"[\[\]:*?/\\]", "-", name).strip("'")[:31].rstrip("'") or "table"
+        numbered = (f"{valid[:26]} {k}" for k in count(2))
+        free = next(one for one in chain([valid], numbered) if one.lower() not in taken)
+        taken[free.lower()] = free
+    return [*taken.values()]
 
 
 #: Rows of a sheet of Excel.

@@ -67,6 +67,15 @@ def test_a_spreadsheet_has_a_sheet_for_each_table_and_no_formula_of_a_person(tmp
     assert sheets["readings"]["spin_frequency_hz"].iloc[0] == 39.93
 
 
+def test_tables_of_names_that_are_no_sheet_s_or_alike_have_a_sheet_each(tmp_path):
+    names = ("Readings", "readings", "READINGS", "'quoted'", "''", "x" * 40, "x" * 41, f"{'y' * 30}'z")
+    tables = tuple(Table(name, (Column("k", np.array([k]), "1", ""),), "") for k, name in enumerate(names))
+    export(lambda: Contents("x", "x", tables, {}), tmp_path / "x.xlsx")
+    sheets = pd.read_excel(tmp_path / "x.xlsx", sheet_name=None, engine="calamine")
+    assert [int(sheet["k"].iloc[0]) for sheet in sheets.values()] == [*range(len(names))]
+    assert [*sheets][:5] == ["Readings", "readings 2", "READINGS 3", "quoted", "table"]
+
+
 def test_hdf5_is_opened_by_xarray_with_what_the_extra_brings(tmp_path):
     written(RUN, tmp_path / "run.h5")
     with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as data:
