@@ -42,15 +42,19 @@ GUARDED = re.compile(r"'[=+@-]")
 #: A number and the unit behind it.
 _NUMBER = r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?"
 _WITH_UNIT = re.compile(rf"(?P<number>{_NUMBER})\s*(?P<unit>[^\d\s.,+/±-].*)")
-#: A number and its uncertainty: 40.00 ± 0.03 Hz, or 40.00(3) Hz, whose digits count from the last one on.
+#: A number and its uncertainty: 40.00 ± 0.03 Hz, 40.00 Hz ± 0.1 %, or 40.00(3) Hz, whose digits count from the last on.
 _MARK = r"\s*(?:±|\+/-|\+-)\s*"
-_WITH_U = re.compile(rf"\(?(?P<value>{_NUMBER}){_MARK}(?P<u>{_NUMBER})\)?\s*(?P<unit>[^\d\s.,+/-].*)?")
+_WITH_U = re.compile(
+    rf"\(?(?P<value>{_NUMBER})\s?(?P<first>[^\d\s.,+/±-][^±]{{,30}}?)?{_MARK}"
+    rf"(?P<u>{_NUMBER}(?:\s?%)?)\)?\s*(?P<unit>[^\d\s.,+/%-].*)?"
+)
 _CONCISE = re.compile(r"(?P<value>[+-]?\d+(?:[.,](?P<decimals>\d+))?)\((?P<digits>\d+)\)\s*(?P<unit>[^\d\s.,+/-].*)?")
 #: Blanks around ±, and those between a number and its unit.
 _AROUND_MARK = re.compile(_MARK)
+_BEFORE_PERCENT = re.compile(rf"(±{_NUMBER})\s+(?=%)")
 _BEFORE_UNIT = re.compile(
-    rf"(?<!\S)({_NUMBER}(?:(?:±|\+/-|\+-){_NUMBER})?)\s+"
-    rf"(?=(?:{'|'.join(re.escape(name) for units in UNITS.values() for name in units)})(?:\s|$))"
+    rf"(?<![^\s±])({_NUMBER})\s+"
+    rf"(?=(?:{'|'.join(re.escape(name) for units in UNITS.values() for name in units)})(?:[\s±]|$))"
 )
 Kind = Literal["number", "clock", "missing", "text"]
 
@@ -119,14 +123,16 @@ class Dialect:
 
 
 def value_and_u(text: str) -> tuple[str, str] | None:
-    """Return a number and its uncertainty, each with the unit behind both; None where there are not both.
+    """Return a number and its uncertainty, each with its unit; one unit is that of both, but % is of the number.
 
-    >>> value_and_u("40,00 ± 0,03 Hz"), value_and_u("40.00(3)"), value_and_u("40.00 Hz")
-    (('40,00Hz', '0,03Hz'), ('40.00', '0.03'), None)
+    >>> value_and_u("40,00 ± 0,03 Hz"), value_and_u("40.00(3)"), value_and_u("40.00 Hz ± 0.1 %")
+    (('40,00Hz', '0,03Hz'), ('40.00', '0.03'), ('40.00Hz', '0.1 %'))
+
+    None where there are not both.
     """
     if found := _WITH_U.fullmatch(text):
-        unit = found["unit"] or ""
-        return f"{found['value']}{unit}", f"{found['u']}{unit}"
+        unit, first, u = found["unit"] or "", found["first"] or "", found["u"]
+        return f"{found['value']}{first or unit}", u if u.endswith("%") else f"{u}{unit or first}"
     if found := _CONCISE.fullmatch(text):
         unit, decimals = found["unit"] or "", len(found["decimals"] or "")
         padded = found["digits"].zfill(decimals + 1)
@@ -308,7 +314,7 @@ def _split_at_blanks(line: str) -> list[str]:
     if any(mark in line for mark in "[(/"):  # "f [Hz]" and "f / Hz" are one title each
         line = re.sub(r"(?<!\s)\s+(?=[\[(/])|(?<=/)\s+", "", line)
     if "±" in line or "+" in line:
-        line = _AROUND_MARK.sub("±", line)
+        line = _BEFORE_PERCENT.sub(r"\1", _AROUND_MARK.sub("±", line))
     if line.upper() != line.lower():  # 0 s   40.00 Hz
         line = _BEFORE_UNIT.sub(r"\1", line)
     return line.split()

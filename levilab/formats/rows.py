@@ -91,9 +91,7 @@ def _read_at_once(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_
     """Read all rows by pandas; None if any line is not plain, or the file grows meanwhile."""
     import pandas as pd
 
-    dialect, fields, used = layout.dialect, layout.width, [column.index for column in chosen]
-    if any(column.behind for column in chosen):
-        return None
+    dialect, fields, used = layout.dialect, layout.width, [column.index for column in chosen if not column.behind]
     count, rest = _plain_lines(text, layout) if _may_be_plain(layout, used) else (0, b"")
     if count == 0:
         return None
@@ -110,12 +108,13 @@ def _read_at_once(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_
         return None
     if len(frame) != count + bool(rest.strip()):
         return None
-    values = tuple(frame[index].to_numpy()[:count] for index in used)
+    read = {index: frame[index].to_numpy()[:count] for index in used}
     # If all fields hold a number, the right sum of separators means the right number in each line. If not, one too
     # many in one line may hide one missing in another.
-    certain = len(used) == fields and not any(np.isnan(column).any() for column in values)
+    certain = len(used) == fields and not any(np.isnan(column).any() for column in read.values())
     if not certain and not _every_line_is_full(text, layout):
         return None
+    values = tuple(np.full(count, np.nan) if column.behind else read[column.index] for column in chosen)
     rows = Rows(values, np.arange(layout.first_line, layout.first_line + count))
     last = rest.decode(layout.encoding, "replace")
     return _with_last(text.path, layout, chosen, rows, last, drop_unended=drop_unended)
@@ -358,18 +357,25 @@ def _row_or_none(path: Path, layout: Layout, chosen: Sequence[Column], line: int
         return None
 
 
-def _number(path: Path, layout: Layout, column: Column, line: int, text: str) -> float:
-    if combined := value_and_u(text):
-        text = combined[column.behind]
-    elif column.behind:
-        return float("nan")
+def _text_and_scale(layout: Layout, column: Column, cell: str) -> tuple[str, float]:
+    """Return the text of a column's number in a cell, empty where it has none, and the factor of that number."""
+    combined = value_and_u(cell)
+    if combined is None:
+        return "" if column.behind else cell, 1.0
+    if column.behind and combined[1].endswith("%"):
+        return combined[1][:-1].strip(), abs(layout.dialect.value(combined[0])) / 100
+    return combined[column.behind], 1.0
+
+
+def _number(path: Path, layout: Layout, column: Column, line: int, cell: str) -> float:
+    text, scale = _text_and_scale(layout, column, cell)
     try:
-        return layout.dialect.number(text)
+        return scale * layout.dialect.number(text)
     except ValueError:
         if text.casefold() in MISSING:
             return float("nan")
     if unit_behind(text):
-        return _number_with_unit(path, layout, column, line, text)
+        return _number_with_unit(path, layout, column, line, cell)
     if column.name == "time_s":
         with contextlib.suppress(ValueError):
             return clock_time(text, month_first=layout.dialect.month_first) / column.factor
@@ -378,25 +384,28 @@ def _number(path: Path, layout: Layout, column: Column, line: int, text: str) ->
         raise TableError(path, f"{what}: open the file in Excel or LibreOffice, save it", line=line)
     mark = "comma" if layout.dialect.decimal == "," else "point"
     do = "correct it, or leave it empty if the reading was missed"
+    if "±" in cell:
+        do = "write what stands behind the ± into a column of its own, with the title u"
     raise TableError(
         path,
-        f"'{shorten(text)}' stands in column '{shorten(column.label)}', a number with decimal {mark} is expected: {do}",
+        f"'{shorten(cell)}' stands in column '{shorten(column.label)}', a number with decimal {mark} is expected: {do}",
         line=line,
     )
 
 
-def _number_with_unit(path: Path, layout: Layout, column: Column, line: int, text: str) -> float:
+def _number_with_unit(path: Path, layout: Layout, column: Column, line: int, cell: str) -> float:
     """Return the number before a unit.  Raises TableError where the unit is not that of the column."""
+    text, _ = _text_and_scale(layout, column, cell)
     unit = unit_behind(text)
     kind = "time" if column.inverse else dimension(column.name)
     if unit_factor(unit, kind) != unit_factor(column.unit, kind):
-        what = f"'{shorten(text)}' stands in column '{shorten(column.label)}', which is in {column.unit}"
+        what = f"'{shorten(cell)}' stands in column '{shorten(column.label)}', which is in {column.unit}"
         raise TableError(path, f"{what}: write one unit in all rows", line=line)
     try:
         return layout.dialect.number(text[: -len(unit)].strip())
     except ValueError:
         mark = "comma" if layout.dialect.decimal == "," else "point"
-        what = f"'{shorten(text)}' has the other decimal mark, a number with decimal {mark} is expected"
+        what = f"'{shorten(cell)}' has the other decimal mark, a number with decimal {mark} is expected"
         raise TableError(path, f"{what}: correct it", line=line) from None
 
 

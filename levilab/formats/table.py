@@ -103,7 +103,7 @@ def read_table(
         plan = plan_of(path, Request(columns or {}, quantities, needed, guess))
         layout = plan.layout
         rows = read_rows(plan.text, layout, plan.columns, skip_doubtful=skip_doubtful)
-    table = _table(plan.path, plan.header, plan.columns, _of_run(rows, plan), plan.warnings)
+    table = _table(plan.path, plan.header, plan.columns, _of_run(rows, plan), plan.warnings, wanted=quantities)
     path = plan.path
     if len(table) >= FEWEST:
         return table
@@ -232,15 +232,18 @@ def _table(
     rows: Rows,
     warnings: tuple[str, ...],
     *,
+    wanted: Collection[str] = (),
     gaps: Collection[str] = (),
 ) -> Table:
     """Leave out missed readings, and columns of uncertainties with gaps; then convert to SI.
 
+    wanted: names of columns that are taken from behind a ±, where the file has none of their own.
     gaps: names of columns that may have some, at no cost of a row.
     """
     name = shorten(str(path), 200)
     notes = [*warnings, *(reword(note, f"{name}: {note}", names_input=True) for note in rows.notes)]
     numbers = dict(zip(chosen, rows.values, strict=False))
+    notes += [of_file("±", f"{_seen(name, column)} is not used") for column in _drop_unused(numbers, wanted)]
     # The comparison is false for NaN, too.
     present = {column: np.abs(values) < NO_READING for column, values in numbers.items() if column.name not in gaps}
     present = {column: there & (numbers[column] != 0) if column.inverse else there for column, there in present.items()}
@@ -248,12 +251,9 @@ def _table(
     quantity = [p for c, p in present.items() if c.name not in companions]
     read = np.logical_and.reduce(quantity) if quantity else np.ones(rows.lines.size, bool)
     for column, missing in [(c, read & ~p) for c, p in present.items() if c.name in companions]:
+        notes += _notes_on_u(_seen(name, column), column, missing, read)
         if missing.any():  # better no uncertainties than readings lost for want of them
             del present[column]
-            rows_of = f"{missing.sum()} of {read.sum()} rows"
-            notes.append(
-                of_file("gaps", f"{name}: column '{shorten(column.label)}' is empty in {rows_of} and is not used")
-            )
     good = np.logical_and.reduce(list(present.values())) if present else np.ones(rows.lines.size, bool)
     kept = {column: values for column, values in numbers.items() if column in present or column.name in gaps}
     lines = rows.lines
@@ -269,6 +269,33 @@ def _table(
         if c.unit == "%":
             columns[c.name] = columns[c.name] * np.abs(columns[COMPANIONS[c.name]])
     return Table(path, columns, tuple(notes), header, lines, {c.name: c.factor for c in kept if not c.inverse})
+
+
+def _drop_unused(numbers: "dict[Column, NDArray[np.float64]]", wanted: Collection[str]) -> list[Column]:
+    """Drop the columns behind a ± that are not wanted, or stand in the file by themselves; return those with numbers.
+
+    Those in which no row has a ± are dropped, too.
+    """
+    own = {column.name for column in numbers if not column.behind}
+    with_numbers = {column for column, values in numbers.items() if column.behind and np.isfinite(values).any()}
+    used = {column for column in with_numbers if column.name in wanted and column.name not in own}
+    for column in [column for column in numbers if column.behind and column not in used]:
+        del numbers[column]
+    return sorted(with_numbers - used, key=lambda column: column.index)
+
+
+def _seen(name: str, column: Column) -> str:
+    """Return the beginning of a note on a column."""
+    return f"{name}: column '{shorten(column.label)}'" + ": the number behind the ±" * column.behind
+
+
+def _notes_on_u(seen: str, column: Column, missing: "NDArray[np.bool_]", read: "NDArray[np.bool_]") -> Iterator[str]:
+    """Yield a note on a column of uncertainties that has gaps among the rows that are read, or stands behind a ±."""
+    if missing.any():
+        gap = "missing" if column.behind else "empty"
+        yield of_file("gaps", f"{seen} is {gap} in {missing.sum()} of {read.sum()} rows and is not used")
+    elif column.behind:
+        yield of_file("±", f"{seen} is taken as the standard uncertainty")
 
 
 def _missed_warning(name: str, lines: "NDArray[np.int64]", rows: int, *, periods: bool) -> str:

@@ -26,7 +26,7 @@ from levilab.formats.columns import (
     quote_names,
     shorten,
 )
-from levilab.formats.dialect import UNVALUED, value_and_u
+from levilab.formats.dialect import UNVALUED
 from levilab.formats.layout import Layout, sniff
 from levilab.formats.rows import read_rows
 from levilab.formats.texts import Text, locate, texts_of
@@ -356,7 +356,7 @@ class Plan:
         path: of the run, for messages and analyses.
         text: the lines.
         header: titles in the file, or numbers in their place.
-        columns: those that are read.
+        columns: those that are read, and for each quantity what may stand behind a ± in its fields.
         own: indices of the columns of this run alone; none where it stands by itself.
         warnings: about guesses.
     """
@@ -477,28 +477,9 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
     for name in needed:
         if name not in {column.name for column in chosen}:
             raise _total_of_turns(path, name, layout) or no_column(path, name, header, _which_columns(layout, [name]))
-    behind, notes = _behind(path, layout, chosen, quantities)
-    chosen = tuple(sorted((*chosen, *behind), key=lambda column: CANONICAL.index(column.name)))
-    return Plan(path, text, layout, header, chosen, part.own, (*warnings, *doubts, *notes))
-
-
-def _behind(
-    path: Path, layout: Layout, chosen: Sequence[Column], quantities: Collection[str]
-) -> tuple[list[Column], list[str]]:
-    """Return the uncertainties that stand behind a ± in the columns of their quantities, and a note for each column."""
-    found: list[Column] = []
-    notes: list[str] = []
-    known = {column.name for column in chosen}
-    for column in chosen:
-        if not any(value_and_u(field) for row in layout.sample for field in row[column.index : column.index + 1]):
-            continue
-        u = companion(column.name)
-        taken = u in quantities and u not in known
-        found += [replace(column, name=u, behind=True)] * taken
-        said = "taken as the standard uncertainty" if taken else "not used"
-        note = f"column '{shorten(column.label)}': the number behind the ± is {said}"
-        notes.append(of_file("±", f"{shorten(str(path), 200)}: {note}"))
-    return found, notes
+    chosen = tuple(sorted(chosen, key=lambda column: CANONICAL.index(column.name)))
+    behind = [replace(one, name=companion(one.name), behind=True) for one in chosen if one.name in QUANTITIES]
+    return Plan(path, text, layout, header, (*chosen, *behind), part.own, (*warnings, *doubts))
 
 
 def _must_be_one_time(path: Path, layout: Layout, meant: Sequence[str]) -> None:

@@ -124,7 +124,7 @@ def _columns(path: Path, options: InputOptions, needed: tuple[str, ...]) -> froz
         raise
     except (TableError, OSError):  # another reader says why
         return frozenset()
-    return frozenset(column.name for column in plan.columns)
+    return frozenset(column.name for column in plan.columns if not column.behind)
 
 
 # --- as the spin of a train of pulses has it ---

@@ -1,6 +1,7 @@
 """Files as students have them: each is read, gives the spin-down that it was made from, or asks."""
 
 import json
+import re
 import zipfile
 from pathlib import Path
 
@@ -87,7 +88,10 @@ def rows(form):
         (rows("{t} s   {f} +/- 0.03 Hz"), 0.03),
         ("t,f\n" + rows("{t:.0f},{f:.2f}(3)"), 0.03),
         ("t,f\n" + rows("{t},({f} ± 0.03) Hz"), 0.03),
-        ("t,f\n" + rows("{t},{f} ± 0.03").replace("38.5 ± 0.03", "38.5"), None),  # no u for want of one
+        ("t,f\n" + rows("{t},{f} Hz ± 0.03 Hz"), 0.03),
+        (rows("{t} s ± 0.5 s   {f} Hz ± 0.03 Hz"), 0.03),
+        ("t,f\n" + rows("{t},{f} ± 0.1 %"), [0.001 * f for f in SPINS]),
+        (rows("{t} s   {f} Hz ± 0.1 %"), [0.001 * f for f in SPINS]),
         (rows("{t} s   {f} Hz"), None),
         ("Zeit Frequenz\n" + rows("{t} s {f} Hz"), None),
         ("sec,Hz\n" + rows("{t},{f}"), None),
@@ -109,6 +113,29 @@ def test_readings_are_read_however_they_are_written(text, u, tmp_path):
     if u:
         assert table.column("spin_frequency_u_hz") == pytest.approx(u, rel=1e-14)
         assert "behind the ± is taken as the standard uncertainty" in " ".join(table.warnings)
+
+
+@pytest.mark.parametrize(("count", "without"), [(12, [3]), (600, range(300)), (20000, range(19000))])
+def test_a_column_in_which_some_rows_have_no_u_behind_the_number_says_so(count, without, tmp_path):
+    path = tmp_path / "my.csv"
+    lines = [f"{t},{40 - t / 1000}{'' if t in without else ' ± 0.03'}\n" for t in range(count)]
+    path.write_text("t,f [Hz]\n" + "".join(lines), encoding="utf-8")
+    table = read_table(path, quantities=SPIN, needed=SPIN[:2])
+    assert table.column("spin_frequency_hz").size == count
+    assert "spin_frequency_u_hz" not in table.columns
+    said = f"column 'f [Hz]': the number behind the ± is missing in {len(without)} of {count} rows and is not used"
+    assert [warning.partition(": ")[2] for warning in table.warnings] == [said]
+
+
+@pytest.mark.parametrize(
+    ("cell", "do"),
+    [("38.5 Hz ± 30 mHz", "write one unit in all rows"), ("38.5 ± 1 %?", "into a column of its own, with the title u")],
+)
+def test_a_number_behind_a_mark_that_cannot_be_used_is_quoted_as_it_stands(cell, do, tmp_path):
+    path = tmp_path / "my.csv"
+    path.write_text("t,f\n" + rows("{t},{f} ± 0.03").replace("38.5 ± 0.03", cell), encoding="utf-8")
+    with pytest.raises(TableError, match=re.escape(f"'{cell}' stands in column 'f'") + f".*{do}"):
+        read_table(path)
 
 
 def test_rows_that_a_person_doubts_are_left_out_on_request_and_named(tmp_path):
