@@ -200,7 +200,7 @@ def analyze(
     frequency: ArrayLike | None = None,
     light: ArrayLike | None = None,
     columns: Mapping[str, str | int] | str | None = None,
-    skip_doubtful: bool = False,
+    skip_doubtful: bool | None = None,
     channel: str | None = None,
     rate: float | None = None,
     reading_u: float | None = None,
@@ -250,7 +250,8 @@ def analyze(
         light: signal of a detector at these times, in the place of frequency; its kind is "spin".
         columns: of a file or a DataFrame, where titles are not known: {"t": "Zeit", "f": "Drehzahl [rpm]"}, or as text
             "t=Zeit,f=Drehzahl [rpm]"; numbers count columns from 1.
-        skip_doubtful: leave out the rows of a table in which a cell is no plain number, as 35.8? or ca. 40.
+        skip_doubtful: leave out the rows of a table in which a cell is no plain number, as 35.8? or ca. 40; None: as a
+            correction beside the file says.
         channel: of a record with several (spindown, spin).
         rate: samples per second [Hz], of files that do not say it (spindown, spin); pictures, in slow motion (video).
         reading_u: standard uncertainty of every reading [Hz], in the place of what the data say (spindown, limit,

@@ -14,7 +14,7 @@ from levilab.cli.options import Json, Language, Paths, existing_path, flag, fold
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError
-from levilab.pipelines.options import KINDS, OPTIONS, Option, options_of, read_options, typed_name
+from levilab.pipelines.options import DEFAULTS, KINDS, OPTIONS, Option, options_of, read_options, typed_name
 from levilab.texts.text import Text, text_of
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def takes_options(
 
     Those of analyses stand behind the paths, more of them at the end; the command has all in `**given`.
     """
-    own = [_parameter(typed_name(name), OPTIONS[name]) for name in names if OPTIONS[name].typed is not None]
+    own = [_parameter(name, OPTIONS[name]) for name in names if OPTIONS[name].typed is not None]
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         paths, *shared, _ = inspect.signature(command).parameters.values()
@@ -79,12 +79,12 @@ def takes_options(
 
 def _parameter(name: str, option: Option) -> inspect.Parameter:
     """Return the parameter of a command by which typer reads an option."""
-    kind: Any = bool if option.kind is bool else option.kind | None
-    default: Any = False if option.kind is bool else None
+    kind: Any = option.kind | None
+    default, name = DEFAULTS[name], typed_name(name)
     if option.choices:
         words = {word.upper(): word for word in option.choices}
         kind = StrEnum(name.title(), words)  # type: ignore[misc,no-redef] # a class that is made here
-        default = kind(option.choices[0])
+        default = kind(default)
     about = typer.Option(
         f"--{name.replace('_', '-')}",
         metavar=option.metavar,

@@ -159,7 +159,7 @@ class InputOptions:
         'Columns of your file: "t=Zeit,f=Kanal2" or "t=1,f=3"; with a unit in brackets: "f=Drehzahl [rpm]".',
         metavar="NAME=COLUMN,…", read=_read_columns,
     ))  # fmt: skip
-    skip_doubtful: bool = field(default=False, metadata=_about(
+    skip_doubtful: bool | None = field(default=None, metadata=_about(
         "Leave out the rows of a table in which a cell is no plain number, as 35.8? or ca. 40.", kind=bool,
     ))  # fmt: skip
     channel: str | None = None
@@ -348,6 +348,10 @@ KINDS: Mapping[str, type[InputOptions]] = MappingProxyType({
 #: All options by the names of their fields.
 OPTIONS: Mapping[str, Option] = MappingProxyType(
     {name: one for kind in KINDS.values() for name, one in options_of(kind).items()}
+)
+#: Their values where none is given.
+DEFAULTS: Mapping[str, Any] = MappingProxyType(
+    {one.name: one.default for kind in KINDS.values() for one in fields(kind) if one.name in OPTIONS}
 )
 #: Those that say how a data file is read.
 OF_FILES = ("columns", "skip_doubtful", "channel", "rate")

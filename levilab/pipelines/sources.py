@@ -445,7 +445,7 @@ def _one(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
 
 def _of_file(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
     """Read a data file.  Options that are given go before those of the correction beside it."""
-    kept = {key: value for key, value in read_correction(path).items() if getattr(options, key) in (None, False, value)}
+    kept = {key: value for key, value in read_correction(path).items() if getattr(options, key) in (None, value)}
     readings = needs.read_file(path, replace(options, **kept))
     text = f"{path.name}: is read as {place_of_correction(path).name} says: {describe(kept)}"
     note = [of_file("correction", text)] if kept else []

@@ -115,6 +115,16 @@ def test_options_that_are_given_go_before_it(swapped):
     assert not any("levilab.toml" in text for text in result.warnings)
 
 
+def test_doubtful_rows_are_refused_where_that_is_asked_for_and_a_correction_leaves_them_out(tmp_path):
+    spin_down_csv(file := tmp_path / "my.csv")
+    titles, first_row, second_row, *others = file.read_text("utf-8").splitlines()
+    file.write_text("\n".join([titles, first_row, second_row.replace(",", "?,"), *others, ""]), encoding="utf-8")
+    kept(file, "skip_doubtful = true\n")
+    assert "1 doubtful row is left out" in " ".join(levilab.analyze(file, "spindown").warnings)
+    with pytest.raises(levilab.errors.DataError, match=r"my\.csv, line 3: "):
+        levilab.analyze(file, "spindown", skip_doubtful=False)
+
+
 def test_each_file_of_a_folder_has_its_own(swapped):
     write_correction(swapped, READ)
     spin_down_csv(swapped.parent / "other.csv", seed=2)

@@ -2,18 +2,16 @@
 
 import inspect
 import math
-from dataclasses import fields
 
 import pytest
 
 import levilab
 from levilab.cli.analyze import takes_options
 from levilab.errors import UsageError
-from levilab.pipelines.options import KINDS, OPTIONS, read_options, typed_name
+from levilab.pipelines.options import DEFAULTS, OPTIONS, read_options, typed_name
 
 #: What is analyzed, beside the options.
 READINGS = {"data", "kind", "time", "frequency", "light"}
-DEFAULTS = {one.name: one.default for kind in KINDS.values() for one in fields(kind) if one.name in OPTIONS}
 
 
 def test_the_notebook_has_each_option_with_its_default_and_a_sentence():
