@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import NotTaken, Readings, Source
 from levilab.texts.note import Note, is_doubt, kind_of, reword
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -147,7 +148,8 @@ class EachAlone(Analyzed[S, D, None, Opt]):
         """Findings in a few sentences for each input."""
         if len(self.runs) == 1:
             return self.runs[0].text
-        return "  ".join(f"{source.name}: {run.text}" for source, run in zip(self.sources, self.runs, strict=True))
+        named = (_named(source, run.text) for source, run in zip(self.sources, self.runs, strict=True))
+        return Sentences(*named, between="  ")
 
     def about_run(self, run: D) -> Iterable[str]:
         """Return what to know of one input."""
@@ -160,4 +162,8 @@ A = TypeVar("A", bound=Analyzed[Any, Any, Any, Any])
 def _with_name(source: Source[Any], text: str) -> str:
     """Put the name of the input before a note that does not name it."""
     named = isinstance(text, Note) and text.names_input
-    return text if named else reword(text, f"{source.name}: {text}", names_input=True)
+    return text if named else reword(text, _named(source, text), names_input=True)
+
+
+def _named(source: Source[Any], text: str) -> Text:
+    return Text("{name:s}: {text}", name=source.name, text=text)

@@ -35,7 +35,8 @@ def with_uncertainty(estimate: Estimate) -> str:
     '1.047×10⁻⁵ rad⁻¹, u not determined'
     """
     text = f"{without_unit(estimate)} {unit(estimate.unit).text}".strip()
-    return text if estimate.u is not None or estimate.value is None else f"{text}, u not determined"
+    known = estimate.u is not None or estimate.value is None
+    return Text("{number:n}" if known else "{number:n}, u not determined", number=text)
 
 
 def in_one_line(estimate: Estimate) -> str:
@@ -58,7 +59,7 @@ def in_one_line(estimate: Estimate) -> str:
 
 def without_unit(estimate: Estimate) -> str:
     """Return value and u alone, for a column whose head has the unit; a dash where there is none."""
-    return "—" if estimate.value is None else _number(estimate.value, estimate.u)
+    return "—" if estimate.value is None else Text("{number:n}", number=_number(estimate.value, estimate.u))
 
 
 def column(estimates: Iterable[Estimate | None]) -> list[str]:
@@ -76,7 +77,12 @@ def column(estimates: Iterable[Estimate | None]) -> list[str]:
     ordinary = 1e-2 <= largest < 1e5
     if ordinary and min(u for _, u in known) < MOST_DECIMALS:
         return [without_unit(one) if one else "—" for one in cells]
-    return ["—" if one is None or one.value is None else _number(one.value, one.u, ordinary=ordinary) for one in cells]
+    return [
+        "—"
+        if one is None or one.value is None
+        else Text("{number:n}", number=_number(one.value, one.u, ordinary=ordinary))
+        for one in cells
+    ]
 
 
 def _number(value: float, u: float | None, *, ordinary: bool | None = None) -> str:

@@ -263,11 +263,15 @@ def _changes(source: Source[Any]) -> tuple[Block, ...]:
     return (Details("Settings that changed between start and end", changes, on_paper="out"),)
 
 
-def _differences(kind: str, start: Mapping[str, Any], end: Mapping[str, Any]) -> Iterator[tuple[str, str, str, str]]:
+def _differences(kind: str, start: Mapping[str, Any], end: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:
     """Yield a row for each setting that both have; the name of the instrument stands in its first alone."""
     name = kind
     for key in (key for key in end if key in start and start[key] != end[key]):
-        yield name, setting_name(key), value_in_words(key, start[key]), value_in_words(key, end[key])
+        yield (
+            name,
+            setting_name(key),
+            *(Text("{value:n}", value=value_in_words(key, when[key])) for when in (start, end)),
+        )
         name = ""
 
 

@@ -27,8 +27,6 @@ _FIELD = re.compile(r"\{(\w+)(?::([+,]?[0-9]{0,2}(?:\.[0-9]{1,2})?[a-z%]?))?\}")
 _POINT = re.compile(r"(?<![\d.])(\d+)\.(?=\d+(?![\d.]*\.\d))")
 #: A head of a column: the quantity, and its unit.
 _HEAD = re.compile(r"(.+?)(\s+\[[^\]]+\])")
-#: A text that says a value, and not a word, such as "39.85(3) Hz": units have at most three letters.
-_VALUE = re.compile(r"(?!.*[^\W\d_]{4}).*\d\.\d", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -144,17 +142,19 @@ def in_language(text: str, code: str | None = None) -> str:
         return str.__str__(text)
     if isinstance(text, Text):
         return _fill(language_of(code).texts.get(text.template, text.template), text.values, code)
-    language = language_of(code)
-    if said := language.texts.get(text):
+    texts = language_of(code).texts
+    if said := texts.get(text):
         return said
-    if (head := _HEAD.fullmatch(text)) and head[1] in language.texts:
-        return f"{language.texts[head[1]]}{head[2]}"
-    return _with_decimals(text, language.decimal) if _VALUE.match(text) else text
+    if (head := _HEAD.fullmatch(text)) and head[1] in texts:
+        return f"{texts[head[1]]}{head[2]}"
+    return text
 
 
-def _with_decimals(text: str, decimal: str) -> str:
-    """Return a text with another decimal sign; versions, as 3.11.7, stay."""
-    return _POINT.sub(rf"\g<1>{decimal}", text)
+def numbers_in_language(text: str, code: str | None = None) -> str:
+    """Return a text of numbers in a language, with its decimal sign; versions, as 3.11.7, stay."""
+    code = code or _of_process
+    decimal = "." if code == ENGLISH else language_of(code).decimal
+    return _POINT.sub(rf"\g<1>{decimal}", in_language(text, code))
 
 
 _of_process = ENGLISH
@@ -183,8 +183,7 @@ def _write(value: Any, how: str, code: str) -> str:
     if how == "s":
         return str(value)
     if isinstance(value, str):
-        said = in_language(value, code)
-        return _with_decimals(said, decimal) if how == "n" else said
+        return numbers_in_language(value, code) if how == "n" else in_language(value, code)
     return format(value, how).replace(".", decimal)
 
 

@@ -64,7 +64,8 @@ def scans_table(analysis: FieldAnalysis) -> Table:
 
 def _range(values: NDArray[np.float64], decimals: int) -> str:
     """Return the least and the greatest value, which need not be the first and the last."""
-    return " … ".join(with_decimals(float(end), decimals) for end in (values.min(), values.max()))
+    least, greatest = (with_decimals(float(end), decimals) for end in (values.min(), values.max()))
+    return Text("{least:n} … {greatest:n}", least=least, greatest=greatest)
 
 
 def base_table(scan: FieldScan) -> Table:
@@ -74,7 +75,7 @@ def base_table(scan: FieldScan) -> Table:
         prior = scan.known.prior(name)
         known = [] if prior is None else [replace(estimate, value=prior.value, u=prior.u)]
         found, *before = (with_uncertainty(QUANTITIES[name].show(one)) for one in (estimate, *known))
-        rows.append((QUANTITIES[name].shown_symbol, found, "".join(before), _gain(scan, name)))
+        rows.append((QUANTITIES[name].shown_symbol, found, *(before or [""]), _gain(scan, name)))
     return table("The base", ("", "found", "known before", "what the scan adds"), rows)
 
 

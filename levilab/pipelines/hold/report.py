@@ -11,6 +11,7 @@ from levilab.pipelines.spindown.words import SYMBOLS
 from levilab.present.document.blocks import Paragraph, Tabular
 from levilab.present.numbers import how_many, plain, short_name, with_uncertainty, without_unit
 from levilab.present.tables import Table, table
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -41,7 +42,11 @@ def laws_table(analysis: HoldAnalysis) -> Table:
     found = analysis.combined
     rows = []
     for law in found.laws:
-        constants = ", ".join(f"{SYMBOLS[name]} = {without_unit(one)}" for name, one in law.constants.items())
+        each = law.constants.items()
+        constants = Sentences(
+            *(Text("{symbol} = {value}", symbol=SYMBOLS[name], value=without_unit(one)) for name, one in each),
+            between=", ",
+        )
         spindown, pull = found.beside.get(law.name, (None, None))
         beside = without_unit(spindown) if spindown else "—"
         rows.append((law.name, constants, plain(law.statistics.chi_square, 3), beside, plain(pull, 2)))

@@ -162,8 +162,8 @@ class Conditions:
         drive = [
             "triggered" * self.triggered,
             "" if self.waveform is None else _WAVEFORMS.get(self.waveform, self.waveform),
-            "" if self.amplitude_vpp is None else f"{self.amplitude_vpp:g} Vpp",
-            "" if self.creep_hz_per_s is None else f"{self.creep_hz_per_s:g} Hz/s",
+            "" if self.amplitude_vpp is None else Text("{volts:g} Vpp", volts=self.amplitude_vpp),
+            "" if self.creep_hz_per_s is None else Text("{rate:g} Hz/s", rate=self.creep_hz_per_s),
             "" if self.step_hz is None else f"a look each {self.step_hz:g} Hz",
         ]
         return Text("{parts}", parts=(*filter(None, drive), self.top))

@@ -84,9 +84,9 @@ def theory_table(analysis: LimitAnalysis) -> Table:
                 one.name
                 if analysis.number(group) is None
                 else Text("{number}: {name}", number=analysis.number(group), name=one.name),
-                f"{one.expected:.2f}",
+                Text("{hz:.2f}", hz=one.expected),
                 without_unit(one.difference),
-                share(one.p),
+                Text("{p:n}", p=share(one.p)),
                 "—" if one.agrees is None else "yes" if one.agrees else "no",
             )
         )

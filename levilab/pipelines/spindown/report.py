@@ -269,7 +269,7 @@ def _runs_table(analysis: SpinDownAnalysis) -> Table:
             source.name,
             str(len(run.time)),
             *cells,
-            f"{run.frequency[0]:.2f} → {run.frequency[-1]:.2f}",
+            Text("{first:.2f} → {last:.2f}", first=run.frequency[0], last=run.frequency[-1]),
             run.best if run.verdict.decided else "undecided",
         )
         for source, run, *cells in zip(analysis.sources, analysis.runs, *cells_of(OF_RUN, analysis.runs), strict=True)
@@ -344,8 +344,8 @@ def count_table(analysis: SpinDownAnalysis, *, symbols: bool = False) -> Table |
                     short_name(source.name),
                     without_unit(tilt) if tilt else "none",
                     without_unit(resonance) if resonance else "—",
-                    plain(float(added[-1]), 2) if tilt else "—",
-                    f"{rho:.2f} ± {seen.u:.2f}" if seen else "none",
+                    Text("{hz:n}", hz=plain(float(added[-1]), 2)) if tilt else "—",
+                    Text("{rho:.2f} ± {u:.2f}", rho=rho, u=seen.u) if seen else "none",
                     Text("{worth:n} of {n}", worth=digits(n * (1 - rho) / (1 + rho)), n=n) if seen else str(n),
                 )
             )
@@ -578,14 +578,14 @@ def _constants_table(
 def _law_cells(analysis: SpinDownAnalysis, law: CombinedLaw, *, short: bool) -> tuple[str, ...]:
     name = Text("{law} (best)", law=law.name) if is_best(analysis, law.name) else law.name
     constants = [
-        f"{SYMBOLS[of]} = {with_uncertainty(value)}"
+        Text("{symbol} = {value}", symbol=SYMBOLS[of], value=with_uncertainty(value))
         for of, value in law_constants(analysis, law.name).items()
         if not short or of in LAWS[law.name].constants
     ]
     if len(analysis.runs) == 1:
-        return name, "\n".join(constants)
+        return name, Sentences(*constants, between="\n")
     scatters = [with_uncertainty(s) if (s := scatter(mean)) else "—" for mean in law.constants.values()]
-    return name, "\n".join(constants), "\n".join(scatters)
+    return name, Sentences(*constants, between="\n"), Sentences(*scatters, between="\n")
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from levilab.present.drawing import SMALL, headline, panel, run_look, synthetic_
 from levilab.present.looks import LOOKS
 from levilab.present.numbers import with_uncertainty
 from levilab.present.style import STYLE, WIDE, label_of_run
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,8 +81,8 @@ def _draw_spectrum(axes: Axes, analysis: SwayAnalysis) -> None:
     axes.set_ylim(max(_LEAST * y.max(), 0.3 * float(np.median(y))), 3 * y.max())
     for f, a in zip(one.frequency[:2].tolist(), one.amplitude[:2].tolist(), strict=True):
         axes.annotate(
-            f"{f:+.3f} Hz".replace("-", "−"), (f, 1e3 * a), xytext=(0, 5), textcoords="offset points", ha="center",
-            fontsize=SMALL,
+            Text("{hz:n} Hz", hz=f"{f:+.3f}".replace("-", "−")), (f, 1e3 * a), xytext=(0, 5),
+            textcoords="offset points", ha="center", fontsize=SMALL,
         )  # fmt: skip
     axes.axvline(0, color="black", linewidth=0.6)
     axes.set(xlabel="frequency; negative: against the spin  [Hz]", ylabel="amplitude  [mm]")

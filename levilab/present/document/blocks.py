@@ -12,14 +12,14 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar
 
-from levilab.texts.text import in_language
+from levilab.present.tables import Table
+from levilab.texts.text import in_language, numbers_in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
     from datetime import datetime
 
     from levilab.present.style import Figure
-    from levilab.present.tables import Table
 
 
 @dataclass(frozen=True)
@@ -325,8 +325,23 @@ def in_language_of_reader(part: T, code: str | None = None) -> T:
     if isinstance(part, Fact):
         texts = part.texts if part.code else in_language_of_reader(part.texts, code)
         return replace(part, name=in_language(part.name, code), texts=texts)
+    if isinstance(part, Points | Table):
+        return _with_numbers(part, code)  # type: ignore[return-value]
     said = {field.name: getattr(part, field.name) for field in fields(part) if field.name not in _NOT_SAID}
     return replace(part, **{name: in_language_of_reader(value, code) for name, value in said.items()})
+
+
+def _with_numbers(part: Points | Table, code: str | None) -> Points | Table:
+    """Return points, or a table with the cells of its columns of numbers, with the decimal sign of a language."""
+    if isinstance(part, Points):
+        return replace(part, texts=tuple(numbers_in_language(text, code) for text in part.texts))
+    say = [numbers_in_language if k in part.numbers else in_language for k in range(len(part.heads))]
+    rows = tuple(
+        replace(row, cells=tuple(one(cell, code) for one, cell in zip(say, row.cells, strict=True)))
+        for row in part.rows
+    )
+    heads = in_language_of_reader(part.heads, code)
+    return replace(part, title=in_language(part.title, code), heads=heads, rows=rows)
 
 
 B = TypeVar("B", bound="Block")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from analysis.uncertainty import Estimate
 from levilab.errors import UsageError
 from levilab.live.practice.experiments import PRACTICE
 from levilab.live.practice.tasks import TASKS
@@ -18,6 +19,9 @@ from levilab.live.server import PAGE
 from levilab.live.views import VIEWS
 from levilab.live.words import change_texts
 from levilab.pipelines.look import QUANTITIES
+from levilab.present.document.blocks import in_language_of_reader
+from levilab.present.numbers import with_uncertainty
+from levilab.present.tables import table
 from levilab.report.worksheets.document import read_language
 from levilab.report.worksheets.sheets import TOPS
 from levilab.texts.text import Text, in_language, language_of, languages, speak, text_from
@@ -168,3 +172,11 @@ def test_a_process_speaks_one_language_and_no_unknown_one(monkeypatch: pytest.Mo
     assert in_language("the top follows the drive") == "der Kreisel folgt dem Antrieb"
     with pytest.raises(UsageError, match="language = xx: one of de, en is expected"):
         speak("xx")
+
+
+def test_a_name_keeps_its_point_and_a_number_gets_a_comma() -> None:
+    assert [in_language(name, "de") for name in ("z1.5.csv", "v1.2", "d0.1")] == ["z1.5.csv", "v1.2", "d0.1"]
+    said = Text("{name}: {value}", name="d0.1.csv", value=with_uncertainty(Estimate(39.853, 0.031, "Hz")))
+    assert in_language(said, "de") == "d0.1.csv: 39,853(31) Hz"
+    shown = table("", ["input", "spin"], [["z1.5.csv", "1.50"]], numbers=["spin"])
+    assert in_language_of_reader(shown, "de").rows[0].cells == ("z1.5.csv", "1,50")
