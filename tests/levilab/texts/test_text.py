@@ -7,6 +7,7 @@ import json
 import pickle
 import re
 from typing import TYPE_CHECKING
+from unittest.mock import Mock
 
 import pytest
 
@@ -18,10 +19,12 @@ from levilab.live.practice.what_if import WHAT_IF
 from levilab.live.server import PAGE
 from levilab.live.views import VIEWS
 from levilab.live.words import change_texts
+from levilab.pipelines.analyzed import EachAlone
 from levilab.pipelines.look import QUANTITIES
 from levilab.present.document.blocks import in_language_of_reader
 from levilab.present.numbers import with_uncertainty
 from levilab.present.tables import table
+from levilab.present.units import split
 from levilab.report.worksheets.document import read_language
 from levilab.report.worksheets.sheets import TOPS
 from levilab.texts.text import Text, in_language, language_of, languages, speak, text_from
@@ -121,6 +124,18 @@ def test_a_text_has_the_values_of_the_english_one(code: str) -> None:
     assert {english: text for english, text in texts.items() if fields(english) != fields(text) or not text} == {}
 
 
+def settings_fields() -> set[str]:
+    """Names of settings: fields of the classes of experiments' settings, and what drivers declare by `Setting`."""
+    named = set()
+    for one in (node for tree in sources().values() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
+        for node in one.body:
+            if isinstance(node, ast.AnnAssign) and one.name.endswith("Settings"):
+                named.add(ast.unparse(node.target))
+            elif isinstance(node, ast.Assign) and ast.unparse(node.value).startswith("Setting("):
+                named.add(ast.unparse(node.targets[0]))
+    return named
+
+
 @pytest.mark.parametrize("code", LANGUAGES)
 def test_no_text_is_of_a_sentence_that_is_said_no_more(code: str) -> None:
     nodes = (node for tree in sources().values() for node in ast.walk(tree))
@@ -130,9 +145,7 @@ def test_no_text_is_of_a_sentence_that_is_said_no_more(code: str) -> None:
         | {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
     )
     said |= {re.sub(r"(_frequency)?_(hz|v|t|m|s)$", "", text).replace("_", " ") for text in said}  # heads of columns
-    named = {node.arg or "" for tree in sources().values() for node in ast.walk(tree) if isinstance(node, ast.keyword)}
-    named |= {ast.unparse(node) for tree in sources().values() for node in ast.walk(tree) if isinstance(node, ast.Name)}
-    said |= {re.sub("_(hz|v|t|m|s|ohm|vpp)$", "", name).replace("_", " ") for name in named}  # settings
+    said |= {split(name)[0].replace("_", " ") for name in settings_fields()}
     said |= {re.sub(r"\s+\[[^]]+\]$", "", text) for text in said}  # heads of columns without the unit
     said |= {f"{text}s" for text in said}  # as `how_many` makes them
     said |= {text.capitalize() for text in said}  # as figures have them
@@ -180,3 +193,20 @@ def test_a_name_keeps_its_point_and_a_number_gets_a_comma() -> None:
     assert in_language(said, "de") == "d0.1.csv: 39,853(31) Hz"
     shown = table("", ["input", "spin"], [["z1.5.csv", "1.50"]], numbers=["spin"])
     assert in_language_of_reader(shown, "de").rows[0].cells == ("z1.5.csv", "1,50")
+
+
+def test_a_note_and_a_finding_of_several_inputs_keep_their_language() -> None:
+    spin = Text("The spin is {at}, its slope {slope:n}.", at="30.5 Hz", slope="0.1 Hz/s")
+    sources = [Mock(warnings=(spin,)), Mock(warnings=())]
+    for source, name in zip(sources, ("run0.5.csv", "b.csv"), strict=True):
+        source.name = name
+    runs = [Mock(text=spin, warnings=()) for _ in sources]
+    found = EachAlone(tuple(sources), tuple(runs), None, Mock(), Mock(), (), (), ())
+    said = "Die Drehfrequenz ist 30.5 Hz, ihre Änderung 0,1 Hz/s."
+    assert in_language(found.text, "de") == f"run0.5.csv: {said}  b.csv: {said}"
+    assert [in_language(text, "de") for text in found.all_warnings] == [f"run0.5.csv: {said}"]
+
+
+def test_german_remedies_are_in_the_nominative_and_no_top_is_the_following_one() -> None:
+    texts = language_of("de").texts.values()
+    assert [text for text in texts if text.startswith("einen ") or re.search(r"folgende[nrs]* Kreisel", text)] == []
