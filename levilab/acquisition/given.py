@@ -17,7 +17,7 @@ from levilab.errors import UsageError
 from levilab.present.units import split
 from levilab.settings import hint_about
 from levilab.simulator.keys import SceneError, parse_setting
-from levilab.texts.text import Text, text_of
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -59,7 +59,8 @@ def with_given_settings(
     try:
         values = {name: parse_setting(f"{name}={text}")[1] for name, text in texts.items()}
     except SceneError as error:
-        raise UsageError("settings", f"{experiment}.{text_of(error)}; {_where(experiment)}") from None
+        fault = Text("{experiment:s}.{fault}", experiment=experiment, fault=error)
+        raise UsageError("settings", _with_where(fault, experiment)) from None
     table = now.model_dump(mode="json", exclude_unset=True)  # defaults may still be suited to a scene
     try:
         return type(now).model_validate(table | values)
@@ -81,7 +82,7 @@ def _key_and_text(now: ExperimentSettings, experiment: str, setting: str) -> tup
         raise _wrong_form(experiment, setting)
     if name != experiment:
         expected = Text(
-            "is a setting of levilab acquire {name}, this is levilab acquire {experiment}",
+            "is a setting of levilab acquire {name:s}, this is levilab acquire {experiment:s}",
             name=name,
             experiment=experiment,
         )
@@ -92,7 +93,7 @@ def _key_and_text(now: ExperimentSettings, experiment: str, setting: str) -> tup
 
 def _wrong_form(experiment: str, setting: str, why: str = "") -> UsageError:
     what = Text(
-        "{why}{experiment}.KEY=VALUE is expected; levilab acquire {experiment} --settings lists all",
+        "{why}{experiment:s}.KEY=VALUE is expected; levilab acquire {experiment:s} --settings lists all",
         why=why,
         experiment=experiment,
     )
@@ -113,25 +114,30 @@ def describe_values(name: str, schema: Mapping[str, Any]) -> str:
     """
     _, unit = split(name)
     kinds = [schema | one for one in schema.get("anyOf", [{}]) if one.get("type") != "null"]
-    return " or ".join(_describe_schema(one) for one in kinds) + (f" [{unit.text}]" if unit else "")
+    said = _one_of([_describe_schema(one) for one in kinds])
+    return Text("{values} [{unit:s}]", values=said, unit=unit.text) if unit else said
+
+
+def _one_of(texts: Sequence[str]) -> str:
+    return texts[0] if len(texts) == 1 else Text("{first} or {last}", first=tuple(texts[:-1]), last=texts[-1])
 
 
 def _describe_schema(schema: Mapping[str, Any]) -> str:
     if "enum" in schema:
-        *some, last = map(str, schema["enum"])
-        return f"{', '.join(some)} or {last}" if some else last
+        return _one_of([Text("{name:s}", name=str(one)) for one in schema["enum"]])
     if schema.get("type") == "array":
         each = _describe_schema(schema["items"])
-        return f"a list as {_LISTS.get(schema['items'].get('type'), '[…]')}, each {each}"
+        example = _LISTS.get(schema["items"].get("type"), "[…]")
+        return Text("a list as {example:s}, each {each}", example=example, each=each)
     words = [_TYPES.get(schema.get("type", ""), "a value")]
     low, high = schema.get("minimum"), schema.get("maximum")
     if low is not None:
-        words.append(f"from {low:g}" if high is not None else f"from {low:g} on")
+        words.append(Text("from {low:g}" if high is not None else "from {low:g} on", low=low))
     elif "exclusiveMinimum" in schema:
-        words.append(f"above {schema['exclusiveMinimum']:g}")
+        words.append(Text("above {low:g}", low=schema["exclusiveMinimum"]))
     if high is not None:
-        words.append(f"to {high:g}" if low is not None else f"up to {high:g}")
-    return " ".join(words)
+        words.append(Text("to {high:g}" if low is not None else "up to {high:g}", high=high))
+    return Sentences(*words) if words[1:] else words[0]
 
 
 def _refuse_unknown(now: ExperimentSettings, experiment: str, name: str) -> None:
@@ -140,7 +146,7 @@ def _refuse_unknown(now: ExperimentSettings, experiment: str, name: str) -> None
     if name in known:
         return
     near = [f"{experiment}.{one}" for one in get_close_matches(name, known, cutoff=0.5)]
-    meant = Text(", did you mean {names:s}?", names=" or ".join(near)) if near else ";"
+    meant = Text(", did you mean {names}?", names=_one_of(near)) if near else ";"
     said = Text("there is no such setting{meant} {where}", meant=meant, where=_where(experiment))
     raise UsageError("settings", said, value=f"{experiment}.{name}")
 
@@ -155,12 +161,17 @@ def _refusal(
     text = str(first.get("ctx", {}).get("error", first["msg"])) if own else ""
     if name not in given:
         return UsageError("settings", f"{experiment}: {text or first['msg']}")
-    what = text or f"{describe_values(name, schema_of(now, limits)[name])} is expected{hint_about(given[name])}"
-    return UsageError("settings", f"{what}; {_where(experiment)}", value=f"{experiment}.{name}={given[name]}")
+    values = describe_values(name, schema_of(now, limits)[name])
+    what = text or Text("{values} is expected{hint}", values=values, hint=hint_about(given[name]))
+    return UsageError("settings", _with_where(what, experiment), value=f"{experiment}.{name}={given[name]}")
 
 
-def _where(experiment: str) -> str:
-    return f"levilab acquire {experiment} --settings lists all"
+def _with_where(what: str, experiment: str) -> Text:
+    return Text("{what}; {where}", what=what, where=_where(experiment))
+
+
+def _where(experiment: str) -> Text:
+    return Text("levilab acquire {experiment:s} --settings lists all", experiment=experiment)
 
 
 def schema_of(now: ExperimentSettings, limits: Limits) -> dict[str, Any]:

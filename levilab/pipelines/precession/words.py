@@ -96,8 +96,9 @@ def miscount_as_text(of: Miscount) -> str:
     """Return a miscount as text."""
     if of.times is not None:
         above, below = of.times
-        part = {(1, 2): "half", (2, 1): "twice"}.get(of.times, Text("{above}/{below} of", above=above, below=below))
-        return Text("{part} the frequency was counted", part=part)
+        simple = {(1, 2): "half the frequency was counted", (2, 1): "twice the frequency was counted"}
+        part = Text("{above}/{below} of the frequency was counted", above=above, below=below)
+        return simple.get(of.times, part)
     if of.counts is not None:
         return Text("{pulses} in each gate", pulses=pulses_too_many(of.counts))
     return "far off the line, and no miscount explains it"

@@ -11,7 +11,9 @@ from unittest.mock import Mock
 
 import pytest
 
+from analysis.precession.miscounts import Miscount
 from analysis.uncertainty import Estimate
+from levilab.acquisition.given import settings_without_bench, with_given_settings
 from levilab.errors import UsageError
 from levilab.live.practice.experiments import PRACTICE
 from levilab.live.practice.tasks import TASKS
@@ -21,13 +23,14 @@ from levilab.live.views import VIEWS
 from levilab.live.words import change_texts
 from levilab.pipelines.analyzed import EachAlone
 from levilab.pipelines.look import QUANTITIES
+from levilab.pipelines.precession.words import miscount_as_text
 from levilab.present.document.blocks import in_language_of_reader
 from levilab.present.numbers import with_uncertainty
 from levilab.present.tables import table
 from levilab.present.units import split
 from levilab.report.worksheets.document import read_language
 from levilab.report.worksheets.sheets import TOPS
-from levilab.texts.text import Text, in_language, language_of, languages, speak, text_from
+from levilab.texts.text import Text, in_language, language_of, languages, speak, text_from, text_of
 from support.sources import sources
 
 if TYPE_CHECKING:
@@ -210,3 +213,25 @@ def test_a_note_and_a_finding_of_several_inputs_keep_their_language() -> None:
 def test_german_remedies_are_in_the_nominative_and_no_top_is_the_following_one() -> None:
     texts = language_of("de").texts.values()
     assert [text for text in texts if text.startswith("einen ") or re.search(r"folgende[nrs]* Kreisel", text)] == []
+
+
+@pytest.mark.parametrize(
+    ("times", "said"), [((2, 1), "gezählt wurde die doppelte Frequenz"), ((3, 2), "gezählt wurden 3/2 der Frequenz")]
+)
+def test_a_miscount_is_a_german_sentence(times: tuple[int, int], said: str) -> None:
+    assert in_language(miscount_as_text(Miscount(0, times)), "de") == said
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ("gate_s=abc", "erwartet wird eine Zahl über 0 [s]; levilab acquire spin --settings zeigt alle"),
+        ("gates=1", "meintest du spin.gate_s"),
+    ],
+)
+def test_a_wrong_setting_is_answered_in_german(given: str, said: str) -> None:
+    with pytest.raises(UsageError) as refused:
+        with_given_settings(settings_without_bench("spin"), "spin", [given])
+    german = in_language(text_of(refused.value), "de")
+    assert said in german
+    assert " or " not in german
