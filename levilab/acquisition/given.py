@@ -6,12 +6,11 @@ Nothing heavy is imported here, and of the experiments that one alone: a wrong s
 from __future__ import annotations
 
 from difflib import get_close_matches
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from levilab.acquisition.experiments import NAMES
+from levilab.acquisition import experiments
 from levilab.bench.config import Limits
 from levilab.errors import UsageError
 from levilab.present.units import split
@@ -31,12 +30,8 @@ _LISTS = {"integer": "[1, 3]", "number": "[44.0, 38.0]", "string": '["tape", "la
 
 def settings_without_bench(experiment: str) -> ExperimentSettings:
     """Return the settings of an experiment where no bench file says others; its module alone is imported."""
-    settings: ExperimentSettings = import_module(f"{_EXPERIMENTS}.{experiment}").EXPERIMENT.settings()
+    settings: ExperimentSettings = experiments.experiment(experiment).settings()
     return settings
-
-
-#: The room with a file for each experiment.
-_EXPERIMENTS = "levilab.acquisition.experiments"
 
 
 def with_given_settings(
@@ -78,7 +73,7 @@ def _key_and_text(now: ExperimentSettings, experiment: str, setting: str) -> tup
     if equals and (not field or (field == experiment and not dot)) and name in {"", experiment}:
         raise _wrong_form(experiment, setting, "the key is missing: ")
     name = name if dot else experiment
-    if not equals or name not in NAMES:
+    if not equals or name not in experiments.NAMES:
         raise _wrong_form(experiment, setting)
     if name != experiment:
         expected = Text(

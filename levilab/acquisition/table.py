@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, create_model
 
 from levilab.acquisition.experiment import CounterSettings, Experiment
-from levilab.acquisition.experiments import field, hold, limit, precession, spin, sway, trace
+from levilab.acquisition.experiments import NAMES, experiment
 from levilab.bench.config import BenchConfig, Setting, SettingsTable
 
 if TYPE_CHECKING:
@@ -17,22 +17,10 @@ if TYPE_CHECKING:
     from levilab.acquisition.experiment import ExperimentSettings
 
 #: Name → experiment.
-EXPERIMENTS: dict[str, Experiment[Any]] = {
-    experiment.name: experiment
-    for experiment in (
-        spin.EXPERIMENT,
-        trace.EXPERIMENT,
-        field.EXPERIMENT,
-        limit.EXPERIMENT,
-        precession.EXPERIMENT,
-        hold.EXPERIMENT,
-        sway.EXPERIMENT,
-    )
-}
+EXPERIMENTS: dict[str, Experiment[Any]] = {name: experiment(name) for name in NAMES}
 
 _TABLES: dict[str, Any] = {
-    experiment.name: (experiment.settings, Field(default_factory=experiment.settings))
-    for experiment in EXPERIMENTS.values()
+    name: (one.settings, Field(default_factory=one.settings)) for name, one in EXPERIMENTS.items()
 }
 #: What a bench file holds: the bench, and for each experiment a table of its name.
 Configuration: type[BenchConfig] = create_model("Configuration", __base__=BenchConfig, **_TABLES)
@@ -41,8 +29,7 @@ Configuration: type[BenchConfig] = create_model("Configuration", __base__=BenchC
 def tables_to_write() -> tuple[SettingsTable, ...]:
     """Return the experiments' tables as they stand in a new bench file: the defaults, with what they mean."""
     return tuple(
-        SettingsTable(experiment.name, experiment.about, tuple(_settings_to_write(experiment.settings)))
-        for experiment in EXPERIMENTS.values()
+        SettingsTable(name, one.about, tuple(_settings_to_write(one.settings))) for name, one in EXPERIMENTS.items()
     )
 
 

@@ -148,7 +148,7 @@ def _trials(analysis: Analysis[Any], found: Any, *, made: bool) -> Iterable[Sect
     advice = (why, Code(f"levilab crosscheck {analysis.name} --like {named}")) if made else ()
     blocks = blocks_of(study, analysis.symbols) if study else advice
     if blocks:
-        lead = "Readings made up with these values, times and scatters, through the same analysis: is it right here?"
+        lead = "Readings drawn with these values, times and scatters, through the same analysis: is it right here?"
         yield Section("Cross-check with these parameters", tuple(blocks), anchor="crosscheck", lead=lead)
 
 

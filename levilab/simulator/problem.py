@@ -284,55 +284,31 @@ def integrate(
     """
     done = np.cumsum(stops.counts)
     pieces, state, at = [problem.start[None]], problem.start, 0
-    other = None if beside is None else _Course(problem.start, beside)
+    end, passed = problem.start, 0  # of the second run
     while at < stops.counts.size:
         first, last = next(stops.part(at, stops.counts.size).pieces(STEPS_IN_A_CALL))
-        run = Stretch(state, stops.part(at + first, at + last), problem.escape)
-        second = other and other.until(float(run.stops.times[-1]))
-        (states, through), *rest = problem.advance_together([run, second] if second else [run])
+        runs = [Stretch(state, stops.part(at + first, at + last), problem.escape)]
+        if beside is not None:
+            until = max(beside.first_at(float(runs[0].stops.times[-1])), passed)
+            runs.append(Stretch(end, beside.part(passed, until)))
+        (states, through), *rest = problem.advance_together(runs)
         pieces.append(states[1:])
         state, at = states[-1], at + len(states) - 1
-        if other and rest:
-            other.go_on(*rest[0], broken_off=not through)
+        for others, all_reached in rest:  # broken off with the first run, it goes on from its last stop
+            passed += len(others) - 1
+            end = others[-1] if all_reached or not through else np.full_like(end, math.nan)
         if not through:
-            passed, fell = _escape(problem, state, stops.part(at, at + 1))
+            after, fell = _escape(problem, state, stops.part(at, at + 1))
             if fell is not None:
                 return np.concatenate(pieces), fell, int(done[at]), None
-            pieces.append(passed[None])
-            state, at = passed, at + 1
+            pieces.append(after[None])
+            state, at = after, at + 1
         if progress is not None:
             progress(float(done[at - 1] / done[-1]))
-    return np.concatenate(pieces), None, int(done[-1]), None if other is None else other.end(problem)
-
-
-class _Course:
-    """A run beside another one: the state at the stop that it has reached, None once its numbers left their range."""
-
-    def __init__(self, start: Array, stops: Stops) -> None:
-        self._state: Array | None = start
-        self._left = stops
-
-    def until(self, time: float) -> Stretch | None:
-        """Return the part ahead, up to the first stop at this time [s] or after it; None if there is none."""
-        if self._state is None or self._left.counts.size == 0:
-            return None
-        ahead, last = abs(time - self._left.times[0]), self._left.counts.size
-        if ahead < abs(self._left.times[-1] - self._left.times[0]):
-            last = int(np.searchsorted(abs(self._left.times - self._left.times[0]), ahead))
-        return Stretch(self._state, self._left.part(0, last)) if last > 0 else None
-
-    def go_on(self, states: Array, through: bool, *, broken_off: bool) -> None:  # noqa: FBT001
-        """Take the states of a stretch, all of it unless the run beside was broken off."""
-        self._left = self._left.part(len(states) - 1, self._left.counts.size)
-        self._state = states[-1] if through or broken_off else None
-
-    def end(self, problem: Problem) -> Array:
-        """Return the last state, shape (18,), integrated as far as it is not yet; NaN beyond the numbers' range."""
-        if self._state is None:
-            return np.full(STATE_SIZE, math.nan)
-        return (
-            integrate_to_end(replace(problem, start=self._state), self._left) if self._left.counts.size else self._state
-        )
+    if beside is None:
+        return np.concatenate(pieces), None, int(done[-1]), None
+    end = integrate_to_end(replace(problem, start=end), beside.part(passed, beside.counts.size))
+    return np.concatenate(pieces), None, int(done[-1]), end
 
 
 def integrate_to_end(problem: Problem, stops: Stops) -> Array:

@@ -57,6 +57,11 @@ class Stops:
             yield first, min(last, self.counts.size)
             first = min(last, self.counts.size)
 
+    def first_at(self, time: float) -> int:
+        """Return the index of the first stop at this time [s] or after it, in the direction of the run."""
+        found = np.searchsorted(abs(self.times - self.times[0]), abs(time - self.times[0]))
+        return min(int(found), self.counts.size)
+
     def part(self, first: int, last: int) -> Stops:
         """Return the intervals from first to last, without the last."""
         return Stops(

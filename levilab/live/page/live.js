@@ -114,13 +114,13 @@ function takeFit(about) {
   data.hidden = null;
 }
 
-/** Draw the running fit, unless a task asks for what it says. */
+/** Draw the running fit, unless a task asks for its numbers. */
 function showFit() {
   const hidden = Boolean(practice?.hidesFit?.()), about = hidden ? {} : data.found ?? {};
   if (data.hidden === hidden) return;
   data.hidden = hidden;
   data.fit = about.curve ? {...about, ...about.curve, solid_to: about.curve.solid_to ?? Infinity} : null;
-  typeset(by("fit-head"), hidden ? phrase("The fit is shown once the run is analyzed: the task asks for what it says.") : about.head || "");
+  typeset(by("fit-head"), hidden ? phrase("The fit is shown once the run is analyzed: the task asks for it.") : about.head || "");
   typeset(by("fit-lines"), (about.lines || []).join(" · "));
   data.end = about.end_s || null;
   dirty.plot = true;

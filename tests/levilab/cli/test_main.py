@@ -10,7 +10,6 @@ from typing import get_type_hints
 
 import pytest
 
-from levilab.acquisition import experiments
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.cli.acquire import EXPERIMENT_HELP
 from levilab.cli.analyze import COMMANDS
@@ -43,7 +42,7 @@ def test_the_example_of_sway_names_the_folder_that_a_search_leaves_out(levilab):
 
 
 def test_each_experiment_and_each_analysis_has_its_command():
-    assert EXPERIMENT_HELP.keys() == EXPERIMENTS.keys() == set(experiments.NAMES)
+    assert EXPERIMENT_HELP.keys() == EXPERIMENTS.keys() == {one.name for one in EXPERIMENTS.values()}
     assert COMMANDS.keys() - {"each"} == ANALYSES.keys()
 
 
