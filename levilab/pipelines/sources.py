@@ -205,7 +205,7 @@ class SkippedRuns:
     count: int
 
     def __str__(self) -> str:
-        return f"skipped {how_many(self.count, f'{self.experiment} run')}"
+        return how_many(self.count, f"{self.experiment} run")
 
 
 @dataclass(frozen=True)
@@ -221,7 +221,7 @@ class Skipped:
     kind: str = ""
 
     def __str__(self) -> str:
-        return f"skipped {self.reason}"
+        return Text("skipped {things}", things=self.reason)
 
 
 @dataclass(frozen=True)
@@ -253,27 +253,41 @@ class NothingSuits(DoesNotSuit):
 
 #: Of texts and spreadsheets.
 OTHER_COLUMNS = Kind("a table with other columns", "name one to see why", plural="tables with other columns")
-#: Files of a kind that are named beside their number.
-_NAMED = 2
+#: Files of a kind that are named beside their number, and files of a folder with names at all, and what to do.
+_NAMED, FEW = 2, 8
 
 
 def in_words(left_out: Sequence[LeftOut]) -> str:
     """Return the files that hold nothing to analyze, as one line."""
-    return f"nothing to analyze in {files_by_kind(left_out)}"
+    return Text("nothing to analyze in {files}", files=files_by_kind(left_out))
+
+
+def _by_kind(left_out: Sequence[LeftOut]) -> dict[Kind, list[str]]:
+    kinds: dict[Kind, list[str]] = {}
+    for one in left_out:
+        kinds.setdefault(one.kind, []).append(one.path.name)
+    return kinds
+
+
+def number_by_kind(left_out: Sequence[LeftOut]) -> tuple[str, ...]:
+    """Return the number of files of each kind."""
+    return tuple(
+        Text("{n} {things}", n=len(names), things=kind.several) if len(names) > 1 else kind.name
+        for kind, names in _by_kind(left_out).items()
+    )
 
 
 def files_by_kind(left_out: Sequence[LeftOut]) -> str:
     """Return the files by kind and number, with what to do."""
-    kinds: dict[Kind, list[str]] = {}
-    for one in left_out:
-        kinds.setdefault(one.kind, []).append(one.path.name)
+    kinds = _by_kind(left_out)
     texts = []
-    for kind, names in kinds.items():
+    for (kind, names), count in zip(kinds.items(), number_by_kind(left_out), strict=True):
         named = ", ".join([*names[:_NAMED], *["…"] * (len(names) > _NAMED)])
-        count = f"{len(names)} {kind.several}" if len(names) > 1 else kind.name
-        texts.append(f"{count} ({named}{f': {kind.advice}' if kind.advice else ''})")
-    all_named = "" if max(map(len, kinds.values()), default=0) <= _NAMED else "; levilab analyze --json names all"
-    return f"{'; '.join(texts)}{all_named}"
+        with_advice = "{count} ({names:s}: {advice})" if kind.advice else "{count} ({names:s})"
+        texts.append(Text(with_advice, count=count, names=named, advice=kind.advice))
+    if max(map(len, kinds.values()), default=0) > _NAMED:
+        texts.append(Text("levilab analyze --json names all"))
+    return Sentences(*texts, between="; ")
 
 
 #: What lies in a folder and is no input, without a cause for a warning.
@@ -590,7 +604,7 @@ def _files(root: Path) -> list[Path]:
 def _nothing_found(
     needs: Needs[Any], others: list[SkippedRuns], broken: list[Skipped], left_out: Sequence[LeftOut]
 ) -> str:
-    seen = [how_many(one.count, f"{one.experiment} run") for one in others]
+    seen = [*map(str, others)]
     seen += [f"{len(broken)} that cannot be used, as {broken[0].reason}"] if broken else []
     seen += [files_by_kind(left_out)] if any(one.kind is not OTHER for one in left_out) else []
     if not seen:

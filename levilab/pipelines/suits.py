@@ -16,10 +16,23 @@ from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.pipelines import catalogue
 from levilab.pipelines.result import ResultError, is_of_another, read_inputs, results_in
 from levilab.pipelines.result import save as save_files
-from levilab.pipelines.sources import Found, LeftOut, NothingSuits, Skipped, data_files, find, in_words, join
+from levilab.pipelines.sources import (
+    FEW,
+    Found,
+    LeftOut,
+    NothingSuits,
+    Skipped,
+    SkippedRuns,
+    data_files,
+    find,
+    in_words,
+    join,
+    number_by_kind,
+)
 from levilab.present.numbers import how_many
 from levilab.runs.find import RECORD, find_run, find_runs
 from levilab.runs.run import Run
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Mapping, Sequence
@@ -280,9 +293,16 @@ def left_out_of(remarks: Sequence[NotTaken]) -> list[dict[str, str]]:
 
 
 def texts_of(remarks: Sequence[NotTaken]) -> list[str]:
-    """Return remarks as lines of text, the files that are left out in one."""
+    """Return remarks as lines of text: runs and files that are left out in one, a few files by name in their own."""
     left_out = [one for one in remarks if isinstance(one, LeftOut)]
-    return [*(str(one) for one in remarks if not isinstance(one, LeftOut)), *([in_words(left_out)] if left_out else [])]
+    few = len(left_out) <= FEW
+    things = (*(str(one) for one in remarks if isinstance(one, SkippedRuns)), *number_by_kind([] if few else left_out))
+    skipped = "skipped {things}" if few else "skipped {things} (levilab analyze --json names the files)"
+    return [
+        *(str(one) for one in remarks if isinstance(one, Skipped)),
+        *([Text(skipped, things=things)] if things else []),
+        *([in_words(left_out)] if few and left_out else []),
+    ]
 
 
 # --- writing -------------------------------------------------------------------------------------------

@@ -170,7 +170,9 @@ def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab,
 def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levilab, sample_data):
     done = levilab("analyze", "spindown", sample_data, "--no-save")
     assert "skipped" not in done.stdout
-    assert "skipped 3 limit runs\n" in done.stderr
+    (skipped,) = [line for line in done.stderr.splitlines() if "skipped" in line]  # each file by kind and number
+    assert "4 hold runs, 3 limit runs, 1 precession run" in skipped
+    assert "2 Markdown pages" in skipped
     assert "lasts [s]" in done.stdout
 
 

@@ -14,7 +14,9 @@ import pytest
 from analysis.precession.miscounts import Miscount
 from analysis.uncertainty import Estimate
 from levilab.acquisition.given import settings_without_bench, with_given_settings
+from levilab.acquisition.table import EXPERIMENTS
 from levilab.errors import UsageError
+from levilab.formats.kinds import EMPTY, KINDS, OTHER
 from levilab.live.practice.experiments import PRACTICE
 from levilab.live.practice.tasks import TASKS
 from levilab.live.practice.what_if import WHAT_IF
@@ -24,6 +26,7 @@ from levilab.live.words import change_texts
 from levilab.pipelines.analyzed import EachAlone
 from levilab.pipelines.look import QUANTITIES
 from levilab.pipelines.precession.words import miscount_as_text
+from levilab.pipelines.sources import OTHER_COLUMNS
 from levilab.present.document.blocks import in_language_of_reader
 from levilab.present.numbers import with_uncertainty
 from levilab.present.tables import table
@@ -94,6 +97,13 @@ def of_worksheets():
     return {text.replace(f"{TOPS} tops", "{tops} tops") for text in texts}
 
 
+def of_files() -> set[str]:
+    """What is said of files and runs that are left out."""
+    kinds = (*KINDS, OTHER, EMPTY, OTHER_COLUMNS)
+    runs = {f"{name} run" for name in EXPERIMENTS}
+    return {text for kind in kinds for text in (kind.name, kind.several, kind.advice)} | runs | {f"{r}s" for r in runs}
+
+
 def of_program() -> set[str]:
     """What the program says in sentences: each `Text`, and what the functions of SAYING are given."""
     found: set[str] = set()
@@ -115,7 +125,9 @@ def test_a_language_has_every_text(code: str) -> None:
     assert sorted(text for text in of_pages() if is_worded(text) and text not in language_of(code).page) == []
     assert (
         sorted(
-            text for text in of_program() | of_worksheets() if is_worded(text) and text not in language_of(code).texts
+            text
+            for text in of_program() | of_worksheets() | of_files()
+            if is_worded(text) and text not in language_of(code).texts
         )
         == []
     )
@@ -145,6 +157,7 @@ def test_no_text_is_of_a_sentence_that_is_said_no_more(code: str) -> None:
     said = (
         of_pages()
         | of_worksheets()
+        | of_files()
         | {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
     )
     said |= {re.sub(r"(_frequency)?_(hz|v|t|m|s)$", "", text).replace("_", " ") for text in said}  # heads of columns
