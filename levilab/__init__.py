@@ -168,21 +168,22 @@ def acquire(
 
 
 @bare
-def load(path: str | PathLike[str]) -> RecordedRun:
-    """Return the run in a run folder.
+def load(path: str | PathLike[str]) -> RecordedRun | AnalysisResult:
+    """Return the run in a run folder, or the result in a result.json.
 
     Args:
-        path: of the folder, or the name of a run in runs/.
+        path: of the folder, or the name of a run in runs/; or of a file that `save` or `levilab analyze` has written.
 
     Returns:
-        The run: `to_dataframe()`, `plot()`, `folder`, `status`, `record`, `events()`, `traces()`.
+        The run: `to_dataframe()`, `plot()`, `folder`, `status`, `record`, `events()`, `traces()`; or the result, as
+        `analyze` returns it.
 
     Raises:
-        DataError: there is no run, or its record is damaged.
+        DataError: there is neither, it is damaged, or the readings of the result have changed.
     """
-    from levilab.notebook.acquisition import load_run
+    from levilab.notebook.acquisition import load_any
 
-    return load_run(path)
+    return load_any(path)
 
 
 @bare
@@ -458,13 +459,13 @@ def runs(folder: str | PathLike[str] = "runs", *, last: int | None = None) -> Ru
 
 @bare
 def report(
-    data: Run | AnalysisResult | str | PathLike[str] | Sequence[Run | AnalysisResult | str | PathLike[str]],
+    data: Run | AnalysisResult | SimulatedMotion | str | PathLike[str] | Sequence[Any],
     output: str | PathLike[str] = "report.html",
     *,
     tables: bool = False,
     crosscheck: bool = True,
 ) -> Path:
-    """Write the report of runs, data files, folders or results.
+    """Write the report of runs, data files, folders, results or motions.
 
     Args:
         data: one of them, or several.

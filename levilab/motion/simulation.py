@@ -123,6 +123,13 @@ def run_simulation(
     return Simulation(summary, writer.folder, factor)
 
 
+def write_motion(summary: Summary, request: SimulationRequest, folder: Path) -> Path:
+    """Write a motion that was simulated without a folder; returns its run folder, in this one.  Raises CannotWrite."""
+    with RunWriter.create(folder, _record(request), STATES) as writer:
+        _write(summary, _samples_per_state(request), writer)
+    return writer.folder
+
+
 def _samples_per_state(request: SimulationRequest) -> int:
     """Return the number of samples for each kept state, as the spectrum needs more than a file.  Checks the numbers."""
     for name, value in (("duration", request.duration), ("tolerance", request.tolerance), ("rate", request.rate)):

@@ -11,7 +11,9 @@ from levilab.acquisition.request import request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.errors import DataError, UsageError
+from levilab.notebook.result import AnalysisResult
 from levilab.notebook.run import RecordedRun
+from levilab.pipelines.suits import recall_suiting
 from levilab.present.progress import Display
 from levilab.runs.find import RECORD, find_run, no_such_path
 from levilab.runs.run import Run
@@ -60,11 +62,13 @@ def ask_with_input(task: Task) -> str:
         ) from None
 
 
-def load_run(path: str | PathLike[str]) -> RecordedRun:
-    """Load the run in a run folder, or of a name in runs/.  Raises DataError."""
+def load_any(path: str | PathLike[str]) -> RecordedRun | AnalysisResult:
+    """Load the run in a run folder, or of a name in runs/; or the result in a file.  Raises DataError."""
     folder = find_run(Path(path))
     if not folder.exists():
         raise no_such_path(folder)
+    if folder.suffix == ".json" and folder.is_file():
+        return AnalysisResult(*recall_suiting([folder], {})[0])
     if folder.is_file():
         raise DataError(f"{folder}: is a file; a run folder is expected, a data file goes to levilab.analyze as it is")
     if folder.is_dir() and not (folder / RECORD).exists():

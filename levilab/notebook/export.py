@@ -28,11 +28,6 @@ def export_data(data: Any, output: str | PathLike[str], **options: Any) -> list[
 def _contents(data: Any) -> Contents:
     """Return what is exported.  Raises UsageError, DataError."""
     if isinstance(data, AnalysisResult):
-        if len(data.inputs) > 1:
-            expected = (
-                "one input is exported at a time, levilab.export(PATH, …); to_dataframe() and to_xarray() have all"
-            )
-            raise UsageError("data", expected, value=f"a result of {len(data.inputs)} inputs")
         return contents_of_results(data.found.sources[0].path, None, [(data.analysis, data.found)])
     if isinstance(data, SimulatedMotion):
         return data.contents
@@ -41,7 +36,6 @@ def _contents(data: Any) -> Contents:
     try:
         path = data.folder if isinstance(data, Run) else Path(data)
     except TypeError:
-        raise UsageError(
-            "data", "a run, a result, a motion, a map or a path is expected", value=type(data).__name__
-        ) from None
+        expected = "a run, a result, a motion, a map or a path is expected; analyze arrays and lists first"
+        raise UsageError("data", f"{expected}: export(analyze(…), …)", value=type(data).__name__) from None
     return contents_of(path, lambda text: print(unquote(text), file=sys.stderr))  # noqa: T201 - as warnings are

@@ -84,12 +84,24 @@ FIT: Mapping[str, tuple[str, Callable[[FittedModel], Any]]] = MappingProxyType({
     "best_values": ("parameter → number", lambda of: {name: one.n for name, one in of.items()}),
     "valuesdict": ("a function that returns the same", lambda of: lambda: {name: one.n for name, one in of.items()}),
     "best_fit": ("the curve at the readings, in SI", lambda of: of.eval()),
+    "success": ("whether the fit converged", lambda of: bool(getattr(of._entry, "converged", True))),
     "residual": ("reading less curve, in SI; NaN: not used.  lmfit's is divided by u, with the other sign", _residual),
 })  # fmt: skip
 #: Of the statistics in result.json, by their own names.
 _OWN = ("weight", "rms_residual", "difference", "durbin_watson", "runs_test_p", "p_fit")
 #: Methods of a fit.
 METHODS = ("eval", "eval_uncertainty", "conf_interval", "ci_report")
+#: Names that lmfit alone has → what to type here, of a fit and of a result.
+INSTEAD: Mapping[str, str] = MappingProxyType({
+    "rsquared": "redchi",
+    "model": "best_model, its name, or models, all laws with their fits",
+    "method": "kind, the analysis: the values are of least squares",
+    "weights": "data, which has u of each reading; analyze((t, f, u)) takes other ones",
+    "independent_vars": "time, or data, which has all readings",
+    "errorbars": "covar, which is None where u is not determined",
+    "flatchain": "conf_interval(): no chain is sampled",
+    **dict.fromkeys(("init_fit", "init_values", "init_params"), "best_fit: the fit finds its own start"),
+})  # fmt: skip
 
 
 class FittedModel(Named[Quantity]):
@@ -106,6 +118,7 @@ class FittedModel(Named[Quantity]):
     name: str
     statistics: dict[str, Any]
     covariance: Any
+    _entry: Any
 
     also: ClassVar[Mapping[str, Any]] = {
         **{name: find for name, (_, find) in FIT.items()},
@@ -113,10 +126,10 @@ class FittedModel(Named[Quantity]):
     }
 
     instead: ClassVar[Mapping[str, str]] = {
-        "fit_report": "fit_report() of the result",
+        **INSTEAD,
         "plot": "plot('fit', model=…) of the result",
-        "pretty_print": "print(….ci_report())",
-        "rsquared": "redchi",
+        "pretty_print": "print(….fit_report())",
+        "message": "verdict of the result, and success",
     }
 
     def __init__(self, values: Mapping[str, Quantity], entry: Any, of: Any, number: int | None) -> None:
@@ -194,6 +207,11 @@ class FittedModel(Named[Quantity]):
         residual = self._of.residual_column(frame)
         x, y = axes_of(frame, residual)
         return frame[x].to_numpy(float), frame[y].to_numpy(float), frame[residual].notna().to_numpy()
+
+    def fit_report(self) -> str:
+        """Return this fit as text: statistics, parameters, correlations."""
+        text: str = self._of.fit_report(self.name, self)
+        return text
 
     # --- intervals ---
 

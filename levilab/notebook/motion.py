@@ -15,7 +15,7 @@ import numpy as np
 
 from levilab.animation.request import AnimationRequest, animate, check_request
 from levilab.errors import UsageError
-from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation
+from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation, write_motion
 from levilab.motion.summary import as_document
 from levilab.motion.table import headline, print_motion
 from levilab.notebook.labels import dataset_of_contents
@@ -59,9 +59,11 @@ class SimulatedMotion(Exportable, Trajectory):
     Attributes:
         found: the motion in numbers, with all samples that its spectrum needed.
         folder: of the run, None if none was written.
+        request: what was asked for.
     """
 
     found: Summary | None = None
+    request: SimulationRequest | None = None
     folder: Path | None = None
 
     also: ClassVar[Mapping[str, Any]] = {
@@ -74,6 +76,14 @@ class SimulatedMotion(Exportable, Trajectory):
         "df": "to_dataframe()",
         "data": "to_dataframe()",
         "notes": "warnings",
+        "theta": "tilt",
+        "to_netcdf": "export",
+        **{name: lambda motion, name=name: getattr(motion.to_xarray(), name) for name in ("sel", "isel", "interp")},
+    }
+    instead: ClassVar[Mapping[str, str]] = {
+        "to_csv": "to_dataframe().to_csv(path), or export('motion.csv')",
+        **dict.fromkeys(("coords", "dims"), "to_xarray(), which has it"),
+        **dict.fromkeys(("samples", "dt", "step"), "time; rate=… of simulate chooses the states per second"),
     }
 
     @property
@@ -179,6 +189,11 @@ class SimulatedMotion(Exportable, Trajectory):
 
         return for_notebooks(motion_figure(self._found))
 
+    def written(self, folder: Path) -> Path:
+        """Return its run folder, which is made in this one where there is none yet.  Raises CannotWrite."""
+        assert self.request
+        return self.folder or write_motion(self._found, self.request, folder)
+
     def animate(
         self,
         path: str | PathLike[str] | None = None,
@@ -261,7 +276,7 @@ def simulate_motion(
     warn_of(scene)
     own = {one.name: getattr(motion, one.name) for one in fields(motion)}
     own |= {"states": motion.states[rows]}
-    simulated = SimulatedMotion(**own, found=done.summary, folder=done.folder)
+    simulated = SimulatedMotion(**own, found=done.summary, folder=done.folder, request=request)
     if animate is not None:
         simulated.animate(animate)
     return simulated

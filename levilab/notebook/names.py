@@ -20,7 +20,7 @@ F = TypeVar("F", bound="Callable[..., Any]")
 #: Flag of a function's code: it takes any names.
 _TAKES_ANY = 0x08
 #: Names less alike than this are not what was meant.
-_ALIKE = 0.55
+_ALIKE = 0.65
 #: What others call an option → names that it may have here.
 _OTHERS = {
     **dict.fromkeys(("sigma", "yerr", "dy", "u"), ("reading_u",)),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import tempfile
 from dataclasses import fields
 from os import PathLike
 from pathlib import Path
@@ -34,27 +35,30 @@ def report_on(data: Any, output: str | PathLike[str], *, tables: bool, crosschec
     items = [*data] if several else [data]
     if not items:
         raise DataError("there is nothing to report: a run, a result or a path is expected")
-    paths, given = [], dict[str, Any]()
+    given = dict[str, Any]()
     for item in items:
-        paths += _paths(item)
         for name, value in _options(item).items():
             if given.setdefault(name, value) != value:
                 raise UsageError("data", f"results with unlike options ({name}) need a report each")
-    folder = "" if output.parent.is_dir() else ", in a new folder"
-    print(f"writing {output}{folder} …", file=sys.stderr)  # noqa: T201 - a cross-check takes seconds
-    return write_report(paths, output, given, tables=tables, crosscheck=crosscheck)
+    with tempfile.TemporaryDirectory(prefix="levilab-") as made:
+        paths = [path for item in items for path in _paths(item, Path(made))]
+        folder = "" if output.parent.is_dir() else ", in a new folder"
+        print(f"writing {output}{folder} …", file=sys.stderr)  # noqa: T201 - a cross-check takes seconds
+        return write_report(paths, output, given, tables=tables, crosscheck=crosscheck)
 
 
-def _paths(item: Reported) -> list[Path]:
+def _paths(item: Reported, made: Path) -> list[Path]:
+    """Return the paths of an item; a motion without a folder is written into that of what is made for the report."""
     if isinstance(item, AnalysisResult):
         return [source.path for source in item.found.sources]
     if isinstance(item, Run):
         return [item.folder]
-    if isinstance(item, SimulatedMotion | SimulatedMap):
-        folder = item.folder if isinstance(item, SimulatedMotion) else item.path
-        if folder is None:
-            raise UsageError("data", "a report needs its folder: simulate or sweep with out=FOLDER", value=repr(item))
-        return [folder]
+    if isinstance(item, SimulatedMotion):
+        return [item.written(made)]
+    if isinstance(item, SimulatedMap):
+        if item.path is None:
+            raise UsageError("data", "a report needs its store: sweep with out='map.zarr'", value=repr(item))
+        return [item.path]
     if isinstance(item, str | PathLike):
         return [find_run(Path(item))]
     raise UsageError("data", "runs, results, motions, maps or paths are expected", value=type(item).__name__)

@@ -18,9 +18,9 @@ import levilab
 from analysis.numbers import how_many
 from levilab.errors import UsageError, unquote
 from levilab.files import CannotWrite, as_json, check_folder, replace_atomically
-from levilab.notebook.fit import FIT, METHODS, FittedModel, axes_of
+from levilab.notebook.fit import FIT, INSTEAD, METHODS, FittedModel, axes_of
 from levilab.notebook.labels import dataset_of_contents, head_as_html
-from levilab.notebook.names import Exportable, bare
+from levilab.notebook.names import Exportable, bare, meant
 from levilab.notebook.quantity import Named, Quantity, correlate
 from levilab.pipelines.catalogue import ANALYSES, print_analysis
 from levilab.pipelines.result import Place
@@ -28,7 +28,7 @@ from levilab.pipelines.suits import save as save_result
 from levilab.present.html import facts_as_html, fold, paragraphs, table_as_html
 from levilab.present.numbers import plain, without_unit
 from levilab.present.units import unit
-from levilab.report.export.contents import contents_of_readings
+from levilab.report.export.contents import contents_of_readings, readings_of
 from levilab.report.export.write import FORMATS
 from levilab.report.page import render_part
 from levilab.report.tables.latex import to_latex
@@ -97,11 +97,11 @@ class AnalysisResult(Exportable):
         **{name: f"fit.{name}" for name in (*FIT, *METHODS)},
         "df": "to_dataframe()",
         "message": "verdict",
+        "to_netcdf": "export",
         "notes": "warnings",
     }
     instead: ClassVar[Mapping[str, str]] = {
         "to_csv": "to_dataframe().to_csv(path), or export('result.csv')",
-        "to_netcdf": "export('result.nc')",
         "to_pandas": "to_dataframe()",
         "savefig": "plot().savefig(path)",
         "laws": "models",
@@ -110,19 +110,15 @@ class AnalysisResult(Exportable):
         "provenance": "document, with inputs, options and software",
         "plot_fit": "plot('fit')",
         "plot_residuals": "plot('residuals')",
-        "rsquared": "redchi",
-        "success": "warnings, which has it where a fit did not converge",
+        **INSTEAD,
         "pretty_print": "print(….fit_report())",
         "ci_out": "conf_interval()",
-        "errorbars": "covar, which is None where u is not determined",
-        "flatchain": "conf_interval(): no chain is sampled",
         "uvars": "params, which calculate as numbers of uncertainties do",
         "userkws": "document['settings']",
         **dict.fromkeys(("dump", "dumps"), "to_json(), or save(folder)"),
-        **dict.fromkeys(("init_fit", "init_values", "init_params"), "best_fit: the fit finds its own start"),
         **dict.fromkeys(("pull", "pulls"), "data, which has residuals and u of each reading"),
         **dict.fromkeys(("x", "y"), "time, or data, which has all readings"),
-        **dict.fromkeys(("sel", "isel", "coords", "dims", "data_vars", "attrs"), "to_xarray(), which has it"),
+        **dict.fromkeys(("sel", "isel", "interp", "coords", "dims", "data_vars", "attrs"), "to_xarray(), which has it"),
     }
 
     @property
@@ -357,11 +353,8 @@ class AnalysisResult(Exportable):
         import pandas as pd
 
         if table == "readings":
-            columns = self.analysis.columns(self.found)
-            frames = [pd.DataFrame(dict(one)) for one in columns]
-            for name, frame in zip(self.inputs, frames, strict=True):
-                frame.insert(0, "input", name)
-            return pd.concat(frames, ignore_index=True)
+            columns = readings_of(self.analysis, self.found).columns
+            return pd.DataFrame({column.name: column.values for column in columns})
         together = {"together": self.values} if len(self.inputs) > 1 and self.values else {}
         parts: dict[str, tuple[str, Mapping[str, Mapping[str, Quantity]]]]
         parts = {"values": ("input", together | dict(self.by_input)), "models": ("model", self.models)}
@@ -424,13 +417,8 @@ class AnalysisResult(Exportable):
         Raises:
             MissingXarray: it is not installed.
         """
-        frame = self.to_dataframe("readings")
-        whose = frame.pop("input").to_numpy()
-        data = dataset_of_contents(contents_of_readings(self.analysis, self.found, frame))
-        if len(self.inputs) == 1:
-            return data
-        (dimension,) = data[frame.columns[-1]].dims
-        return data.assign_coords({"input": (dimension, whose)})
+        data = dataset_of_contents(contents_of_readings(self.analysis, self.found))
+        return data if len(self.inputs) == 1 else data.set_coords("input")
 
     @property
     def residuals(self) -> np.ndarray:
@@ -472,15 +460,26 @@ class AnalysisResult(Exportable):
             raise UsageError("x", "a number or an array of numbers in SI is expected", value=x)
         return self.models_by_input[self.inputs[number]][chosen].eval(x)
 
-    def fit_report(self) -> str:
-        """Return the fits as text: each model's statistics, parameters of the best one, and their correlations."""
+    @bare
+    def fit_report(self, model: str | None = None, of: FittedModel | None = None) -> str:
+        """Return the fits as text: each model's statistics, the parameters of one, and their correlations.
+
+        Args:
+            model: the law; None: the statistics of all, and the parameters of the best one.
+            of: its fit, where that is not the one in `models`.
+
+        Raises:
+            UsageError: there is no such law.
+        """
+        if model is not None and model not in self.models:
+            raise UsageError("model", meant(model, self.models), value=model)
         lines = [f"{self.kind} of {', '.join(self.inputs)}{', SYNTHETIC' * self.synthetic}", ""]
-        for model in self.document["models"]:
-            found = model.get("statistics", {})
-            words = [f"{name} = {found[key]:.4g}" for key, name in _STATISTICS.items() if found.get(key) is not None]
-            best = " (best)" if model["name"] == self.best_model and len(self.models) > 1 else ""
-            lines.append(f"{model['name']}{best}: {', '.join(words)}")
-        fitted = self.models.get(self.best_model, self.values)
+        shown = self.models if model is None else {model: of or self.models[model]}
+        for name, fit in shown.items():
+            known = {key: value for key in _STATISTICS if (value := fit.statistics.get(key)) is not None}
+            best = " (best)" if name == self.best_model and len(self.models) > 1 else ""
+            lines.append(f"{name}{best}: {', '.join(f'{_STATISTICS[key]} = {one:.4g}' for key, one in known.items())}")
+        fitted = shown.get(model or self.best_model, self.values)
         lines += ["", *(f"  {name} = {quantity!r}" for name, quantity in fitted.items()), ""]
         lines += [f"  correlation of {one} and {other} = {r:+.3f}" for one, other, r in _correlations(fitted)]
         return "\n".join(lines).strip()

@@ -44,6 +44,7 @@ class RecordedRun(Exportable, Run):
         "experiment": "record.experiment",
         "note": "record.note",
         "name": "folder.name",
+        "to_netcdf": "export",
         **{name: lambda run, name=name: getattr(run.to_xarray(), name) for name in ("sel", "isel")},
     }
 
@@ -69,7 +70,6 @@ class RecordedRun(Exportable, Run):
 
     instead: ClassVar[Mapping[str, str]] = {
         "to_csv": "df.to_csv(path), or export('run.csv')",
-        "to_netcdf": "export('run.nc')",
         "values": "df.to_numpy(), or analyze().values",
     }
 

@@ -34,10 +34,19 @@ def chosen_scene(scene: Scene | str | PathLike[str], settings: Mapping[str, Any]
         SceneError: there is no such scene, key or value.
     """
     read = scene if isinstance(scene, Scene) else read_scene(Path(scene))
+    for name in by_name:
+        if name in _OPTIONS:
+            raise UsageError(name, f"is no key of a scene; take {_OPTIONS[name]}")
     whole = {**settings, **{whole_key(read, name): value for name, value in by_name.items()}}
     return read.changed({key: _with_unit(key, value) for key, value in whole.items()})
 
 
+#: What others call an option of simulations, which no key of a scene is → what to type.
+_OPTIONS = {
+    **dict.fromkeys(("t", "time", "t_end", "tmax", "t_max", "t_span"), "duration=…, in seconds or as '2min'"),
+    **dict.fromkeys(("dt", "step", "samples", "n", "t_eval", "fs"), "rate=…, the states per second"),
+    **dict.fromkeys(("rtol", "atol", "tol"), "tolerance=…, of the end [m and rad]"),
+}
 #: Frames from a warning to the line of a person: it, `warn_of`, the room's function, that of the front door, `bare`.
 _CALLER = 5
 

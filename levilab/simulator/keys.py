@@ -40,7 +40,7 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "g": ("gravity_m_s2",),
 }
 #: How similar a name must be to be suggested, from 0 to 1: in the same table, and in any table.
-_ALIKE, _ALIKE_ANYWHERE = 0.5, 0.6
+_ALIKE, _ALIKE_ANYWHERE = 0.6, 0.6
 
 
 class SceneError(LevilabError):

@@ -306,6 +306,7 @@ def _combined_model(fit: CombinedLaw) -> dict[str, Any]:
         "covariance": None,
         "scatter": {name: mean.scatter for name, mean in fit.constants.items()},
         "statistics": statistics_of(fit.statistics),
+        "converged": all(each.kind != "not converged" for each in fit.remarks),
         "warnings": [remark(each) for each in fit.remarks],
     } | ({"linearised": _means(fit.linearised)} if fit.linearised else {})
 
@@ -318,6 +319,7 @@ def _models(run: SpinDown) -> list[dict[str, Any]]:
             "parameters": values_of(fit.parameters),
             "covariance": None if fit.covariance is None else fit.covariance.tolist(),
             "statistics": statistics_of(fit.statistics),
+            "converged": all(each.kind != "not converged" for each in fit.remarks),
             "warnings": [remark(each) for each in fit.remarks],
         }
         | ({"linearised": values_of(fit.linearised)} if fit.linearised else {})

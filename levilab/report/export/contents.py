@@ -16,9 +16,10 @@ from analysis.errors import AnalysisError
 from levilab.errors import DataError, unquote
 from levilab.files import as_json
 from levilab.pipelines.result import Place
+from levilab.pipelines.row import plain
 from levilab.pipelines.suits import recall_suiting
 from levilab.present.units import UNITS, split
-from levilab.runs.find import RECORD, find_run, find_runs
+from levilab.runs.find import RECORD, find_run
 from levilab.runs.run import EVENTS, READINGS, STATES, Run
 from levilab.runs.waveforms import run_waveforms
 from levilab.sweeps.plan import unit_of
@@ -64,11 +65,13 @@ class Table:
         name: of its file, such as readings or trace-000001.
         columns: in their order.
         about: what a row is.
+        labelled: whether the first column names the rows.
     """
 
     name: str
     columns: tuple[Column, ...]
     about: str
+    labelled: bool = False
 
     @property
     def length(self) -> int:
@@ -136,15 +139,13 @@ def contents_of(
         given: options of analyses by their names.
 
     Raises:
-        DataError: there is nothing, or several runs.
+        DataError: there is nothing.
     """
     if not isinstance(place, Path):
         return _of_sweep(place)
     path = find_run(place)
     if (path / "zarr.json").exists():
         return _of_sweep(Store.open(path))
-    if len(runs := [] if path.is_file() else find_runs(path)) > 1:
-        raise _several(path, len(runs))
     run = Run.load(path) if (path / RECORD).exists() else None
     try:
         results = recall_suiting([path], given or {}, tell)
@@ -157,10 +158,10 @@ def contents_of(
 
 
 def contents_of_results(path: Path, run: Run | None, results: Results) -> Contents:
-    """Return what is exported of one input and of what analyses found of it.  Raises DataError for several inputs."""
+    """Return what is exported of an input, or of several, and of what analyses found of them.  Raises DataError."""
     inputs = {source.path: source for _, found in results for source in found.sources}
     if len(inputs) > 1:
-        raise _several(path, len(inputs))
+        return _of_several(path.stem, results)
     if inputs:  # also those of a folder that was searched
         path, run = next((path, source.run) for path, source in inputs.items())
     waveforms = run_waveforms(run) if run else _waveforms_of(results)
@@ -186,27 +187,65 @@ def contents_of_results(path: Path, run: Run | None, results: Results) -> Conten
     )
 
 
-def contents_of_readings(analysis: Analysis[Any], found: Any, frame: Any) -> Contents:
-    """Return the readings of one result in a DataFrame, with its values and models.
-
-    Args:
-        analysis: the row of the catalogue.
-        found: what it found, of one or several inputs.
-        frame: a row for each reading, with their residuals.
-    """
-    first, *others = found.sources
-    about = facts_of(first.run, first.path, [(analysis, found)])
-    if others:
-        synthetic = any(source.synthetic for source in found.sources)
-        about = {"source": "; ".join(source.name for source in found.sources), "synthetic": str(synthetic).lower()}
+def contents_of_readings(analysis: Analysis[Any], found: Any) -> Contents:
+    """Return the readings of one result, with its values and models."""
+    if len(found.sources) > 1:
+        return _of_several(found.place.name, [(analysis, found)])
+    (source,) = found.sources
+    about = facts_of(source.run, source.path, [(analysis, found)])
     written = analysis.result_of(found, Place(Path()))
     about |= {"best_model": getattr(written, "best_model", None) or ""}
-    title, table = f"{analysis.name} of {about['source']}", table_of(frame, "readings", "a reading")
-    return Contents(first.name, title, (table,), about, values=tuple(_values(written)))
+    title, table = f"{analysis.name} of {about['source']}", readings_of(analysis, found)
+    return Contents(
+        source.name, title, (replace(table, columns=table.columns[1:]),), about, values=(*_values(written),)
+    )
 
 
-def _several(path: Path, count: int) -> DataError:
-    return DataError(f"{path}: holds {count} runs, and one is exported at a time: name one of them")
+def readings_of(analysis: Analysis[Any], found: Any) -> Table:
+    """Return a row for each reading of all inputs, with its residual; the first column names the input."""
+    import pandas as pd
+
+    frames = [pd.DataFrame(dict(one)) for one in analysis.columns(found)]
+    for source, frame in zip(found.sources, frames, strict=True):
+        frame.insert(0, "input", source.name)
+    return table_of(pd.concat(frames, ignore_index=True), "readings", "a reading")
+
+
+def _of_several(name: str, results: Results) -> Contents:
+    """Return what analyses found of several inputs: their readings, a row for each input, and all together."""
+    tables, values, files = list[Table](), list[Value](), dict[str, bytes]()
+    names = dict.fromkeys(source.name for _, found in results for source in found.sources)
+    for analysis, found in results:
+        written = analysis.result_of(found, Place(Path()))
+        own = f"{analysis.name}-" * (len(results) > 1)
+        readings = readings_of(analysis, found)
+        inputs = _of_each([source.name for source in found.sources], analysis, written.as_dict()["runs"])
+        tables += [replace(readings, name=f"{own}readings"), replace(inputs, name=f"{own}inputs")]
+        values += _values(written)
+        files[f"{own}result.json"] = f"{as_json(written.as_dict())}\n".encode(errors="replace")
+    about = {
+        "source": "; ".join(names),
+        "synthetic": str(any(source.synthetic for _, found in results for source in found.sources)).lower(),
+        "warnings": "; ".join(dict.fromkeys(unquote(text) for _, found in results for text in found.all_warnings)),
+        "history": f"analyzed by levilab {version('levilab')}",
+    }
+    title = f"{' and '.join(analysis.name for analysis, _ in results)} of {len(names)} inputs"
+    return Contents(name or "inputs", title, tuple(tables), about, values=tuple(values), files=files)
+
+
+def _of_each(names: Sequence[str], analysis: Analysis[Any], parts: Sequence[Mapping[str, Any]]) -> Table:
+    """Return a row for each input, with the columns of `levilab analyze --table` of which something is known."""
+    columns = [Column("input", np.array(names), "1", "the input")]
+    for one in analysis.row:
+        cells = [plain(one.read(part), one.kind) for part in parts]
+        if all(cell is None for cell in cells):
+            continue
+        if one.kind == "text":
+            values = np.array(["" if cell is None else cell for cell in cells], dtype=str)
+        else:
+            values = np.array([np.nan if cell is None else cell for cell in cells])
+        columns.append(Column(one.name, values, unit_of_name(one.name), one.meaning))
+    return Table("inputs", tuple(columns), "an input", labelled=True)
 
 
 def _readings(run: Run | None) -> Iterator[Table]:
@@ -229,7 +268,9 @@ def table_of(frame: Any, name: str, about: str, described: Mapping[str, Mapping[
     columns = []
     for title in map(str, frame):
         unit, source = ((described or {}).get(title, {}).get(key, "") for key in ("unit", "source"))
-        columns.append(Column(title, frame[title].to_numpy(), unit or unit_of_name(title), _meaning(title), source))
+        values = frame[title].to_numpy()
+        values = values.astype(str) if values.dtype.kind == "O" else values
+        columns.append(Column(title, values, unit or unit_of_name(title), _meaning(title), source))
     return Table(name, tuple(columns), about)
 
 
@@ -364,7 +405,7 @@ class Variable:
     Attributes:
         name: letters, digits and low lines.
         dimensions: one for each axis of the values; a variable of the name of a dimension holds its coordinates.
-        values: of int8, int32, float32 or float64.
+        values: of int8, int32, float32, float64, or texts.
         attributes: text, numbers or arrays.
     """
 
@@ -420,24 +461,26 @@ def _of_tables(tables: Sequence[Table], taken: set[str]) -> Iterator[Variable]:
     """Yield the columns of the readings, the first table, and over their dimension what analyses say of each reading.
 
     A table whose rows are no readings has a dimension of its own.  A dimension is the table's first column where that
-    increases, else the number of the row.
+    increases, else the number of the row; of a table whose rows have names these, and the dimension has its name.
     """
     readings: dict[str, Column] = {}
     over, length = "", 0
     for table in tables:
         prefix = f"{table.name}_" if readings else ""
-        rows = _rows_in(readings, table)
+        rows = None if table.labelled else _rows_in(readings, table)
         names: dict[str, str] = {}
         for column in table.columns:
             given = readings.get(column.name) if rows is not None else None
             known = given is not None and _are_equal(given.values[rows], column.values)
             names[column.name] = plain_name(column.name if known else f"{prefix}{column.name}")
+        if table.labelled:
+            names[table.columns[0].name] = plain_name(table.name)
         columns = [column for column in table.columns if names[column.name] not in taken]
         taken |= {*names.values()}
         dimension = over
         if rows is None:
             dimension, length = names[table.columns[0].name], table.length
-            if not _increases(table.columns[0].values):
+            if not (table.labelled or _increases(table.columns[0].values)):
                 dimension = free_name(plain_name(f"{prefix}reading"), taken)
                 yield _numbers(dimension, length, table.about)
         if not readings:
@@ -465,7 +508,7 @@ def _rows_in(readings: Mapping[str, Column], table: Table) -> list[int] | None:
     reading is made of lie before the reading's time.
     """
     columns = {column.name: column.values for column in table.columns}
-    common = [name for name in columns if name in readings and "_u_" not in name]
+    common = [name for name in columns if name in readings and "_u_" not in name and columns[name].dtype.kind != "U"]
     if not common:
         return None
     key = "time_s" if "time_s" in common else common[0]
@@ -496,6 +539,10 @@ def _numbers(name: str, length: int, of: str) -> Variable:
 
 def _spread(variable: Variable, rows: list[int], length: int) -> Variable:
     """Return a variable over all readings: those that it has no row of are missing."""
+    if variable.values.dtype.kind == "U":
+        values = np.full(length, "", variable.values.dtype)
+        values[rows] = variable.values
+        return replace(variable, values=values)
     missing = {"_FillValue": variable.attributes.get("_FillValue", variable.values.dtype.type(-1))}
     values = np.full(length, missing["_FillValue"])
     values[rows] = variable.values
@@ -560,11 +607,8 @@ def _variable(
     if values.dtype.kind == "b":
         flags = {"flag_values": np.array([0, 1], dtype=np.int8), "flag_meanings": "no yes", "dtype": "bool"}  # xarray's
         return Variable(name, dimensions, values.astype(np.int8), attributes | flags)
-    if values.dtype.kind in "US":
-        words, numbers = np.unique(values, return_inverse=True)
-        meanings = " ".join(re.sub(r"[^\w.+-]", "_", word) or "_" for word in words.tolist())
-        flags = {"flag_values": np.arange(len(words), dtype=np.int32), "flag_meanings": meanings}
-        return Variable(name, dimensions, numbers.astype(np.int32), attributes | flags)
+    if values.dtype.kind == "U":
+        return Variable(name, dimensions, values, attributes)
     if values.dtype.kind in "iu":
         return Variable(name, dimensions, values.astype(np.int32), attributes | units_of(column.unit))
     missing = {} if (name,) == dimensions else {"_FillValue": np.array(np.nan, dtype=values.dtype)}

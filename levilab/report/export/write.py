@@ -12,6 +12,8 @@ from itertools import chain, count
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from levilab.errors import LevilabError, UsageError
 from levilab.files import CannotWrite, check_writable, replace_atomically, writing
 from levilab.report.export.contents import attributes_of, variables_of
@@ -104,9 +106,15 @@ def _netcdf(contents: Contents, out: Path) -> dict[Path, bytes]:
         for name, length in zip(variable.dimensions, variable.values.shape, strict=True):
             if name not in file.dimensions:
                 file.createDimension(name, length)
-        written = file.createVariable(variable.name, variable.values.dtype, variable.dimensions)
-        written[...] = variable.values
-        for name, value in variable.attributes.items():
+        values, dimensions, attributes = variable.values, variable.dimensions, dict(variable.attributes)
+        if values.dtype.kind == "U":  # a row of letters each, as netCDF-3 has it, and how xarray joins them
+            letters = np.char.encode(values, "utf-8", "replace")
+            values = letters.astype(f"S{max(letters.itemsize, 1)}").view("S1").reshape(len(values), -1)
+            dimensions, attributes["_Encoding"] = (*dimensions, f"{variable.name}_length"), "utf-8"
+            file.createDimension(dimensions[-1], values.shape[1])
+        written = file.createVariable(variable.name, values.dtype, dimensions)
+        written[...] = values
+        for name, value in attributes.items():
             setattr(written, name, value.encode(errors="replace") if isinstance(value, str) else value)
     file.flush()
     return {out: buffer.getvalue()}
@@ -126,7 +134,8 @@ def _hdf5(contents: Contents, out: Path) -> dict[Path, bytes]:
     with h5py.File(buffer, "w") as file:
         file.attrs.update(attributes_of(contents))
         for one in variables:
-            file.create_dataset(one.name, data=one.values).attrs.update(one.attributes)
+            values = one.values.astype(h5py.string_dtype()) if one.values.dtype.kind == "U" else one.values
+            file.create_dataset(one.name, data=values).attrs.update(one.attributes)
             if (one.name,) == one.dimensions:
                 file[one.name].make_scale(one.name)
         for one in variables:

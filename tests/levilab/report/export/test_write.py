@@ -191,7 +191,6 @@ def test_traces_of_unlike_lengths_are_one_behind_the_other_as_cf_has_it(tmp_path
     [
         ("spin-down-1", "run.docx", "ends in .nc, .h5, .csv, .xlsx, .zip is expected"),
         ("spin-down-1", "there.zip", "is there already: give another name with `out`, or `force` to replace it"),
-        (".", "run.zip", "one is exported at a time: name one of them"),
         ("README.md", "run.zip", "README.md"),
     ],
 )
@@ -202,6 +201,21 @@ def test_what_cannot_be_exported_says_what_to_do(source, name, said, tmp_path):
     assert said in str(refused.value)
     assert [path.name for path in tmp_path.iterdir()] == ["there.zip"]
     assert (tmp_path / "there.zip").read_bytes() == b"kept"
+
+
+@pytest.mark.parametrize("name", ["four.nc", "four.h5"])
+def test_several_inputs_have_a_row_each_and_their_readings_one_behind_the_other(name, tmp_path):
+    four = door.analyze([SAMPLE_DATA / f"spin-down-{k}" for k in (1, 2, 3, 4)])
+    (file,) = door.export(four, tmp_path / name)
+    second = four.by_input["spin-down-2"]["c32"]
+    with xarray.open_dataset(file) as data:
+        own = data.sel(inputs="spin-down-2")
+        assert own.inputs_disc_c32_per_sqrt_rad_s.item() == second.value
+        assert own.inputs_disc_c32_u_per_sqrt_rad_s.item() == second.u
+        assert data.result_spindown_disc_c32.item() == four["c32"].value  # of all together
+        alone = data.residual_hz[data.input == "spin-down-2"]
+        assert np.array_equal(alone, door.analyze(SAMPLE_DATA / "spin-down-2").residuals)
+        assert four.to_xarray().sizes == data.sizes
 
 
 def test_no_table_of_a_csv_replaces_a_file(tmp_path):
