@@ -66,7 +66,8 @@ class Grid:
         whole numbers of samples.  So the error of a rounded time is carried to the frequency, for all places of the
         flank between samples and all drifts up to one sample along the record; of those that would leave no larger
         residuals than these, the mean square is the least variance.  Where every rounding would leave larger ones, the
-        flanks are seen to a part of a sample, by which the smallest of these errors is multiplied.
+        flanks are seen to a part of a sample, by which the smallest of these errors is multiplied: the residuals over
+        those of the rounding, less what lies between the places and drifts that are tried.
 
         Args:
             times: of the turns, shape (n,) [s].
@@ -79,9 +80,9 @@ class Grid:
         rounded = ((place - np.rint(place)) * rounding).reshape(-1, times.size)
         shifts = rounded @ carried
         left = np.sqrt(np.mean((rounded - shifts @ powers.T) ** 2, axis=1))
-        most, least = UNLIKE * seen + UNSEEN * rounding, float(left.min())
-        part = min(most / least, 1.0) if least else 1.0
-        return part**2 * float(np.mean(shifts[left <= max(most, least), 1] ** 2))
+        unseen, least = UNSEEN * rounding, float(left.min())
+        part = min(UNLIKE * seen / (least - unseen), 1.0) if least > unseen else 1.0
+        return part**2 * float(np.mean(shifts[left <= max(UNLIKE * seen + unseen, least), 1] ** 2))
 
 
 @dataclass(frozen=True)

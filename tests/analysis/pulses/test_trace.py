@@ -183,7 +183,7 @@ def test_pulses_of_three_samples_that_show_their_flanks_have_no_u_of_whole_sampl
         found = spin_of_trace(samples, rate, degree=2).frequency
         errors.append((found.value - spin, found.u))
     error, u = np.array(errors).T
-    assert np.median(u) < 10 * 1.4826 * np.median(np.abs(error))  # 7.5: the places in the mean pulse are no finer
+    assert np.median(u) < 3 * 1.4826 * np.median(np.abs(error))  # 2.0; at turns of nearly whole samples 28 are right
     assert np.std(error / u) < 1.15  # three standard errors
 
 
