@@ -11,7 +11,7 @@ from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, title_of
 from levilab.pipelines.row import cells_of
-from levilab.pipelines.spin.analysis import MOST_DRAWN, OF_A_RUN, in_a_sentence
+from levilab.pipelines.spin.analysis import MOST_DRAWN, OF_A_RUN, in_a_sentence, shown_time
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
 from levilab.present.numbers import column, enumeration, how_many, plain, short_name, with_decimals, with_uncertainty
@@ -174,7 +174,7 @@ def frequency_table(analysis: SpinAnalysis) -> Table:
             spin,
             slope,
             *([run.which or "all"] * several),
-            with_decimals(run.spin.reference_time, 4),
+            shown_time(run.spin),
             run.spin.method,
             plain(None if run.spin.bound is None else 1e3 * run.spin.bound, 2),
         )

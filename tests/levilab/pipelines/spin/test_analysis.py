@@ -20,7 +20,7 @@ from levilab.pipelines.spin import words
 from levilab.pipelines.spin.analysis import Series, drive_offset, in_a_sentence
 from levilab.pipelines.spin.document import SPIN
 from levilab.pipelines.spin.figure import spin_figure
-from levilab.pipelines.spin.report import meaning, spin_part, spin_tables
+from levilab.pipelines.spin.report import frequency_table, meaning, spin_part, spin_tables
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import analyze_suiting
 from levilab.pipelines.suits import save as save_found
@@ -371,3 +371,4 @@ def test_the_time_that_is_said_moves_the_spin_by_less_than_its_u(tmp_path):
     (said,) = re.findall(r" at ([\d.]+) s", in_a_sentence(found.runs[0]))
     assert abs((float(said) - spin.reference_time) * spin.chirp.value) < spin.frequency.u / 2
     assert len(said) < 14
+    assert said in frequency_table(found).rows[0].cells
