@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from levilab.notebook.run import RecordedRun, RunList
     from levilab.notebook.stability import FloatingTop
     from levilab.notebook.sweep import SimulatedMap
-    from levilab.pipelines.options import Method, Tilt
+    from levilab.pipelines.options import Correlation, Method, Tilt
     from levilab.runs.run import Run
     from levilab.simulator.scene import Scene
 
@@ -207,6 +207,7 @@ def analyze(
     reading_u: float | None = None,
     keep_outliers: bool = False,
     tilt: Tilt = "auto",
+    correlation: Correlation = "fitted",
     between: tuple[float, float] | str | None = None,
     laws: Sequence[str] | str | None = None,
     method: Method = "auto",
@@ -260,6 +261,7 @@ def analyze(
         keep_outliers: fit readings that look like miscounts, too (spindown, precession).
         tilt: whether counts hold the tilt of the top's moment: "auto" as "fitted", but for a mock run whose top only
             spins; "none" for a top that only spins (spindown).
+        correlation: whether the noise of neighbouring readings may be correlated; "none": it is white (spindown).
         between: fit only the readings between two spins [Hz], as (30, 24) (spindown).
         laws: fit only these drag laws, as ("disc", "stokes") (spindown).
         method: how pulses are found: edges is the fastest, likelihood for weak ones (spin).

@@ -42,14 +42,18 @@ class CountModel:
         tilt: whether the count has the tilt of the top.
         top: the top that is counted.
         release: see `fit_spin_down`.
+        correlated: whether the noise of neighbouring readings may be correlated.
     """
 
     tilt: bool
     top: Top
     release: Release | None
+    correlated: bool = True
 
     def fit(self, law: DragLaw, readings: Readings, rho: Array = RHO) -> Solution:
         """Return the best point of one law."""
+        if not self.correlated:
+            rho = INDEPENDENT
         return solution(law, readings, tilt=self.tilt, top=self.top, release=self.release, rho=rho)
 
 
@@ -68,7 +72,7 @@ class SpinDown:
         start_time: time of the first reading [s].
         remarks: what to know before using the numbers.
         model: of the count.
-        correlation: of neighbouring readings' noise, about the best law; None where it is undefined.
+        correlation: of neighbouring readings' noise, about the best law; None where it is undefined, or known to be 0.
     """
 
     fits: tuple[LawFit, ...]
@@ -121,6 +125,7 @@ def fit_spin_down(
     release: Release | None = None,
     gate: float | None = None,
     top: Top = THESIS_TOP,
+    correlated: bool = True,
 ) -> SpinDown:
     """Fit drag laws to one spin-down: a count of a top that wobbles, with noise whose neighbours may be correlated.
 
@@ -136,6 +141,7 @@ def fit_spin_down(
             more it nutates. None: set free at the first reading.
         gate: over which each reading is a mean [s]; None: not known.  The fits say what it does, and are not changed.
         top: whose count it is.
+        correlated: whether the noise of neighbouring readings may be correlated; False: it is known to be white.
 
     Raises:
         AnalysisError: readings or names that cannot be used, see `readings.checked` and `UnknownName`.
@@ -152,7 +158,7 @@ def fit_spin_down(
     """
     chosen = _check_names("drag law", laws, LAWS)
     given = check_readings(time, spin_frequency, u)
-    model = CountModel(tilt, top, release)
+    model = CountModel(tilt, top, release, correlated)
     outliers = _search_outliers(given, model)
     while True:
         readings = given if keep_outliers or not len(outliers) else given.without(outliers)

@@ -72,7 +72,7 @@ class LawFit:
         top: whose count it is.
         shared_u: by parameter, the part of its u that is the same for all runs of one top, with one sign.
         parts: by parameter, what u is made of; empty where u is undefined.
-        rho: correlation of neighbouring readings' noise; None where undefined.
+        rho: correlation of neighbouring readings' noise; None where undefined, or known.
     """
 
     name: str
@@ -370,7 +370,7 @@ def fit_law(found: Solution, gate: float | None = None) -> LawFit:
         top=found.counted.top if found.counted else THESIS_TOP,
         shared_u=_shared_u(found, slopes) if known and found.counted else {},
         parts=_parts(found, slopes, u, gate) if known else {},
-        rho=None if after is None or not known else Estimate(after.rho, after.rho_u, "1"),
+        rho=None if after is None or not known or not after.rho_u else Estimate(after.rho, after.rho_u, "1"),
     )
 
 

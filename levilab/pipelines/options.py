@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from levilab.formats.device import Device
 
 Tilt = Literal["auto", "none", "fitted"]
+Correlation = Literal["fitted", "none"]
 Method = Literal["auto", "edges", "matched", "likelihood"]
 
 
@@ -193,6 +194,10 @@ class SpinDownOptions(RecordOptions):
         "Whether counts hold the tilt of the top's moment.  auto: as fitted, but for a mock run whose top only spins.  "
         "none: a top that only spins.",
         choices=get_args(Tilt),
+    ))  # fmt: skip
+    correlation: Correlation = field(default="fitted", metadata=_about(
+        "Whether the noise of neighbouring readings may be correlated.  none: it is white, as you know.",
+        choices=get_args(Correlation),
     ))  # fmt: skip
     between: tuple[float, float] | None = field(default=None, metadata=_about(
         "Fit only the readings between two spins, as 30:24.", metavar="HZ:HZ", unit="Hz", read=_read_between,

@@ -49,7 +49,7 @@ class _Run:
         rho: correlation of neighbours.
         step: last digit of the readings [Hz]; 0: they are not rounded.
         gate: of the counter [s]; 0: not known.
-        tilt, release: as the analysis had them.
+        tilt, release, correlated: as the analysis had them.
     """
 
     time: Array
@@ -61,6 +61,7 @@ class _Run:
     gate: float
     tilt: bool
     release: Release | None
+    correlated: bool
 
     def readings(self, random: np.random.Generator, factors: Sequence[float]) -> Array:
         """Made-up readings, the constants multiplied by factors, shape (n,) [Hz]."""
@@ -124,6 +125,7 @@ def _run(found: SpinDownAnalysis, k: int, fit: LawFit, run: SpinDown) -> _Run:
         gate=gate_of(source, EXPERIMENT) or 0.0,
         tilt=fit.has_tilt,
         release=run.model.release,
+        correlated=run.model.correlated,
     )
 
 
@@ -182,6 +184,7 @@ def _trial(
                 release=run.release,
                 gate=run.gate or None,
                 top=run.fit.top,
+                correlated=run.correlated,
             )
         )
         if several:

@@ -83,6 +83,7 @@ def fit_source(source: Source[SpinReadings], options: SpinDownOptions) -> SpinDo
             release=readings.release,
             gate=gate_of(source, EXPERIMENT),
             top=top_of_device(options.device),
+            correlated=options.correlation == "fitted",
         )
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error

@@ -142,9 +142,8 @@ def _of_readings(
         note = Text("χ²/dof = {chi:n}", chi=digits(fit.statistics.reduced_chi_square or 0.0))
         remedy = "finding what the law, or the stated u, leaves out"
         yield direct_row("excess", "scatter beyond the stated u", parts.excess, unit, note, remedy, kind="A")
-    if parts.correlation > 0:
-        found = run.correlation
-        note = Text("ρ = {r:.2f} ± {u:.2f} between neighbours", r=found.value, u=found.u) if found else ""
+    if (found := run.correlation) and parts.correlation > 0:
+        note = Text("ρ = {r:.2f} ± {u:.2f} between neighbours", r=found.value, u=found.u)
         yield direct_row(
             "correlation", "correlation of neighbouring readings", parts.correlation, unit, note,
             "a calmer top, or more runs", kind="A",

@@ -41,6 +41,22 @@ def test_a_law_that_fits_has_the_numbers_of_lmfit(result):
     assert (ends[4][1] - ends[2][1]) / 2 == pytest.approx(np.sqrt(scale) * half, rel=0.1)
 
 
+@pytest.mark.parametrize("stated", [None, 0.02])
+def test_with_white_noise_values_and_u_are_those_of_lmfit(stated):
+    """Twenty readings of the disc law itself; a stated u counts as 8 readings, by which u of lmfit is multiplied."""
+    t = np.arange(0.0, 200.0, 10.0)
+    for seed in range(5):
+        f = _disc(t, 40.0, 2.34e-4) + np.random.default_rng(seed).normal(0.0, 0.02, t.size)
+        theirs = lmfit.Model(_disc).fit(f, t=t, start_frequency=40.0, c32=2.4e-4, weights=50.0)
+        data = (t, f) if stated is None else (t, f, stated)
+        ours = levilab.analyze(data, tilt="none", correlation="none", keep_outliers=True).models["disc"]
+        scale = 1.0 if stated is None else np.sqrt((8 + theirs.chisqr) / (8 + 18) / theirs.redchi)
+        for name, their in theirs.params.items():
+            assert ours[name].n == pytest.approx(their.value, abs=0.01 * their.stderr)
+            assert ours[name].s == pytest.approx(scale * their.stderr, rel=0.01)
+        assert ours.covar == pytest.approx(scale**2 * theirs.covar, rel=0.02)
+
+
 def test_information_criteria_have_their_closed_forms(result):
     """K counts the noise besides: AICc − AIC = 2K(K+1)/(n−K−1) and BIC − AIC = K(ln n − 2)."""
     for fit in result.models.values():
