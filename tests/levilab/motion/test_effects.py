@@ -92,6 +92,7 @@ def only(monkeypatch, *names):
 
 def test_what_is_in_is_reported_by_what_its_absence_changes(monkeypatch):
     only(monkeypatch, "tilt of the moment", "drive")
+    monkeypatch.setattr("levilab.motion.effects.field_kinds", lambda _: ())
     effects = {e.name: e for e in explain(preset("driven"), 2.0)}
     assert effects["tilt of the moment"].included
     assert effects["drive"].included

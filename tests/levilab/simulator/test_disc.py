@@ -111,7 +111,7 @@ def test_the_mean_field_over_the_disc_is_that_of_magpylib():
 
 @pytest.mark.parametrize("name", SCENES)
 def test_the_estimate_bounds_the_error_against_the_volume(name):
-    scene, (duration, rate) = SCENES[name], (0.02, 4000) if name == "near the base" else (1.0, 600)
+    scene, (duration, rate) = SCENES[name], (0.02, 4000) if name == "near the base" else (0.5, 600)
     motion = simulate(scene, duration, tolerance=1e-10, rate=None)
     place, axis = errors(motion, true_end(scene, duration, 1 / rate))
     assert motion.accuracy.reached

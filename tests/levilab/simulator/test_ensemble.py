@@ -230,9 +230,9 @@ def test_lanes_are_filled_again_so_that_many_early_escapes_cost_little():
 
 
 def test_tops_of_different_kinds_go_together():
-    many = simulate_many(UNDRIVEN, {"base.field": np.array(["paraxial-2", "paraxial-4"])}, 1.0)
-    for field, place in zip(("paraxial-2", "paraxial-4"), many.position, strict=True):
-        alone = simulate(UNDRIVEN.changed({"base.field": field}), 1.0, tolerance=1e-10, rate=None)
+    many = simulate_many(UNDRIVEN, {"drag.law": np.array(["none", "stokes"])}, 1.0)
+    for law, place in zip(("none", "stokes"), many.position, strict=True):
+        alone = simulate(UNDRIVEN.changed({"drag.law": law}), 1.0, tolerance=1e-10, rate=None)
         assert place == pytest.approx(alone.position[-1], abs=1e-9)
 
 

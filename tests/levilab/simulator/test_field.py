@@ -1,7 +1,6 @@
 """The base's field against magpylib, against derivatives of higher precision, and against itself."""
 
 import math
-from itertools import pairwise
 
 import magpylib
 import mpmath
@@ -26,7 +25,7 @@ PLACES = np.array(
         [0.08, 0, 0.005], [0.01, 0, -0.05], [0.1, 0.1, 0.1], [0.5, 0.0, 1.0],
     ]
 )  # fmt: skip
-THESIS = ["paraxial-2", "paraxial-4", "paraxial-8", "paraxial-20", "exact"]
+THESIS = ["paraxial-2", "paraxial-4", "paraxial-20", "exact"]
 
 
 def authority(thickness, origin, places):
@@ -181,11 +180,11 @@ def test_the_series_converges_to_the_exact_field_by_the_distance_from_the_edges(
     exact = flux_density(field_of(A, B, RHO, "exact", thickness=thickness, origin=-thickness / 2), at)
     ring = {"thickness": thickness, "origin": -thickness / 2}
     # each order is compiled for itself, for a second; those between take the same way through the same code
-    cut = [flux_density(field_of(A, B, RHO, f"paraxial-{n}", **ring), at) for n in (4, 8, 20)]
+    cut = [flux_density(field_of(A, B, RHO, f"paraxial-{n}", **ring), at) for n in (4, 20)]
     errors = [relative(series, exact) for series in cut]
     # a term is smaller than the one before by r²/(a² + z²) = 1/62, but for polynomials of the height that pass zero
-    assert all(later < earlier / 100 for earlier, later in pairwise(errors) if later > 1e-14)
-    assert errors[-1] < 1e-14
+    assert 1e-14 < errors[0] < 1e-4
+    assert errors[1] < 1e-14
 
 
 def test_general_and_written_out_series_agree():
@@ -198,8 +197,8 @@ def test_general_and_written_out_series_agree():
 
 
 def test_a_thin_base_is_nearly_a_sheet():
-    thin = field_of(A, B, RHO, "paraxial-8", thickness=1e-4)
-    sheet = field_of(A, B, RHO, "paraxial-8")
+    thin = field_of(A, B, RHO, "paraxial-4", thickness=1e-4)
+    sheet = field_of(A, B, RHO, "paraxial-4")
     # the mean over h adds h²/24 of the second derivative: 1e-6 of the field for z ~ 5 cm
     assert relative(flux_density(thin, PLACES[:8]), flux_density(sheet, PLACES[:8])).max() < 1e-5
 

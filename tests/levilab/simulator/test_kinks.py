@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from levilab.simulator.accuracy import has_kink
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.kernels.motion import TIME
 from levilab.simulator.model import model_of
@@ -27,7 +28,6 @@ DRAGS = {
     "newton": {"drag.law": "newton", "drag.coefficient": 2e-2},
     "strong newton": {"drag.law": "newton", "drag.coefficient": 2e-1},
     "disc": {"drag.law": "disc", "drag.coefficient": 2e-2},
-    "mixed": {"drag.law": "mixed", "drag.coefficient": [0.1, 2e-2]},
     "washers": {
         "drag.law": "newton", "drag.coefficient": 2e-2,
         "washers.inertia_kg_m2": 3e-7, "washers.coupling_n_m_s": 1e-6, "washers.drag_share": 0.5,
@@ -57,6 +57,11 @@ def test_the_estimate_bounds_the_error_of_a_spin_that_passes_zero(drag):
             many = simulate_many(scene, {}, 0.5, step=step)
             assert np.linalg.norm(many.axis[0] - true.axis[-1]) <= many.axis_error[0] + 1e-13
     assert passed >= 5
+
+
+@pytest.mark.parametrize(("law", "kink"), [("stokes", False), ("mixed", True)])
+def test_every_law_but_that_of_stokes_has_a_kink(law, kink):
+    assert has_kink(model_of(SLOW.changed({"drag.law": law})).drag) is kink
 
 
 def test_a_spin_that_stays_away_from_zero_has_its_order():

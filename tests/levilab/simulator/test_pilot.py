@@ -45,16 +45,15 @@ def test_backwards_the_estimate_is_as_good_as_forwards():
 
 
 @pytest.mark.parametrize(
-    "changes",
+    "scene",
     [
-        {"top.magnet": "disc"},
-        {"start.spin_hz": 20.0},  # it falls
-        {"drive.waveform": "square", "drive.off_s": 1.0},
+        UNDRIVEN.changed({"top.magnet": "disc"}),
+        UNDRIVEN.changed({"start.spin_hz": 20.0}),  # it falls
+        preset("driven").changed({"drive.waveform": "square", "drive.off_s": 1.0}),
     ],
     ids=["disc", "fall", "drive that goes off"],
 )
-def test_the_estimate_bounds_the_error_where_the_motion_changes_on_the_way(changes):
-    scene = UNDRIVEN.changed(changes)
+def test_the_estimate_bounds_the_error_where_the_motion_changes_on_the_way(scene):
     motion = simulate(scene, 3.0, tolerance=1e-8, rate=None)
     assert motion.accuracy.reached
     exact = simulate(scene, 3.0, tolerance=1e-8, rate=None, step=motion.accuracy.step / 4)
@@ -72,7 +71,7 @@ def test_no_step_is_beyond_the_longest_that_the_kernels_hold_for(kind, monkeypat
         return real(problem, stretches)
 
     monkeypatch.setattr(Problem, "advance_together", watch)
-    for duration in (0.3, 3.0, 12.0):
+    for duration in (0.3, 4.0):
         for tolerance in (1.0, 1e-4, 1e-9):
             for rate in (None, 30.0):
                 simulate(scene, duration, tolerance=tolerance, rate=rate)
