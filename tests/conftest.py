@@ -12,6 +12,7 @@ from pathlib import Path
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
+from filelock import FileLock
 from hypothesis import settings
 
 from support.one_compiler import compile_each_kernel_once
@@ -50,9 +51,20 @@ LONGEST = """
 """
 
 
+@pytest.hookimpl(wrapper=True)
 def pytest_collection():
-    """Look for no garbage until all tests are collected: there is none, and that took a fifth of the time."""
+    """Look for no garbage until all tests are collected: there is none, and that took a fifth of the time.
+
+    In a fresh clone no file of tests is compiled yet.  One process of xdist does it, for five seconds, and the others
+    wait and read what it has written.
+    """
     gc.disable()
+    compiled = Path(__file__).parent / "__pycache__"
+    if "PYTEST_XDIST_WORKER" in os.environ and not sys.dont_write_bytecode:
+        with FileLock(compiled / "first.lock"):
+            if not any(compiled.glob("test_*.pyc")):
+                return (yield)
+    return (yield)
 
 
 def pytest_collection_modifyitems(items):
