@@ -35,7 +35,8 @@ def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> st
     named = ("",) if "_" not in where else ()  # a unit in a key stands behind _
     hint = "" if first["type"] == "literal_error" else hint_about(first["input"], *named)  # where words are expected
     whole_table = first["type"] == "missing" or isinstance(first["input"], dict)
-    seen = "" if whole_table else f" = {str(first['input'])[:60]!r}"
+    given = str(first["input"])[:60]
+    seen = "" if whole_table else f" = {given if first['type'] == 'range' else repr(given)}"
     return f"{where}{seen}: {explain_message(first['msg'])}{hint}{more}"
 
 

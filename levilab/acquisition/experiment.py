@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
-from pydantic import Field, PositiveFloat, model_validator
+from pydantic import Field, PositiveFloat, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from levilab.formats.typed import check_range
 from levilab.runs.channel import Channel
 from levilab.settings import Settings
 
@@ -29,6 +30,8 @@ class ExperimentSettings(Settings):
     A field's description is its comment in a new bench file, where the fields stand in order, inherited ones last; a
     field that is None by default has an example.
     """
+
+    _in_range = field_validator("*")(check_range)
 
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for what the bench does not allow.

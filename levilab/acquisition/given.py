@@ -152,8 +152,9 @@ def _refusal(
     """Return the faults of settings that were given as texts by their names."""
     first = error.errors()[0]
     name = str(first["loc"][0]) if first["loc"] else ""
-    own = first["type"] == "value_error" or not name  # the experiment's own words
-    text = str(first.get("ctx", {}).get("error", first["msg"])) if own else ""
+    own = first["type"] in {"value_error", "range"} or not name  # the experiment's own words
+    about = first.get("ctx", {})
+    text = about.get("problem") or (str(about.get("error", first["msg"])) if own else "")
     if name not in given:
         return UsageError("settings", f"{experiment}: {text or first['msg']}")
     values = describe_values(name, schema_of(now, limits)[name])

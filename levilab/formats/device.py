@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Self
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationError, model_validator
+from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationError, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
 from levilab.errors import DataError
 from levilab.files import parse_toml
+from levilab.formats.typed import check_range
 from levilab.settings import Settings, in_one_line
 
 if TYPE_CHECKING:
@@ -28,6 +29,8 @@ class BaseTable(Settings):
     Attributes:
         origin_m: height of the middle of its thickness, on the scale of the scan's heights.
     """
+
+    _in_range = field_validator("*")(check_range)
 
     inner_radius_m: PositiveFloat | None = None
     inner_radius_u_m: NonNegativeFloat = 1e-4
@@ -53,6 +56,8 @@ class PartTable(Settings):
         offset_m: of its middle along the axis, from any mark.
     """
 
+    _in_range = field_validator("*")(check_range)
+
     name: str
     mass_kg: PositiveFloat
     mass_u_kg: NonNegativeFloat = 0.0
@@ -68,6 +73,8 @@ class PartTable(Settings):
 
 class TopTable(Settings):
     """The top: mass and inertias as they are known, or its parts; its moment; the size of its magnet."""
+
+    _in_range = field_validator("*")(check_range)
 
     mass_kg: PositiveFloat | None = None
     mass_u_kg: NonNegativeFloat = 0.0

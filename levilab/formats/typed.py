@@ -5,13 +5,26 @@ from __future__ import annotations
 import math
 import re
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from pydantic_core import PydanticCustomError
+
+from levilab.formats.ranges import problem_of
 from levilab.formats.titles import UNITS, factor_of, plain_unit
 from levilab.settings import hint_about
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from pydantic import ValidationInfo
+
+
+def check_range(value: Any, info: ValidationInfo) -> Any:
+    """Refuse a value outside of the range of its field's quantity; settings call it as `field_validator("*")`."""
+    if isinstance(value, float) and (problem := problem_of(info.field_name or "", value)):
+        raise PydanticCustomError("range", "{problem}", {"problem": problem})
+    return value
+
 
 #: Units in which people type a quantity, with their factors to the first one, that of results and of keys.
 TYPED: tuple[Mapping[str, float], ...] = (
@@ -38,8 +51,6 @@ _TEMPERATURES = {
 #: Units that a refusal names.
 _SHOWN = 8
 _NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s*([^\d\s,.;:].*)?", re.IGNORECASE)
-#: Magnets that people hold in their hands, and the lightest washer and the heaviest top [kg].
-_COLDEST, _WARMEST, _LIGHTEST, _HEAVIEST = -30.0, 60.0, 1e-6, 1.0
 
 
 def read_number(text: str, unit: str) -> float:
@@ -106,7 +117,7 @@ def read_mass(text: str) -> float:
         grams = read_number(text, "g")
     except ValueError:
         raise ValueError(f"{expected} is expected{hint_about(text) if ',' in text else ''}") from None
-    return round(_in_range(grams * 1e-3, _LIGHTEST, _HEAVIEST, expected, "kg"), 9)
+    return round(_in_range("mass_kg", grams * 1e-3, 1e-3, asks=text.strip()[-1:].isdecimal()), 9)
 
 
 def read_temperature(text: str) -> float:
@@ -120,7 +131,7 @@ def read_temperature(text: str) -> float:
     scale = _TEMPERATURES.get(found[2] or "°C") if found else None
     if found is None or scale is None:
         raise ValueError(f"{expected} is expected{hint_about(text) if ',' in text else ''}")
-    return round(_in_range(float(found[1]) * scale[0] + scale[1], _COLDEST, _WARMEST, expected, "°C"), 2)
+    return round(_in_range("temperature_c", float(found[1]) * scale[0] + scale[1], asks=not found[2]), 2)
 
 
 def read_masses(text: str) -> tuple[float, ...]:
@@ -149,7 +160,7 @@ def read_masses(text: str) -> tuple[float, ...]:
     )
 
 
-def _in_range(value: float, low: float, high: float, expected: str, unit: str) -> float:
-    if not low <= value <= high:
-        raise ValueError(f"{expected} is expected, from {low:g} to {high:g} {unit}")
+def _in_range(key: str, value: float, factor: float = 1.0, *, asks: bool) -> float:
+    if problem := problem_of(key, value, factor, asks=asks):
+        raise ValueError(problem)
     return value

@@ -21,7 +21,6 @@ from levilab.motion.table import headline, print_motion
 from levilab.notebook.labels import dataset_of_contents
 from levilab.notebook.names import Exportable, bare, meant
 from levilab.notebook.quantity import Named
-from levilab.notebook.scene import warn_of
 from levilab.present.html import facts_as_html
 from levilab.report.export.contents import Contents, table_of
 from levilab.simulator.trajectory import Trajectory
@@ -273,7 +272,6 @@ def simulate_motion(
     done = run_simulation(request, lambda _: None, uses_states=True)
     motion = done.summary.motion
     rows = kept_rows(motion, done.samples_per_state)
-    warn_of(scene)
     own = {one.name: getattr(motion, one.name) for one in fields(motion)}
     own |= {"states": motion.states[rows]}
     simulated = SimulatedMotion(**own, found=done.summary, folder=done.folder, request=request)

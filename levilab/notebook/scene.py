@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import DoubtWarning, UsageError, unquote
+from levilab.errors import UsageError
 from levilab.formats.typed import read_number, unit_of_key
-from levilab.simulator.equilibrium import doubts_of
 from levilab.simulator.keys import parse_setting
 from levilab.simulator.scene import Scene, leaves, preset, presets, read_scene
 
@@ -47,14 +45,6 @@ _OPTIONS = {
     **dict.fromkeys(("dt", "step", "samples", "n", "t_eval", "fs"), "rate=…, the states per second"),
     **dict.fromkeys(("rtol", "atol", "tol"), "tolerance=…, of the end [m and rad]"),
 }
-#: Frames from a warning to the line of a person: it, `warn_of`, the room's function, that of the front door, `bare`.
-_CALLER = 5
-
-
-def warn_of(scene: Scene) -> None:
-    """Warn as Python does of what makes a motion doubtful."""
-    for text in doubts_of(scene):
-        warnings.warn(unquote(text), DoubtWarning, stacklevel=_CALLER)
 
 
 def _with_unit(key: str, value: Any) -> Any:

@@ -13,7 +13,7 @@ from levilab.errors import UsageError
 from levilab.notebook.labels import dataset_of, head_as_html
 from levilab.notebook.names import Exportable, bare
 from levilab.notebook.quantity import Named
-from levilab.notebook.scene import chosen_scene, in_seconds, warn_of, whole_key
+from levilab.notebook.scene import chosen_scene, in_seconds, whole_key
 from levilab.present.html import facts_as_html, fold
 from levilab.report.export.contents import attributes_of, contents_of
 from levilab.sweeps.adaptive import is_adaptive, run_adaptive
@@ -198,7 +198,6 @@ def sweep_scene(
         SceneError, SimulationError: a scene of the sweep cannot be simulated.
     """
     chosen = chosen_scene(scene, settings, {})
-    warn_of(chosen)
     if not isinstance(axes, Mapping | Sequence):
         raise UsageError("sweep", "keys with their values are expected, as {'spin_hz': [20, 30]}", value=axes)
     named: Mapping[str, Any] = axes if isinstance(axes, Mapping) else {}

@@ -13,6 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from levilab.errors import UsageError
+from levilab.formats.ranges import problem_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -139,7 +140,7 @@ _RATE = _about(
 )  # fmt: skip
 _HEIGHT = _about(
     "Height at which the top floats; with a scan its moment follows, if its mass is known.  Of the rim, with --camera.",
-    kind=float, metavar="MM", typed="height", unit="mm", factor=1e-3, low=-1.0, high=2.0,
+    kind=float, metavar="MM", typed="height", unit="mm", factor=1e-3,
 )  # fmt: skip
 _CLOCK_U = _about(
     "Relative standard uncertainty of the clock that counts or samples, as 2e-6, from its manual; the budgets show "
@@ -233,7 +234,7 @@ class SpinOptions(RecordOptions):
     ))  # fmt: skip
     below_m: float | None = field(default=None, metadata=_about(
         "Height of the top above the magnetometer.", default_text="0, the same height", needs="distance_m",
-        kind=float, metavar="M", typed="below", unit="m", low=-1.0, high=1.0,
+        kind=float, metavar="M", typed="below", unit="m",
     ))  # fmt: skip
     moment_a_m2: float | None = field(default=None, metadata=_about(
         "Moment of the top, as levilab analyze field finds it; the angle of its tilt follows.", needs="distance_m",
@@ -403,6 +404,8 @@ def read_options(given: Mapping[str, Any], *, typed: bool = False) -> dict[str, 
         in_si = value * one.factor if typed and one.factor != 1 else value
         if not one.allows(in_si):
             raise UsageError(shown, one.expected, value=value)
+        if one.kind is float and (problem := problem_of(names[shown], in_si, one.factor if typed else 1.0)):
+            raise UsageError(shown, problem, value=value)
         read = one.read(in_si) if one.read else str(in_si) if one.choices else in_si
         if read is not None:
             found[names[shown]] = read

@@ -29,9 +29,6 @@ _LOW, _HIGH = 0.1, 4.0
 
 WEIGHTLESS = "gravity_m_s2 = 0: without weight there is nothing to float; a number above 0 is expected"
 
-#: A heavier top was most likely given in grams [kg].
-HEAVIEST_KG = 1.0
-
 
 @dataclass(frozen=True)
 class Stability:
@@ -329,12 +326,6 @@ def _crossings(field: stability.AxialField, top: stability.SymmetricTop, weights
     return place
 
 
-def doubts_of(scene: Scene) -> list[str]:
-    """Return what makes a motion worthless if it is right: a mass that was meant in grams."""
-    found = stability_of(scene) if scene.top.mass_kg > HEAVIEST_KG else None
-    return [advice(found)] if found and not found.floating else []
-
-
 def advice(found: Stability) -> str:
     """Return why a top does not float, and which one does."""
     if found.top.moment == 0:
@@ -347,11 +338,8 @@ def advice(found: Stability) -> str:
             "no top with this moment floats over this base, whatever its mass: the moment must point against the field "
             "(top.moment_a_m2 of the other sign)"
         )
-    kilograms = found.scene.top.mass_kg
-    said = Text(
+    return Text(
         "a top of {mass:.6g} g does not float over this base; the nearest that does has {nearest:.2f} g",
-        mass=1000 * kilograms,
+        mass=1000 * found.scene.top.mass_kg,
         nearest=1000 * found.nearest,
     )
-    asked = f".  Were grams meant?  {kilograms:g} g are top.mass_kg = {kilograms / 1000:g}"
-    return said + asked if kilograms > HEAVIEST_KG else said

@@ -10,9 +10,10 @@ import math
 import sys
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from pydantic import BeforeValidator, ConfigDict, Field, NonNegativeFloat, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, NonNegativeFloat, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from levilab.formats.typed import check_range
 from levilab.settings import Settings
 from levilab.simulator.laws import LAWS
 
@@ -69,6 +70,7 @@ class Part(Settings):
     """A table of a scene.  Strict: a number in quotes is no number."""
 
     model_config = ConfigDict(strict=True)
+    _in_range = field_validator("*")(check_range)
 
 
 class Base(Part):

@@ -12,7 +12,6 @@ from levilab.errors import SimulationError, UsageError
 from levilab.formats.dialect import Dialect
 from levilab.formats.typed import read_number, unit_of_key
 from levilab.settings import hint_about
-from levilab.simulator.equilibrium import HEAVIEST_KG
 from levilab.simulator.keys import SceneError, short_text
 from levilab.simulator.scene import SWITCHES
 from levilab.simulator.start import start_of
@@ -245,9 +244,6 @@ def _check_key(scene: Scene, axis: Axis, name: str) -> None:
     if isinstance(now, float) and axis.values.dtype.kind == "U":
         word = next(word for word in axis.values.tolist() if not _is_number(word))
         raise UsageError(name, f"numbers are expected in its column, not {word!r}{hint_about(word)}", value=axis.key)
-    if axis.key == "top.mass_kg" and axis.values.dtype.kind == "f" and (lightest := axis.values.min()) > HEAVIEST_KG:
-        meant = f"kilograms are expected.  Were grams meant?  {lightest:g} g are {lightest / 1000:g}"
-        raise UsageError(name, meant, value=f"{axis.key} from {lightest:g}")
 
 
 def _is_number(text: str) -> bool:

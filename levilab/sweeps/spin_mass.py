@@ -9,9 +9,10 @@ import numpy as np
 
 from levilab.errors import UsageError
 from levilab.files import CannotWrite, replace_atomically, writing
+from levilab.formats.ranges import problem_of
 from levilab.formats.typed import read_number
 from levilab.settings import hint_about
-from levilab.simulator.equilibrium import HEAVIEST_KG, stability_of
+from levilab.simulator.equilibrium import stability_of
 from levilab.sweeps.observables import cut
 from levilab.sweeps.plan import Axis, Plan
 
@@ -97,11 +98,8 @@ def _usual_masses(scene: Scene, floating: tuple[tuple[float, float], ...]) -> Sp
 def _check(spins: Span, masses: Span) -> None:
     if masses[0] <= 0:
         raise UsageError("masses", "masses above 0 are expected", value=f"from {masses[0]:g} kg")
-    if masses[0] > HEAVIEST_KG:
-        low, high = masses[0] / 1000, masses[1] / 1000
-        step = (high - low) / (masses[2] - 1)
-        meant = f"kilograms are expected.  Were grams meant?  They are {low:g}:{high:g}:{step:.3g}"
-        raise UsageError("masses", meant, value=f"from {masses[0]:g} kg")
+    if problem := problem_of("mass_kg", masses[0]):
+        raise UsageError("masses", problem, value=f"from {masses[0]:g} kg")
     if (tops := spins[2] * masses[2]) > MOST_TOPS:
         raise UsageError(
             "masses",

@@ -14,6 +14,7 @@ from levilab.acquisition.experiment import Experiment, ExperimentSettings
 from levilab.acquisition.session import ExperimentFailed
 from levilab.bench.config import ConfigError
 from levilab.bench.person import PlaceProbe, ShieldProbe
+from levilab.formats.ranges import problem_of
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 _MOST_HEIGHTS = 1000
 #: As many as the model has parameters of its own.
 _FEWEST_HEIGHTS = 4
-#: A height that is typed lies within the stand [m].
-_LOWEST_M, _HIGHEST_M = -1.0, 2.0
 #: How a person types a height.
 _TYPED = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*(mm|cm|m)?", re.IGNORECASE)
 _METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
@@ -106,7 +105,7 @@ class FieldSettings(ExperimentSettings):
         return self
 
     def check(self, table: str, limits: Limits) -> None:
-        """Raise ConfigError for radii that no ring has, and heights that no stand reaches."""
+        """Raise ConfigError for radii that no ring has."""
         if self.base_inner_radius_m >= self.base_outer_radius_m:
             raise ConfigError(
                 "{table}.base_inner_radius_m = {base_inner_radius_m:g} must be less than "
@@ -115,16 +114,6 @@ class FieldSettings(ExperimentSettings):
                 base_inner_radius_m=self.base_inner_radius_m,
                 base_outer_radius_m=self.base_outer_radius_m,
             )
-        for name in ("lowest_m", "highest_m"):
-            if not _LOWEST_M <= getattr(self, name) <= _HIGHEST_M:
-                raise ConfigError(
-                    "{table}.{name} = {height:g}: heights from {low:g} to {high:g} m are expected; is it in metres?",
-                    table=table,
-                    name=name,
-                    height=getattr(self, name),
-                    low=_LOWEST_M,
-                    high=_HIGHEST_M,
-                )
 
 
 def channels(settings: FieldSettings) -> tuple[Channel, ...]:
@@ -254,7 +243,7 @@ def parse_height(answer: str) -> float | None:
     if match is None:
         return None
     height = float(match[1].replace(",", ".")) * _METRES[(match[2] or "mm").lower()]
-    return round(height, 9) if _LOWEST_M <= height <= _HIGHEST_M else None
+    return None if problem_of("height_m", height) else round(height, 9)
 
 
 # --- the readings ---

@@ -87,8 +87,8 @@ def test_a_run_keeps_temperature_and_washers_and_its_report_shows_them(tmp_path)
 
 
 @pytest.mark.parametrize(("words", "says"), [
-    (("--temperature", "294"), ("levilab: --temperature 294: a temperature of a room such as 21.5 °C is expected, "
-     "from -30 to 60 °C")),
+    (("--temperature", "294"), ("levilab: --temperature 294: a number from -30 to 60 °C is expected. "
+     "Were kelvins meant? 294 K are 20.85")),
     (("--washers", "0,06"), "levilab: --washers 0,06: a decimal point is expected, and a comma between two masses"),
 ])  # fmt: skip
 def test_a_wrong_condition_is_refused_before_a_run_is_made(tmp_path, words, says):

@@ -232,7 +232,7 @@ def test_the_commands_print_and_refuse_in_one_line(levilab, tmp_path, scan, devi
     assert top["values"]["mass"]["value"] == pytest.approx(0.02505)
     assert "I₃/I₁" in levilab("top", device).stdout
     for words, status, says in (
-        (("analyze", "field", scan, "--height", "1e9"), 2, "--height 1e+09: a number from -1000 to 2000 [mm]"),
+        (("analyze", "field", scan, "--height", "1e9"), 2, "--height 1e+09: a number from -1000 to 2000 mm"),
         (("analyze", "field", scan, "--height-u", "1"), 2, "--height-u: goes with --height alone"),
         (("analyze", "field", scan, "--height", "73"), 1, "give it with --device"),
         (("analyze", "field", scan, "--device", "none.toml"), 1, "none.toml: there is no such file"),

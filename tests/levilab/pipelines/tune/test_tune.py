@@ -36,13 +36,13 @@ def test_a_mass_is_read_with_its_unit_or_in_grams(text, value):
 
 @pytest.mark.parametrize("text", ["", "g", "24,98 g", "-1 g", "24.98 s", "25 25", "2 kg", "1e400 g", "0 g"])
 def test_what_is_no_mass_is_refused(text):
-    with pytest.raises(ValueError, match=r"24\.98 g is expected"):
+    with pytest.raises(ValueError, match="is expected"):
         read_mass(text)
 
 
 @pytest.mark.parametrize("text", ["21,5", "294", "21 g", "-40 C", "hot"])
 def test_what_is_no_temperature_of_a_room_is_refused(text):
-    with pytest.raises(ValueError, match=r"21\.5 °C is expected"):
+    with pytest.raises(ValueError, match="is expected"):
         read_temperature(text)
 
 
