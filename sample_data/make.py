@@ -42,8 +42,10 @@ from levilab.pipelines.tune.owner import write_owner
 from levilab.present.progress import Display
 from levilab.reproduce.spindown import NOISE_HZ, READINGS, solve
 from levilab.runs.events import RunEvent
+from levilab.runs.run import RunRecord
 from levilab.simulator import preset, simulate
 from levilab.simulator.published.printed import several
+from levilab.texts.text import Text, text_from
 
 HERE = Path(__file__).parent
 #: (C₁ [1/s], |C₂| [1/rad], readings): the thesis's four runs, C₁ printed to six decimals, C₂ to eight.
@@ -61,10 +63,22 @@ CHANNELS = [
     {"name": "spin_frequency_u_hz", "unit": "Hz", "source": "standard deviation of the noise"},
 ]
 HOW = (
-    "SYNTHETIC, not the author's data: disc law from {start:.4f} Hz with C32 = {c32:.4e} (rad/s)^-1/2/s, noise "
-    "N(0, 0.03 Hz) of seed {seed}, both solved for so that unweighted straight lines return the published "
-    "C1 = {c1} 1/s and C2 = {c2} 1/rad; rounded to 0.01 Hz; made by sample_data/make.py"
+    "not the author's data: disc law from {start:.4f} Hz with C32 = {c32:.4e} (rad/s)^-1/2/s, noise N(0, 0.03 Hz) of "
+    "seed {seed}, both solved for so that unweighted straight lines return the published C1 = {c1:n} 1/s and "
+    "C2 = {c2:n} 1/rad; rounded to 0.01 Hz; made by sample_data/make.py"
 )
+
+
+def synthetic(said: str) -> dict[str, Any]:
+    """Return the fields of a record that say how it was made."""
+    says = said.as_table() if isinstance(said, Text) else None
+    return {"synthetic": True, "synthetic_how": f"SYNTHETIC: {said}", "synthetic_says": says}
+
+
+def made_by(record: RunRecord, command: str = "sample_data/make.py") -> str:
+    """Return how a run was made, and by which command."""
+    how = text_from(record.synthetic_says, record.synthetic_how or "")
+    return Text("{how}; made by {command:s}", how=how, command=command)
 
 
 def write(folder: Path, header: str, rows: list[str], record: dict[str, Any]) -> None:
@@ -349,9 +363,8 @@ def precession_sweep() -> None:
                 "configuration": {name: run.record.configuration[name] for name in ("precession", "scene")},
                 "seed": seed,
                 "note": "a sweep from 44 Hz down to 28 Hz",
-                "synthetic": True,
-                "synthetic_how": f"SYNTHETIC: {run.record.synthetic_how}; made by sample_data/make.py --full-motion",
-            },
+            }
+            | synthetic(made_by(run.record, "sample_data/make.py --full-motion")),
         )
         events = [{key: value for key, value in event.items() if key != "utc"} for event in run.events()]
         lines = [json.dumps(event, ensure_ascii=False, sort_keys=True) + "\n" for event in events]
@@ -390,7 +403,7 @@ def write_traces(name: str, scene: str | None, settings: str, note: str) -> None
     record["configuration"] = {key: value for key, value in record["configuration"].items() if key in kept}
     record |= {"started_utc": None, "ended_utc": None, "time_zero_utc": None, "software": {}}
     record["command_line"] = ["python", "sample_data/make.py"]
-    record["synthetic_how"] = "SYNTHETIC: " + record["synthetic_how"]
+    record |= synthetic(made_by(run.record))
     text = json.dumps(record, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
     path.write_text(text, encoding="utf-8", newline="\n")
     events = HERE / name / "events.jsonl"
@@ -429,9 +442,8 @@ def from_the_virtual_bench(
             "configuration": {name: record.configuration[name] for name in (experiment, *["scene"] * bool(scene))},
             "seed": seed,
             "note": note,
-            "synthetic": True,
-            "synthetic_how": f"SYNTHETIC: {record.synthetic_how}; made by {command}",
-        },
+        }
+        | synthetic(made_by(record, command)),
     )
     if events:
         lines = [json.dumps(one, ensure_ascii=False) + "\n" for one in events]
@@ -522,11 +534,10 @@ def main() -> None:
                 "started_utc": None,
                 "channels": CHANNELS,
                 "note": f"run {number} of four; a stand-in for the thesis's run {number}",
-                "synthetic": True,
-                "synthetic_how": HOW.format(c1=c1, c2=c2, **how),
                 "world": "spin",
                 "published": {"c1_per_s": c1, "c2_per_rad": c2},
-            },
+            }
+            | synthetic(Text(HOW, c1=str(c1), c2=str(c2), **how)),
         )
         print(f"spin-down-{number}: {how}")
     write(

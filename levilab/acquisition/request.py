@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from pydantic import ValidationError
 
+from analysis.numbers import digits
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiment import CounterSettings
 from levilab.acquisition.given import with_given_settings
@@ -46,8 +47,8 @@ HOW = (
 )
 _ADVICE = "correct it or start again"
 _SPIN_ONLY = (
-    "the top a spin that decays by the {law} law with {constants:.4e} (SI), falling at {fall:.2f} Hz; drag and fall "
-    "were drawn by the seed"
+    "the top a spin that decays by the {law} law with {constants:n} (SI), and each top falls at a spin of its own, the "
+    "first at {fall:.2f} Hz; drag and falls were drawn by the seed"
 )
 _BASE = (
     "the base a ring of strength {strength_t_m:.6e} T m, radii {inner_radius_m:.6f} and {outer_radius_m:.6f} m, "
@@ -473,7 +474,8 @@ def _describe_world(scene: SpinScene, experiment: str) -> str:
     if "magnetometer" in EXPERIMENTS[experiment].instruments:
         base = scene.base
         return Text(_BASE, **vars(base))
-    return Text(_SPIN_ONLY, law=scene.drag, constants=tuple(scene.constants), fall=scene.fall_hz)
+    constants = tuple(digits(constant, 5) for constant in scene.constants)
+    return Text(_SPIN_ONLY, law=scene.drag, constants=constants, fall=scene.fall_hz)
 
 
 def _scene(name: str | None, run: Run | None) -> Scene | None:

@@ -12,6 +12,7 @@ from levilab.pipelines.hold.analysis import text_of
 from levilab.present.drawing import headline, panel, synthetic_mark
 from levilab.present.looks import LOOKS
 from levilab.present.style import STYLE, WIDE
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -30,7 +31,7 @@ def hold_figure(analysis: HoldAnalysis) -> Figure:
     with mpl.rc_context(STYLE):
         best = found.best
         figure = Figure(figsize=(WIDE, 5.3 if best else 3.3))
-        finding = f"The drag at {len(analysis.runs)} held spins, and the drag laws through it"
+        finding = Text("The drag at {n} held spins, and the drag laws through it", n=len(analysis.runs))
         headline(figure, finding if len(analysis.runs) > 1 else text_of(analysis.runs[0]),
                  synthetic_mark([one.synthetic for one in analysis.sources]))  # fmt: skip
         upper = panel(figure, 0.75, 0.5, 4.05, 2.3)
@@ -41,7 +42,7 @@ def hold_figure(analysis: HoldAnalysis) -> Figure:
         if best:
             lower = panel(figure, 0.75, 3.1, 4.05, 1.7)
             _draw(lower, analysis, "ratios", best.drag)
-            lower.set(ylabel=f"drag over that of {best.name}", ylim=_RATIOS)
+            lower.set(ylabel=Text("drag over that of {law}", law=best.name), ylim=_RATIOS)
         figure.axes[-1].set(xlabel="spin  [Hz]")
     return figure
 

@@ -13,6 +13,7 @@ from levilab.formats.table import FEWEST
 from levilab.pipelines.sources import Readings
 from levilab.present.numbers import how_many
 from levilab.runs.events import RunEvent
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,7 +50,8 @@ class HoldReadings(Readings):
 
 def read_hold_file(path: Path, _: InputOptions) -> HoldReadings:
     """Raise DoesNotSuit: a file has no gain."""
-    raise DoesNotSuit(f"{path}: a run folder of `levilab acquire hold` is expected: the gain stands in its events")
+    said = "{path:s}: a run folder of `levilab acquire hold` is expected: the gain stands in its events"
+    raise DoesNotSuit(Text(said, path=path))
 
 
 def read_hold_run(run: Run, _: InputOptions) -> HoldReadings:
@@ -60,12 +62,18 @@ def read_hold_run(run: Run, _: InputOptions) -> HoldReadings:
     )
     if len(time) < FEWEST:
         raise TableError(
-            table.path, f"holds {how_many(len(time), 'reading')}, at least {FEWEST} are needed: hold the spin longer"
+            table.path,
+            Text(
+                "holds {readings}, at least {fewest} are needed: hold the spin longer",
+                readings=how_many(len(time), "reading"),
+                fewest=FEWEST,
+            ),
         )
     settings = run.record.configuration.get("hold")
     full = settings.get("drive_amplitude_vpp") if isinstance(settings, dict) else None
     if not isinstance(full, int | float) or not full > 0:
-        raise DataError(f"{run.folder}/run.json: configuration.hold.drive_amplitude_vpp, above 0, is expected")
+        said = "{path:s}/run.json: configuration.hold.drive_amplitude_vpp, above 0, is expected"
+        raise DataError(Text(said, path=run.folder))
     return HoldReadings(time, spin, u, volts / (full / 2), _gains(run), table.warnings)
 
 

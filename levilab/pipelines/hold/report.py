@@ -81,7 +81,7 @@ def hold_part(analysis: HoldAnalysis) -> ReportPart:
     return ReportPart(
         subject="held spin",
         heading="Held spins: the drag by the amplitude that balances it",
-        lead=f"{len(analysis.runs)} held spins",
+        lead=Text("{n} held spins", n=len(analysis.runs)),
         result=(
             Paragraph(_MEANING, "What it means."), Tabular("hold-spins", spins_table(analysis), VALUE_U), *laws,
         ),
@@ -100,11 +100,16 @@ def hold_part(analysis: HoldAnalysis) -> ReportPart:
 def _in_words(source: Source[HoldReadings], *_: object) -> tuple[str, ...]:
     one = source.readings
     return (
-        f"{how_many(len(one), 'reading')} from {one.time[0]:.1f} s to {one.time[-1]:.1f} s",
-        f"gain at the full amplitude measured {how_many(len(one.gains), 'time')}",
+        Text(
+            "{readings} from {begin:.1f} s to {end:.1f} s",
+            readings=how_many(len(one), "reading"),
+            begin=one.time[0],
+            end=one.time[-1],
+        ),
+        Text("{measured} of the gain at the full amplitude", measured=how_many(len(one.gains), "measurement")),
     )
 
 
 def _points(run: Hold) -> Iterator[tuple[str, ...]]:
-    drag = (f"drag = {with_uncertainty(run.drag)}",) if run.drag else ()
-    yield f"spin = {with_uncertainty(run.spin)}", *drag
+    drag = (Text("drag = {drag:n}", drag=with_uncertainty(run.drag)),) if run.drag else ()
+    yield Text("spin = {spin:n}", spin=with_uncertainty(run.spin)), *drag

@@ -164,7 +164,7 @@ class Conditions:
             "" if self.waveform is None else _WAVEFORMS.get(self.waveform, self.waveform),
             "" if self.amplitude_vpp is None else Text("{volts:g} Vpp", volts=self.amplitude_vpp),
             "" if self.creep_hz_per_s is None else Text("{rate:g} Hz/s", rate=self.creep_hz_per_s),
-            "" if self.step_hz is None else f"a look each {self.step_hz:g} Hz",
+            "" if self.step_hz is None else Text("a look each {step:g} Hz", step=self.step_hz),
         ]
         return Text("{parts}", parts=(*filter(None, drive), self.top))
 

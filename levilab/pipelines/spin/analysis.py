@@ -232,9 +232,10 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
         texts = [in_a_sentence(run) for run in self.runs]
         if len(texts) == 1:
             return texts[0]
-        named = (f"{source.name}: {text}" for source, text in zip(self.sources[:MOST_SENTENCES], texts, strict=False))
+        of_each = zip(self.sources[:MOST_SENTENCES], texts, strict=False)
+        named = (Text("{name:s}: {text}", name=source.name, text=text) for source, text in of_each)
         more = len(texts) - MOST_SENTENCES
-        return " ".join(named) + (f" And {more} more, in the table." if more > 0 else "")
+        return Sentences(*named, Text("And {more} more, in the table.", more=more) if more > 0 else "")
 
     @property
     def averaged(self) -> tuple[()]:
@@ -245,13 +246,14 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
         """Yield what to know of the method."""
         method = self.options.method
         if method != "auto" and all(source.readings.pulses for source in self.sources):
-            yield f"the method {method} was chosen, but a list of pulse times leaves no choice"
+            yield Text("the method {method} was chosen, but a list of pulse times leaves no choice", method=method)
         if self.options.distance_m is not None and not any(run.transverse for run in self.runs):
             yield "a distance was given, but no record of a magnetometer has three axes: no tilt follows"
 
     def about_run(self, run: SpinRun) -> Iterable[str]:
         """Return what to know of one input."""
-        return (Note(note.name, f"{finding_text(note, run.series.of)} ({note.name})") for note in run.notes)
+        said = ((note.name, finding_text(note, run.series.of)) for note in run.notes)
+        return (Note(kind, Text("{text} ({kind:s})", text=text, kind=kind)) for kind, text in said)
 
 
 #: Number of samples that show the steps of a converter; closer numbers than this part of their range are rounding.

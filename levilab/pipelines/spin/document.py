@@ -16,6 +16,7 @@ from levilab.pipelines.spin.readings import read_spin_file, read_spin_run
 from levilab.pipelines.spin.report import spin_columns, spin_part, spin_tables
 from levilab.runs.traces import INDEX
 from levilab.runs.waveforms import has_traces
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -62,11 +63,12 @@ def budget_of_run(source: Source[Records], run: SpinRun, options: SpinOptions) -
 def _of_pulses(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> Iterator[Component]:
     """Yield the parts of the pulses: noise of the samples, which is a bound, and the scatter beyond it."""
     spin = run.spin
-    longer = f"a record twice as long (u falls by {_BY_LENGTH[name]})"
+    longer = Text("a record twice as long (u falls by {factor:n})", factor=_BY_LENGTH[name])
     bound = _bound(spin, name)
     whole = parts.pulses
     if bound is None:
-        note = f"{spin.pulses} pulses, each {digits(1e3 * spin.scatter)} ms from its place"
+        late = digits(1e3 * spin.scatter)
+        note: str = Text("{n} pulses, each {ms:n} ms from its place", n=spin.pulses, ms=late)
         what = "scatter of the pulses' times"
         if spin.scatter > 0:
             yield Component("scatter", what, "A", spin.scatter, "s", whole / spin.scatter, note=note, remedy=longer)
@@ -76,14 +78,16 @@ def _of_pulses(run: SpinRun, name: str, parts: UParts, estimate: Estimate) -> It
     noise = min(bound, whole)
     if run.code is not None and run.code > 0:
         of_codes = noise * min(run.code / math.sqrt(12), 1.0)
-        note = f"one step of its numbers is {digits(run.code)} times the noise of a sample, in which it is contained"
+        step = "one step of its numbers is {times:n} times the noise of a sample, in which it is contained"
+        note = Text(step, times=digits(run.code))
         yield direct_row(
             "resolution", "bits of the oscilloscope", of_codes, estimate.unit, note, "a finer vertical scale"
         )
         noise = rest(noise, of_codes)
     of, more, jitter, why = _OF_A_LINE if run.line else _OF_PULSES
-    note = f"the Cramér–Rao bound of a {of}: no method does better"
-    yield direct_row("noise", "noise of the samples", noise, estimate.unit, note, f"{more}, or {longer}", "A")
+    note = Text("the Cramér–Rao bound of a {of}: no method does better", of=of)
+    remedy = Text("{more}, or {longer}", more=more, longer=longer)
+    yield direct_row("noise", "noise of the samples", noise, estimate.unit, note, remedy, "A")
     beyond = rest(whole, min(bound, whole))
     if beyond > 0:
         yield direct_row("jitter", jitter, beyond, estimate.unit, why, longer, "A")

@@ -16,6 +16,7 @@ from levilab.present.drawing import SMALL, band, headline, panel, synthetic_mark
 from levilab.present.looks import LOOKS
 from levilab.present.numbers import short_name, with_uncertainty
 from levilab.present.style import STYLE, TALLEST, WIDE
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -76,15 +77,15 @@ def spin_figure(analysis: SpinAnalysis) -> Figure:
             _draw(panels, source, run, k)
         more = len(analysis.runs) - len(shown)
         if more > 0:
-            write(figure, WIDE - 0.1, 0.3, f"{more} more inputs are not drawn", ha="right", fontsize=SMALL)
+            write(figure, WIDE - 0.1, 0.3, Text("{n} more inputs are not drawn", n=more), ha="right", fontsize=SMALL)
     return figure
 
 
 def _finding(analysis: SpinAnalysis) -> str:
     if len(analysis.runs) == 1:
         spin = analysis.runs[0].spin
-        return f"Spin {with_uncertainty(spin.frequency)} at {_reference(spin)}"
-    return f"Spin of {len(analysis.runs)} inputs"
+        return Text("Spin {spin:n} at {time:n}", spin=with_uncertainty(spin.frequency), time=_reference(spin))
+    return Text("Spin of {n} inputs", n=len(analysis.runs))
 
 
 def _title(source: Source[Records], run: SpinRun) -> str:
@@ -368,7 +369,7 @@ def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
         room = 1.45
     if limit > 0:
         axes.set_ylim(-1.1 * limit, room * limit)
-    axes.set(xlabel="time  [s]", ylabel=f"pulse − fit  [{unit}]")
+    axes.set(xlabel="time  [s]", ylabel=Text("pulse − fit  [{unit}]", unit=unit))
     axes.set_title("Residuals of the pulses' times", loc="left")
 
 
@@ -396,6 +397,7 @@ def _draw_series(axes: Axes, run: SpinRun, time: Array, gid: str) -> None:
             low, high = axes.get_ylim()
             axes.set_ylim(low, high + 0.25 * (high - low))
             axes.legend(loc="upper center", ncols=3, fontsize=SMALL, borderaxespad=0, columnspacing=1, handlelength=1.6)
-        axes.set_title(f"Frequency of {len(series)} {series.of}s, ± u", loc="left")
+        title = Text("Frequency of {n} {of}, ± u", n=len(series), of=f"{series.of}s")
+        axes.set_title(title, loc="left")
     axes.ticklabel_format(axis="y", useOffset=False)
     axes.set(xlabel="time  [s]", ylabel="spin ν  [Hz]")

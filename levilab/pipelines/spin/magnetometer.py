@@ -16,6 +16,7 @@ from levilab.formats.table import read_table
 from levilab.formats.titles import COMPONENTS, MAGNITUDE
 from levilab.formats.understanding import Request, SeveralRuns, plan_of
 from levilab.texts.note import of_file
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -68,7 +69,7 @@ class FieldRecord:
     @property
     def kind(self) -> str:
         """The kind of record, as text."""
-        return f"magnetometer, {', '.join(self.axes)}, {self.rate:.4g} samples/s"
+        return Text("magnetometer, {axes}, {rate:.4g} samples/s", axes=self.axes, rate=self.rate)
 
 
 def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
@@ -91,18 +92,22 @@ def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
     back = np.flatnonzero(np.diff(times) < 0)
     if back.size:
         k = int(back[0])
-        what = (
-            f"the time {times[k + 1]:.9g} s comes after {times[k]:.9g} s: cut the file where the recording was started"
-        )
-        raise TableError(path, f"{what} again", line=int(table.lines[k + 1]))
+        back_to = "the time {then:.9g} s comes after {now:.9g} s: cut the file where the recording was started again"
+        raise TableError(path, Text(back_to, then=times[k + 1], now=times[k]), line=int(table.lines[k + 1]))
     strongest = float(np.abs(np.median(field, axis=0)).max())
     if strongest > STRONGEST_T:
         units = ",".join(f"{'babs' if axis == '|B|' else 'b' + axis}=NAME [µT]" for axis in axes.values())
-        what = f"{path.name}: a field of {strongest:.3g} T is stronger than a phone measures, so the unit is another"
-        warnings.append(of_file("strongest", f"{what}; say it with the columns: {units}"))
+        strong = (
+            "{name:s}: a field of {field:.3g} T is stronger than a phone measures, so the unit is another; say it with "
+            "the columns: {units:s}"
+        )
+        warnings.append(of_file("strongest", Text(strong, name=path.name, field=strongest, units=units)))
     if MAGNITUDE in axes:
-        what = f"{path.name}: holds the field's magnitude alone: where the field that turns is the stronger part, its"
-        warnings.append(of_file("magnitude", f"{what} line lies at twice the spin; record the axes x, y and z, too"))
+        alone = (
+            "{name:s}: holds the field's magnitude alone: where the field that turns is the stronger part, its line "
+            "lies at twice the spin; record the axes x, y and z, too"
+        )
+        warnings.append(of_file("magnitude", Text(alone, name=path.name)))
     record = FieldRecord(times, field, tuple(axes.values()), tuple(warnings))
     return record if record.duration > 0 and record.rate > SLOWEST_RATE else None
 

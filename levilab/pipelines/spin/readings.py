@@ -15,10 +15,11 @@ from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
-from levilab.present.numbers import how_many
+from levilab.present.numbers import enumeration, how_many
 from levilab.runs.traces import INDEX, undescribed_codes
 from levilab.runs.waveforms import run_waveforms
 from levilab.texts.note import Note, of_file
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 #: Channels whose frequency is no spin, as experiments call them, with what it is.
 NO_SPIN = {"laser": "how often the stem cuts the laser: its precession", "drive": "that of the drive"}
+_CHOSEN = "has records of {names}; {chosen} is analyzed, the option `channel` chooses another"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +75,7 @@ class Records(Readings):
         if self.pulses:
             return self.pulses.format
         if len(self.waveforms) > 1:
-            return f"{how_many(len(self.waveforms), 'record')} of an oscilloscope"
+            return Text("{records} of an oscilloscope", records=how_many(len(self.waveforms), "record"))
         return self.waveforms[0].format
 
 
@@ -98,7 +100,8 @@ def read_spin_file(path: Path, options: InputOptions) -> Records:
     """
     field = read_field_record(path, options)
     if field and len(field) < FEWEST:
-        raise DoesNotSuit(f"{path}: holds {len(field)} samples of a field, at least {FEWEST} are needed: record longer")
+        few = "{path:s}: holds {n} samples of a field, at least {fewest} are needed: record longer"
+        raise DoesNotSuit(Text(few, path=path, n=len(field), fewest=FEWEST))
     if field:
         return Records(path, (), "", None, field.warnings, field)
     record = read_record(path, columns=options.columns, rate=options.rate, guess=options.guess)
@@ -107,9 +110,9 @@ def read_spin_file(path: Path, options: InputOptions) -> Records:
     chosen = record.signals[record.signal(options.channel)].name
     warnings = list(record.warnings)
     if options.channel is None and len(record.signals) > 1:
-        names = ", ".join(signal.name for signal in record.signals)
-        what = f"{path.name}: has the channels {names}; {chosen} is analyzed, the option `channel` chooses another"
-        warnings.append(of_file("channels", what))
+        warnings.append(
+            of_file("channels", Text(_CHOSEN, names=tuple(one.name for one in record.signals), chosen=chosen))
+        )
     return Records(path, (record,), chosen, None, tuple(warnings))
 
 
@@ -124,13 +127,18 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
     """
     found = run_waveforms(run)
     if not found:
-        raise DoesNotSuit(f"{run.folder}: keeps no record of an oscilloscope")
+        raise DoesNotSuit(Text("{path:s}: keeps no record of an oscilloscope", path=run.folder))
     names = Counter(waveform.signals[0].name for waveform in found)
     chosen = options.channel or _shows_a_spin(run, names)
     of_channel = tuple(w for w in found if w.signals[0].name.casefold() == chosen.casefold())
     if not of_channel:
         raise DataError(
-            f"{run.folder}: has no record of {chosen!r}, but of {', '.join(names)}: name one with `channel`"
+            Text(
+                "{path:s}: has no record of {chosen:s}, but of {names}: name one with `channel`",
+                path=run.folder,
+                chosen=repr(chosen),
+                names=(*names,),
+            )
         )
     warnings: list[str] = [
         Note("undescribed", f"{path} has no line in {INDEX}, as a process that was killed leaves it: it is left out")
@@ -138,10 +146,12 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
     ]
     warnings += [text for waveform in found for text in waveform.warnings]
     if chosen.casefold() in NO_SPIN:
-        warnings.append(Note("no spin", f"the frequency of {chosen} is no spin, but {NO_SPIN[chosen.casefold()]}"))
+        what = NO_SPIN[chosen.casefold()]
+        warnings.append(
+            Note("no spin", Text("the frequency of {chosen} is no spin, but {what}", chosen=chosen, what=what))
+        )
     if options.channel is None and len(names) > 1:
-        what = f"has records of {', '.join(names)}; {chosen} is analyzed, the option `channel` chooses another"
-        warnings.append(Note("channels", what))
+        warnings.append(Note("channels", Text(_CHOSEN, names=(*names,), chosen=chosen)))
     return Records(run.folder, of_channel, chosen, None, tuple(warnings))
 
 
@@ -151,6 +161,11 @@ def _shows_a_spin(run: Run, names: Counter[str]) -> str:
     if spins:
         return spins[0]
     raise DoesNotSuit(
-        f"{run.folder}: keeps records of {' and '.join(names)}, none of which shows the spin: levilab analyze "
-        f"precession reads such a run; `channel` = {next(iter(names))} takes the frequency of its pulses"
+        Text(
+            "{path:s}: keeps records of {names}, none of which shows the spin: levilab analyze precession reads such a "
+            "run; `channel` = {first:s} takes the frequency of its pulses",
+            path=run.folder,
+            names=enumeration([*names]),
+            first=next(iter(names)),
+        )
     )

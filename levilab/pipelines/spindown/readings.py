@@ -29,6 +29,7 @@ from levilab.pipelines.spin.words import finding_text
 from levilab.present.numbers import how_many
 from levilab.runs.events import RunEvent
 from levilab.texts.note import Note, of_file
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
 QUANTITIES = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: Length of a window of a record, in which its frequency is one reading [s].
 WINDOW_S = 2.0
+_NAMED = "{name:s}: {text}"
 #: A record whose spin falls by less than this part is no spin-down: in 6 s, a top that coasts loses twice as much.
 LEAST_FALL = 0.01
 
@@ -170,8 +172,10 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
             track = track_of_record(record, options.channel, WINDOW_S, "auto")
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)(f"{path}: {error}") from error
-    notes = [of_file(note.name, f"{path.name}: {finding_text(note)}") for note in track.notes]
-    what = f"{'list of pulse times' if times is not None else 'record'} of {digits(duration, 3)} s"
+    notes = [of_file(note.name, Text(_NAMED, name=path.name, text=finding_text(note))) for note in track.notes]
+    what = Text(
+        "a list of pulse times of {s:n} s" if times is not None else "a record of {s:n} s", s=digits(duration, 3)
+    )
     return _of_track(path, track, WINDOW_S, what, (record.warnings, notes))
 
 
@@ -182,8 +186,9 @@ def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions")
         track = track_of_field(record.times, record.field, near=options.near)
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)(f"{path}: {error}") from error
-    notes = [of_file(note.name, f"{path.name}: {finding_text(note)}") for note in findings_of(track.spins)]
-    what = f"magnetometer's record of {digits(record.duration, 3)} s"
+    found = findings_of(track.spins)
+    notes = [of_file(note.name, Text(_NAMED, name=path.name, text=finding_text(note))) for note in found]
+    what = Text("a magnetometer's record of {s:n} s", s=digits(record.duration, 3))
     window = record.duration / round(record.duration / FIELD_WINDOW_S)
     readings = _of_track(path, track, window, what, (record.warnings, notes))
     return replace(readings, doubtful=any(spin.doubtful for spin in track.spins))
@@ -191,8 +196,8 @@ def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions")
 
 def _must_last(path: "Path", duration: float, window: float) -> None:
     if duration < FEWEST * window:
-        expected = f"a spin-down needs {FEWEST} windows of {window:g} s at least"
-        raise DoesNotSuit(f"{path}: lasts {digits(duration, 3)} s, {expected}")
+        short = "{path:s}: lasts {s:n} s, a spin-down needs {fewest} windows of {window:g} s at least"
+        raise DoesNotSuit(Text(short, path=path, s=digits(duration, 3), fewest=FEWEST, window=window))
 
 
 def _of_track(
@@ -202,15 +207,17 @@ def _of_track(
     first, last = _coasting(track)
     start, end = track.frequency[first], track.frequency[last - 1]
     if last - first < FEWEST or end > (1 - LEAST_FALL) * start:
-        seen = f"the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {last - first} windows of {window:.3g} s"
-        expected = "a falling spin is expected: is the drive still on?"
-        raise DoesNotSuit(f"{path}: {seen}, {expected}")
-    text = f"{path.name}: a {what}: each reading is the frequency in a window of {window:.3g} s"
-    how_read = [of_file("windows", text)]
+        rises = (
+            "{path:s}: the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {n} windows of {window:.3g} s, a "
+            "falling spin is expected: is the drive still on?"
+        )
+        raise DoesNotSuit(Text(rises, path=path, start=start, end=end, n=last - first, window=window))
+    text = "{name:s}: {what}: each reading is the frequency in a window of {window:.3g} s"
+    how_read = [of_file("windows", Text(text, name=path.name, what=what, window=window))]
     if last - first < len(track.time):
-        span = f"{track.time[first]:.1f} s to {track.time[last - 1]:.1f} s"
-        text = f"{path.name}: the top coasts from {span}; the windows before and after are left out"
-        how_read.append(of_file("coasts", text))
+        text = "{name:s}: the top coasts from {start:.1f} s to {end:.1f} s; the windows before and after are left out"
+        begin, stop = track.time[first], track.time[last - 1]
+        how_read.append(of_file("coasts", Text(text, name=path.name, start=begin, end=stop)))
     part = slice(first, last)
     of_record, of_track = notes
     return SpinReadings(track.time[part], track.frequency[part], track.u[part], (*of_record, *how_read, *of_track))

@@ -71,7 +71,7 @@ class SwayRun:
         geometry: what they say.
         mirrored: whether the view was mirrored; None where no precession is seen to tell it.
         text: in a few sentences.
-        warnings: what to know before using the numbers.
+        unknown: what is not known of top and base, and taken from the thesis.
     """
 
     swings: tuple[Swings, ...]
@@ -79,7 +79,17 @@ class SwayRun:
     geometry: Geometry
     mirrored: bool | None
     text: str
-    warnings: tuple[str, ...]
+    unknown: tuple[str, ...]
+
+    @property
+    def warnings(self) -> tuple[Text, ...]:
+        """Doubts about the numbers."""
+        of_thesis = (
+            "not known, and taken from the thesis: {missing}; the prediction is of that device; describe yours in a "
+            "file, for the option `device`"
+        )
+        said = [Text(of_thesis, missing=self.unknown)] if self.unknown else []
+        return (*said, *_doubts(self.swings, self.geometry, view=self.mirrored))
 
 
 class SwayAnalysis(EachAlone[SwayReadings, SwayRun, SwayOptions]):
@@ -97,10 +107,13 @@ def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRu
     spin = np.full(len(readings), options.spin_hz) if options.spin_hz is not None else readings.spin
     if spin is None:
         raise DataError(
-            f"{source.data}: the spin is not known: a column spin_frequency_hz, or the option `spin` where it is "
-            "nearly constant, is expected"
+            Text(
+                "{path:s}: the spin is not known: a column spin_frequency_hz, or the option `spin` where it is nearly "
+                "constant, is expected",
+                path=source.data,
+            )
         )
-    known, notes = known_of(source, options)
+    known, unknown = known_of(source, options)
     times, places = readings.time, readings.x + 1j * readings.y
     try:
         swings = swings_of(times, places, readings.height)
@@ -111,9 +124,7 @@ def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRu
         geometry = geometric_magnetism(swings, at, known)
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error
-    return SwayRun(
-        tuple(swings), at, geometry, view, _in_words(geometry), (*notes, *_doubts(swings, geometry, view=view))
-    )
+    return SwayRun(tuple(swings), at, geometry, view, _in_words(geometry), unknown)
 
 
 def _in_words(found: Geometry) -> str:
@@ -140,31 +151,38 @@ def _in_words(found: Geometry) -> str:
     return Sentences(said, null)
 
 
-def _doubts(swings: Sequence[Swings], found: Geometry, *, view: bool | None) -> Iterable[str]:
+def _doubts(swings: Sequence[Swings], found: Geometry, *, view: bool | None) -> Iterable[Text]:
     if view:
-        yield "the precession turns backwards: the view is from below, or in a mirror; y has got the other sign"
+        yield Text("the precession turns backwards: the view is from below, or in a mirror; y has got the other sign")
     if view is None:
-        yield (
+        yield Text(
             "no precession is seen, which would show whether the view is mirrored: a split of the other sign would be "
             "one of a mirrored view"
         )
     if found.lean > _LEANS:
-        yield (
-            f"the precession is so large that {100 * found.lean:.0f} % are added to the split for its tilt: is the "
-            "place that of the top's middle?  The end of the stem moves more; follow its foot or the rim"
+        yield Text(
+            "the precession is so large that {percent:.0f} % are added to the split for its tilt: is the place that of "
+            "the top's middle?  The end of the stem moves more; follow its foot or the rim",
+            percent=100 * found.lean,
         )
     large = _LARGE_U * abs(found.measured.value or 0.0)
     if found.parts["mistake"] > large:
         one, ((backward, *_), (forward, *_)) = swings[len(swings) // 2], swings[len(swings) // 2].others
-        yield (
-            f"u is large: the slow swings may be the lines at {one.frequency[0]:.2f} or {backward:.2f} Hz and at "
-            f"{one.frequency[1]:.2f} or {forward:.2f} Hz; let the top swing less, by half a millimetre, or film until "
-            "its spin has fallen by a third"
+        yield Text(
+            "u is large: the slow swings may be the lines at {one:.2f} or {backward:.2f} Hz and at {other:.2f} or "
+            "{forward:.2f} Hz; let the top swing less, by half a millimetre, or film until its spin has fallen by a "
+            "third",
+            one=one.frequency[0],
+            backward=backward,
+            other=one.frequency[1],
+            forward=forward,
         )
     elif (found.measured.u or 0.0) > large:
         beat = float(np.mean([one.frequency[1] - one.frequency[0] for one in swings]))
         vertical = float(np.mean([one.vertical.value for one in swings]))
-        yield (
-            f"u is large: the beat of the slow swings, {beat:.2f} Hz, is near the vertical swing, {vertical:.2f} Hz, "
-            "and they exchange energy; add or take off a washer of 0.1 g, or let the top swing less"
+        yield Text(
+            "u is large: the beat of the slow swings, {beat:.2f} Hz, is near the vertical swing, {vertical:.2f} Hz, "
+            "and they exchange energy; add or take off a washer of 0.1 g, or let the top swing less",
+            beat=beat,
+            vertical=vertical,
         )

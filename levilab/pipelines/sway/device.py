@@ -20,6 +20,7 @@ from levilab.pipelines.field.document import FIELD
 from levilab.pipelines.options import FieldOptions
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import scene_of
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,12 +34,12 @@ _RING, _SIZE_U_M = Ring(1.40e-3, 0.0, 0.0, 0.030, 0.055), 1e-4
 _MASS = Estimate(0.02526, 1e-5, "kg")
 
 
-def known_of(source: Source[SwayReadings], options: SwayOptions) -> tuple[Known, list[str]]:
-    """Return what is known of an input's top and base, and what to know of that.  Raises DataError."""
+def known_of(source: Source[SwayReadings], options: SwayOptions) -> tuple[Known, tuple[str, ...]]:
+    """Return what is known of an input's top and base, and what of it is the thesis's.  Raises DataError."""
     table: Any = source.run.record.configuration.get("scene") if source.run else None
     if isinstance(table, dict) and not (options.device or options.scan):
-        return _of_scene(source, table), []
-    device, notes = options.device or Device(), []
+        return _of_scene(source, table), ()
+    device = options.device or Device()
     made = top_of(parts_of(device.top)) if device.top.parts else None
     transverse, axial, missing = inertias(device.top)
     mass = made.mass if made else _MASS
@@ -49,16 +50,11 @@ def known_of(source: Source[SwayReadings], options: SwayOptions) -> tuple[Known,
     ring, covariance = _base(device, options.scan)
     if ring is None:
         ring, covariance, missing = _RING, np.diag([0.0, _SIZE_U_M**2, _SIZE_U_M**2]), [*missing, "radii of the base"]
-    if missing:
-        notes.append(
-            f"the {' and the '.join(missing)} are not known, those of the thesis are taken: the prediction is of that "
-            "device; describe yours in a file, for the option `device`"
-        )
     m, i1, i3 = (float(one.value or 0.0) for one in (mass, transverse, axial))
     top = SymmetricTop(m, i1, i3, -1.0, device.gravity_m_s2)
     size = device.top.magnet_radius_m, device.top.magnet_height_m
     magnet = None if size[0] is None else Disc(size[0], size[1] or 0.0)
-    return Known(top, mass.u or 0.0, axial.u or 0.0, ring, covariance, magnet, transverse.u or 0.0), notes
+    return Known(top, mass.u or 0.0, axial.u or 0.0, ring, covariance, magnet, transverse.u or 0.0), (*missing,)
 
 
 def _base(device: Device, scan: Path | None) -> tuple[Ring | None, np.ndarray]:
@@ -66,7 +62,8 @@ def _base(device: Device, scan: Path | None) -> tuple[Ring | None, np.ndarray]:
     if scan is not None:
         found = FIELD.analyze([scan], FieldOptions(device=device if device.base.inner_radius_m else None)).runs
         if len(found) > 1:
-            raise DataError(f"{scan}: holds {len(found)} scans of the base, one is expected: name its run or file")
+            several = "{path:s}: holds {n} scans of the base, one is expected: name its run or file"
+            raise DataError(Text(several, path=scan, n=len(found)))
         sizes = [2, 4, 5]
         return found[0].scan.ring, found[0].scan.covariance[np.ix_(sizes, sizes)]
     base = device.base
@@ -81,7 +78,7 @@ def _of_scene(source: Source[SwayReadings], table: dict[str, Any]) -> Known:
     try:
         scene = scene_of(table)
     except (SceneError, AnalysisError) as error:
-        raise DataError(f"{source.path}/run.json: configuration.scene: {error}") from error
+        raise DataError(Text("{path:s}/run.json: configuration.scene: {why}", path=source.path, why=error)) from error
     top, base = scene.top, scene.base
     body = SymmetricTop(
         top.mass_kg, top.inertia_transverse_kg_m2, top.inertia_axial_kg_m2, top.moment_a_m2, scene.gravity_m_s2

@@ -37,9 +37,11 @@ def sway_figure(analysis: SwayAnalysis) -> Figure:
 
 def _finding(analysis: SwayAnalysis) -> str:
     found = analysis.runs[0].geometry
-    return (
-        f"The slow swings split by {with_uncertainty(found.measured)} at {found.spin:g} Hz, "
-        f"{with_uncertainty(found.ratio)} of geometric magnetism"
+    return Text(
+        "The slow swings split by {split:n} at {spin:g} Hz, {ratio:n} of geometric magnetism",
+        split=with_uncertainty(found.measured),
+        spin=found.spin,
+        ratio=with_uncertainty(found.ratio),
     )
 
 
@@ -86,9 +88,11 @@ def _draw_spectrum(axes: Axes, analysis: SwayAnalysis) -> None:
         )  # fmt: skip
     axes.axvline(0, color="black", linewidth=0.6)
     axes.set(xlabel="frequency; negative: against the spin  [Hz]", ylabel="amplitude  [mm]")
-    text = (
-        f"spectrum of x + iy around {one.time:.0f} s,\nat a spin of {run.spin[k]:.1f} Hz; smaller lines\nbeside the "
-        "slow swings belong to\nthe vertical swing, "
-        f"{one.vertical.value:.2f} Hz"
+    text = Text(
+        "spectrum of x + iy around {time:.0f} s,\nat a spin of {spin:.1f} Hz; smaller lines\nbeside the slow swings "
+        "belong to\nthe vertical swing, {vertical:.2f} Hz",
+        time=one.time,
+        spin=run.spin[k],
+        vertical=one.vertical.value,
     )
     axes.text(_BESIDE, 1.0, text, transform=axes.transAxes, va="top", fontsize=8)

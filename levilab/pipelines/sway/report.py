@@ -16,6 +16,7 @@ from levilab.pipelines.sway.analysis import QUANTITIES
 from levilab.present.document.blocks import Listing, Paragraph, Tabular
 from levilab.present.numbers import how_many, short_name, with_decimals, with_uncertainty, without_unit
 from levilab.present.tables import Table, table
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -59,7 +60,7 @@ def windows_table(run: SwayRun, name: str) -> Table:
         "t\n[s]", "spin\n[Hz]", "backward\n[Hz]", "forward\n[Hz]", "precession\n[Hz]", "vertical\n[Hz]", "split\n[mHz]",
         "predicted\n[mHz]",
     )  # fmt: skip
-    return table(f"Windows of {name}", heads, rows, numbers=heads)
+    return table(Text("Windows of {name:s}", name=name), heads, rows, numbers=heads)
 
 
 # --- windows as columns of tables for programs ---
@@ -88,12 +89,13 @@ def sway_columns(analysis: SwayAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
         }
 
 
-_VALUES = (
-    f"{VALUE_U} Ω_g/2π is what the split would be of small swings of a slow top, brought to a spin of 30 Hz: the "
+_VALUES = Sentences(
+    VALUE_U,
+    "Ω_g/2π is what the split would be of small swings of a slow top, brought to a spin of 30 Hz: the "
     "frequencies are corrected for the size of the swings and of the precession. Predicted: (I₃ω₃/m)(B′/2B)² with the "
     "form of the base's field at the height at which the swings are as fast as seen; neither the strength of the base "
     "nor the moment of the top is needed. All lines: swings and precession of all windows as roots of one "
-    "quartic; the ratio is the part of the angular momentum that the slow swings carry along."
+    "quartic; the ratio is the part of the angular momentum that the slow swings carry along.",
 )
 
 
@@ -104,7 +106,7 @@ def sway_part(analysis: SwayAnalysis) -> ReportPart:
         heading="Slow swings of a floating top: geometric magnetism",
         lead=how_many(sum(len(run.swings) for run in analysis.runs), "window"),
         result=(
-            Paragraph(" ".join(_meaning(analysis)), "What it means."),
+            Paragraph(Sentences(*_meaning(analysis)), "What it means."),
             Tabular("sway-values", quantities_table(analysis), _VALUES, first_column_wraps=True),
         ),
         figure=FigureText(
@@ -130,9 +132,15 @@ def _in_words(source: Source[SwayReadings], run: SwayRun, *_: object) -> tuple[s
     size = 1e3 * math.sqrt(max(one.size for one in run.swings))
     rate = (len(time) - 1) / float(time[-1] - time[0])
     return (
-        f"{len(time)} places from {time[0]:.1f} s to {time[-1]:.1f} s, {rate:.0f} a second",
-        f"swings: {size:.2g} mm at most, root of the sum of both amplitudes' squares",
-        f"residuals of a coordinate: standard deviation {noise:.2g} mm at most",
+        Text(
+            "{n} places from {begin:.1f} s to {end:.1f} s, {rate:.0f} a second",
+            n=len(time),
+            begin=time[0],
+            end=time[-1],
+            rate=rate,
+        ),
+        Text("swings: {size:.2g} mm at most, root of the sum of both amplitudes' squares", size=size),
+        Text("residuals of a coordinate: standard deviation {noise:.2g} mm at most", noise=noise),
     )
 
 
@@ -143,7 +151,11 @@ def _readings(_: Source[SwayReadings], run: SwayRun, *__: object) -> tuple[Listi
 def _points(run: SwayRun) -> Iterator[tuple[str, ...]]:
     """Yield the lines of each window of the figure."""
     for spin, split, expected in zip(run.spin, run.geometry.splits, run.geometry.expected, strict=True):
-        yield f"spin = {spin:.2f} Hz", f"split = {1e3 * split:.1f} mHz", f"predicted = {1e3 * expected:.1f} mHz"
+        yield (
+            Text("spin = {hz:.2f} Hz", hz=spin),
+            Text("split = {mhz:.1f} mHz", mhz=1e3 * split),
+            Text("predicted = {mhz:.1f} mHz", mhz=1e3 * expected),
+        )
 
 
 # --- what it means ---
@@ -161,14 +173,23 @@ def _meaning(analysis: SwayAnalysis) -> Iterator[str]:
     found, first, last = run.geometry, run.swings[0], run.swings[-1]
     shift = 100 * abs(float(found.shifts.sum(axis=1).mean()) / float(found.splits.mean()))
     yield _WHY
-    yield (
-        f"It sways at {abs(first.frequency[0]):.3f} Hz against and {first.frequency[1]:.3f} Hz with the spin while it "
-        f"spins at {run.spin[0]:.1f} Hz, and at {abs(last.frequency[0]):.3f} Hz and {last.frequency[1]:.3f} Hz at "
-        f"{run.spin[-1]:.1f} Hz."
+    yield Text(
+        "It sways at {against:.3f} Hz against and {along:.3f} Hz with the spin while it spins at {spin:.1f} Hz, and at "
+        "{later_against:.3f} Hz and {later_along:.3f} Hz at {later_spin:.1f} Hz.",
+        against=abs(first.frequency[0]),
+        along=first.frequency[1],
+        spin=run.spin[0],
+        later_against=abs(last.frequency[0]),
+        later_along=last.frequency[1],
+        later_spin=run.spin[-1],
     )
-    yield f"Its swings are so large that the split is shifted by {digits(shift)} %, which is taken away."
+    large = "Its swings are so large that the split is shifted by {percent:n} %, which is taken away."
+    yield Text(large, percent=digits(shift))
     if found.of_precession:
-        yield (
-            f"The precession, another motion, gives B′/2B = {with_uncertainty(found.of_precession)}, the field "
-            f"{with_uncertainty(found.of_base)} and the slow swings {with_uncertainty(found.gradient)}."
+        yield Text(
+            "The precession, another motion, gives B′/2B = {precession:n}, the field {field:n} and the slow swings "
+            "{swings:n}.",
+            precession=with_uncertainty(found.of_precession),
+            field=with_uncertainty(found.of_base),
+            swings=with_uncertainty(found.gradient),
         )

@@ -26,8 +26,9 @@ from levilab.pipelines.row import Quantity, columns_of
 from levilab.pipelines.sources import Readings
 from levilab.pipelines.video.leaning import Leaning, Rising, leaning_of, rising_of
 from levilab.pipelines.video.tracking import Followed, follow
-from levilab.present.numbers import with_uncertainty
+from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.progress import ShareBar
+from levilab.texts.text import Sentences, Text, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -122,15 +123,18 @@ def read_film(path: Path, options: VideoOptions) -> FilmReadings:
     with file_errors(path), path.open("rb") as stream:
         head = stream.read(_HEAD)
     if kind_of_bytes(head, path.suffix) is not AUDIO:
-        raise DoesNotSuit(f"{path}: holds no film that can be read: give the file that the camera wrote")
+        raise DoesNotSuit(
+            Text("{path:s}: holds no film that can be read: give the file that the camera wrote", path=path)
+        )
     given = [name for name in ("scale", "rim", "base") if getattr(options, f"{name}_m") is not None]
-    wanted = (
+    wanted = Text(
         "`rim`, the diameter of the top's rim; `base`, the outer diameter of the base; or `scale`, metres in a pixel"
     )
     if not given:
-        raise DoesNotSuit(f"{path}: one scale is expected, none is given: {wanted}")
+        raise DoesNotSuit(Text("{path:s}: one scale is expected, none is given: {wanted}", path=path, wanted=wanted))
     if len(given) > 1:
-        raise UsageError("scale", f"one scale is expected, {' and '.join(given)} are given: {wanted}")
+        several = "one scale is expected, {given} are given: {wanted}"
+        raise UsageError("scale", Text(several, given=enumeration(given), wanted=wanted))
     camera, height = options.camera_m, options.height_m
     if (camera is None) != (height is None):
         raise UsageError("camera", "goes with `height`: the top is nearer to the camera than the base")
@@ -139,7 +143,8 @@ def read_film(path: Path, options: VideoOptions) -> FilmReadings:
     if camera is not None and (options.scale_m is not None or not 0 < (height or 0) < camera):
         raise UsageError("camera", "goes with `base` or `rim`, and is greater than `height`")
     if options.stop_s is not None and (options.start_s or 0.0) >= options.stop_s:
-        raise UsageError("stop", f"a time after `start` = {options.start_s:g} is expected", value=options.stop_s)
+        after = Text("a time after `start` = {start:g} is expected", start=options.start_s)
+        raise UsageError("stop", after, value=options.stop_s)
     return FilmReadings(open_film(path), np.array([*head, path.stat().st_size], dtype=np.float64))
 
 
@@ -205,29 +210,49 @@ class Video:
     def pictures(self) -> str:
         """Number and times of the pictures, as text."""
         steps = np.diff(self.time) * 1e3
-        even = f"{np.median(steps):.2f}" if np.ptp(steps) < _EVEN_MS else f"{steps.min():.2f} to {steps.max():.2f}"
-        return f"{self.time.size} pictures in {np.ptp(self.time):.2f} s, {even} ms apart"
+        even = np.ptp(steps) < _EVEN_MS
+        return Text(
+            "{n} pictures in {time:.2f} s, {step:.2f} ms apart"
+            if even
+            else "{n} pictures in {time:.2f} s, {least:.2f} to {most:.2f} ms apart",
+            n=self.time.size,
+            time=float(np.ptp(self.time)),
+            step=float(np.median(steps)),
+            least=float(steps.min()),
+            most=float(steps.max()),
+        )
 
     @property
     def text(self) -> str:
         """Place, spin, precession and fall, in a few sentences."""
-        wide, high = (1e3 * np.ptp(one) for one in (self.x, self.y))
-        place = f"x stays within {wide:.2f} mm and {'z' if self.beside else 'y'} within {high:.2f} mm"
-        text = f"{self.pictures}: {place}, u of a place is {1e3 * np.median(self.u):.3f} mm."
+        return Sentences(*self._sentences())
+
+    def _sentences(self) -> Iterator[str]:
+        wide, high = (float(1e3 * np.ptp(one)) for one in (self.x, self.y))
+        yield Text(
+            "{pictures}: x stays within {wide:.2f} mm and {axis} within {high:.2f} mm, u of a place is {u:.3f} mm.",
+            pictures=self.pictures,
+            wide=wide,
+            axis="z" if self.beside else "y",
+            high=high,
+            u=float(1e3 * np.median(self.u)),
+        )
         if self.spin and self.turning:
             sense = "clockwise" if self.turning.frequency > 0 else "counter-clockwise"
-            text += f" The spin is {with_uncertainty(self.spin)} in the middle of the film, {sense} seen from above."
+            said = "The spin is {spin:n} in the middle of the film, {sense} seen from above."
+            yield Text(said, spin=with_uncertainty(self.spin), sense=sense)
         if self.precession:
-            text += f" The precession is {with_uncertainty(self.precession)}."
+            yield Text("The precession is {precession:n}.", precession=with_uncertainty(self.precession))
         if self.leaning and self.leaning.middle and self.leaning.tilt:
-            about = f"{with_uncertainty(self.leaning.middle)}, with a tilt of {with_uncertainty(self.leaning.tilt)}"
-            text += f" The precession by the lean is {about}."
+            said = "The precession by the lean is {precession:n}, with a tilt of {tilt:n}."
+            middle, tilt = self.leaning.middle, self.leaning.tilt
+            yield Text(said, precession=with_uncertainty(middle), tilt=with_uncertainty(tilt))
         if self.rising and self.rising.swing:
-            text += f" The top swings up and down at {with_uncertainty(self.rising.swing)}."
+            yield Text("The top swings up and down at {swing:n}.", swing=with_uncertainty(self.rising.swing))
         if self.fall:
-            spin = f", at a spin of {with_uncertainty(self.spin_at_fall)}" if self.spin_at_fall else ""
-            text += f" The top falls at {with_uncertainty(self.fall)} of the film{spin}."
-        return text
+            spin = self.spin_at_fall
+            at = Text(", at a spin of {spin:n}", spin=with_uncertainty(spin)) if spin else ""
+            yield Text("The top falls at {fall:n} of the film{at}.", fall=with_uncertainty(self.fall), at=at)
 
 
 class VideoAnalysis(EachAlone[FilmReadings, Video, VideoOptions]):
@@ -243,14 +268,14 @@ def analyze_source(source: Source[FilmReadings], options: VideoOptions) -> Video
         followed = follow(film, start, stop, bar, with_dot=bool(options.stem_m), beside=options.beside)
         return _video(film, options, followed)
     except AnalysisError as error:
-        raise DataError(f"{film.path}: {error}") from error
+        raise DataError(Text("{path:s}: {why}", path=film.path, why=error)) from error
     finally:
         bar.close()
 
 
 def no_run(run: Run, _: InputOptions) -> FilmReadings:
     """Raise DoesNotSuit: a run holds no film."""
-    raise DoesNotSuit(f"{run.folder}: is a run, a film is expected")
+    raise DoesNotSuit(Text("{path:s}: is a run, a film is expected", path=run.folder))
 
 
 def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:
@@ -381,7 +406,7 @@ def _turn(
     try:
         found = spins_of_start(times, phases.phase, phases.u)
     except NoMark as error:
-        return None, (), str(error)
+        return None, (), text_of(error)
     if options.beside:
         found = [(f, chi) for f, chi in found if abs(f) > _STANDS]
     choices, slow = choices_of(found, options.near)
@@ -416,7 +441,7 @@ def _scale(film: Film, options: VideoOptions, followed: Followed) -> Estimate:
     if options.rim_m is not None:
         diameter, radius, nearer = options.rim_m, float(np.median(followed.radius)), 1.0
     elif followed.base is None:
-        raise DataError(f"{film.path}: no round base is seen round the top: give `rim`, or `scale`")
+        raise DataError(Text("{path:s}: no round base is seen round the top: give `rim`, or `scale`", path=film.path))
     else:
         assert options.base_m is not None
         diameter, radius = options.base_m, followed.base.radius
@@ -425,19 +450,19 @@ def _scale(film: Film, options: VideoOptions, followed: Followed) -> Estimate:
     return Estimate(value, value * _EDGE_U / radius, "m")
 
 
-def _notes(options: VideoOptions, seen: Followed, leaning: Leaning | None) -> Iterator[str]:
+def _notes(options: VideoOptions, seen: Followed, leaning: Leaning | None) -> Iterator[Text]:
     if seen.ended:
         why = {"lost": "the rim is lost", "hand": "a large part of the view changes, as by a hand,"}[seen.ended]
-        yield f"{why} after {seen.times[-1]:.2f} s: the rest of the film is left out"
+        yield Text("{why} after {time:.2f} s: the rest of the film is left out", why=why, time=float(seen.times[-1]))
     if seen.missed:
-        yield f"no rim is seen in {seen.missed} pictures in between; they are left out"
+        yield Text("no rim is seen in {n} pictures in between; they are left out", n=seen.missed)
     if options.stem_m is not None and leaning is None:
-        yield (
+        yield Text(
             "no dot is seen on the stem: a light one is expected near the middle of the rim, with dark round it, and "
             "the mark beyond a third of the radius"
         )
     if options.base_m is not None and options.camera_m is None:
-        yield (
+        yield Text(
             "the scale is that of the base, and the top is nearer to the camera: places are too large by height over "
             "distance; say both by `height` and `camera`, or give `rim`"
         )
@@ -445,12 +470,15 @@ def _notes(options: VideoOptions, seen: Followed, leaning: Leaning | None) -> It
 
 def _notes_on_spin(
     turning: Turning | None, choices: tuple[float, ...], problem: str, rate: float, options: VideoOptions
-) -> Iterator[str]:
-    listed = " or ".join(f"{abs(f):.3f} Hz ({'counter-' * (f > 0)}clockwise)" for f in choices)
+) -> Iterator[Text]:
+    way = ("clockwise", "counter-clockwise")
+    listed = tuple(Text("{hz:.3f} Hz ({way})", hz=abs(f), way=way[f > 0]) for f in choices)
     if problem:
-        yield f"no spin: {problem}"
+        yield Text("no spin: {problem}", problem=problem)
     elif turning is None:
-        slow = "" if options.rate else "; or, if the film is in slow motion, the true `rate`"
-        yield f"no spin: at {rate:.4g} pictures in a second it may be {listed}; say which by `near`{slow}"
+        slow = "" if options.rate else Text("; or, if the film is in slow motion, the true `rate`")
+        said = "no spin: at {rate:.4g} pictures in a second it may be one of {listed}; say which by `near`{slow}"
+        yield Text(said, rate=rate, listed=listed, slow=slow)
     elif len(choices) > 1:  # the slope chose
-        yield f"of {listed}, which look the same, the one that slows down is taken, as a free top does"
+        taken = "of {listed}, which look the same, the one that slows down is taken, as a free top does"
+        yield Text(taken, listed=listed)

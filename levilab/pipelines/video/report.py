@@ -13,6 +13,7 @@ from levilab.pipelines.video.analysis import QUANTITIES
 from levilab.present.document.blocks import Listing, Paragraph, Tabular
 from levilab.present.numbers import short_name, with_decimals
 from levilab.present.tables import Table, table
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -68,14 +69,21 @@ def _csv(columns: Mapping[str, np.ndarray]) -> str:
     return text.getvalue()
 
 
+_SCALE = "The scale is common to all places, and not in their u."
+
+
 def video_part(analysis: VideoAnalysis) -> ReportPart:
     """Return the values and the still."""
     (values,) = video_tables(analysis)
     return ReportPart(
         subject="film of a top",
         heading="A floating top, filmed",
-        lead=f"{sum(run.time.size for run in analysis.runs)} pictures",
-        result=(Tabular("video-values", values, f"{VALUE_U} The scale is common to all places, and not in their u."),),
+        lead=Text("{n} pictures", n=sum(run.time.size for run in analysis.runs)),
+        result=(
+            Tabular(
+                "video-values", values, Sentences(VALUE_U, "The scale is common to all places, and not in their u.")
+            ),
+        ),
         figure=FigureText(
             title="First picture.",
             caption="Rim, mark, base, and the path of the rim's middle, drawn over the first picture.",
@@ -88,7 +96,7 @@ def video_part(analysis: VideoAnalysis) -> ReportPart:
 
 def _pictures(source: Source[FilmReadings], run: Video, *_: object) -> tuple[str, ...]:
     film = source.readings.film
-    return (f"{film.width} × {film.height}, {film.codec}", run.pictures)
+    return (Text("{width} × {height}, {codec:s}", width=film.width, height=film.height, codec=film.codec), run.pictures)
 
 
 def _spins(run: Video, number: int) -> Block:

@@ -15,6 +15,7 @@ from analysis.film.side import Side, find_side, fit_side
 from analysis.film.view import compare_views
 from levilab.errors import DataError
 from levilab.formats.film import pictures
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -111,7 +112,8 @@ def follow(
     base = None if isinstance(top, Side) else _fit_base(still, background, top, factor)
     watch = _Watch(background, top, factor)
     if watch.share_of_background < _LEAST_BACKGROUND:
-        raise DataError(f"{film.path}: the top fills the picture: film it from farther away, with the base round it")
+        fills = "{path:s}: the top fills the picture: film it from farther away, with the base round it"
+        raise DataError(Text(fills, path=film.path))
     track = _Track(top.scaled(factor), with_dot=with_dot)
     span = min(stop, film.duration or np.inf) - start
     for time, picture in pictures(film, start, stop):
@@ -143,7 +145,12 @@ def _beginning(film: Film, start: float, stop: float) -> tuple[Array, Picture, i
             before = time
     if still is None or len(found) < 3:
         raise DataError(
-            f"{film.path}: holds {len(found)} pictures from {start:g} s on: a second of film is needed at least"
+            Text(
+                "{path:s}: holds {n} pictures from {start:g} s on: a second of film is needed at least",
+                path=film.path,
+                n=len(found),
+                start=start,
+            )
         )
     return np.stack(found), still, factor
 
@@ -243,8 +250,13 @@ def _followed(film: Film, track: _Track, watch: _Watch, base: Circle | None) -> 
         if track.ended == "hand":
             raise HandInView(times=(max(watch.clean, 0.0), track.last), share=watch.share)
         raise DataError(
-            f"{film.path}: the top is seen for {span:.2f} s, {_LEAST_S:g} s are needed: name a part where it floats by "
-            "`start` and `stop`"
+            Text(
+                "{path:s}: the top is seen for {span:.2f} s, {least:g} s are needed: name a part where it floats by "
+                "`start` and `stop`",
+                path=film.path,
+                span=span,
+                least=_LEAST_S,
+            )
         )
     times = np.array(track.times)
     missed = sum(time < times[-1] for time in track.missed)

@@ -173,7 +173,7 @@ def test_a_top_that_is_spun_by_hand_needs_no_generator(experiment, tmp_path):
     assert run.count() == 2 if more else run.count() > 5
     if more:
         limit, u = (run.readings().column(name)[0] for name in ("spin_frequency_hz", "spin_frequency_u_hz"))
-        fell = float(run.record.synthetic_how.rpartition("falling at ")[2].split()[0])
+        fell = float(run.record.synthetic_how.rpartition("the first at ")[2].split()[0])
         assert limit == pytest.approx(fell, abs=4 * u)
     analysis = ANALYSES["limit" if more else "spindown"]
     assert analysis.analyze([run.folder], analysis.options_from({})).runs
