@@ -40,16 +40,16 @@ def test_a_top_is_followed_from_where_it_is_put_to_where_it_falls(fresh):
 
 def test_the_end_of_a_line_scatters_about_the_fall_as_its_u_says(fresh):
     errors, pulls = [], []
-    for _ in range(60):
+    for _ in range(40):
         end, amplitude = fresh.uniform(32, 38), fresh.uniform(0.25e-6, 0.6e-6)
-        track, _ = follow(fresh, duration=50.0, up=(0.0, end), amplitude=amplitude)
+        track, _ = follow(fresh, duration=42.0, up=(0.0, end), amplitude=amplitude)
         (flight,) = track.flights
         errors.append(flight.end - end)
         pulls.append(errors[-1] / flight.u_end)
-    # 3 standard errors of a mean, 4 of a share of 60: the jolt of the fall is no part of the line
+    # 3 standard errors of a mean, 4 of a share of 40: the jolt of the fall is no part of the line
     assert np.mean(errors) == pytest.approx(0, abs=3 * np.std(errors) / np.sqrt(60))
-    assert np.mean(np.abs(pulls) < 1) == pytest.approx(0.68, abs=4 * np.sqrt(0.68 * 0.32 / 60))
-    assert np.mean(np.abs(pulls) < 2) > 0.95 - 4 * np.sqrt(0.95 * 0.05 / 60)
+    assert np.mean(np.abs(pulls) < 1) == pytest.approx(0.68, abs=4 * np.sqrt(0.68 * 0.32 / 40))
+    assert np.mean(np.abs(pulls) < 2) > 0.95 - 4 * np.sqrt(0.95 * 0.05 / 40)
 
 
 def test_a_jolt_at_the_fall_does_not_move_the_end_of_the_line(fresh):

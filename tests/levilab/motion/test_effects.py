@@ -27,9 +27,9 @@ def explained(name):
 
 
 def measured(scene):
-    """Mean height over 45 s [m], and the precession [Hz] from the turns of its own part of n_x + i n_y."""
+    """Mean height over 32 s [m], and the precession [Hz] from the turns of its own part of n_x + i n_y."""
     try:
-        motion = simulate(scene, 45.0, tolerance=1e-6, rate=150.0)
+        motion = simulate(scene, 32.0, tolerance=1e-6, rate=150.0)
     except SceneError:  # there is no equilibrium to start from
         return math.nan, math.nan
     if not motion.survived:
@@ -63,7 +63,7 @@ def test_switching_an_effect_on_changes_the_motion_by_what_was_said(name):
             continue
         if math.isnan(higher):
             continue  # it only falls later than what was compared
-        # means over 20 s and over 45 s of a motion that swings by 2 mm differ by some hundredths of a millimetre
+        # means over 20 s and over 32 s of a motion that swings by 2 mm differ by some hundredths of a millimetre
         assert higher - height == pytest.approx(effect.height_m, rel=0.3, abs=6e-5), kind.name
         if not math.isnan(effect.precession_hz):
             assert faster - precession == pytest.approx(effect.precession_hz, rel=0.3, abs=0.02), kind.name

@@ -63,13 +63,13 @@ def test_the_commands_of_a_worksheet_find_the_numbers_of_its_key(experiment, tmp
 @pytest.mark.slow
 def test_the_limits_of_a_key_are_those_of_the_tops_that_its_seeds_draw():
     """Each within the u of a line through ten falls, 0.05 Hz a fall; and of the mean of all tops within 2 u."""
-    sheet, seeds = SHEETS["limit"], {f"Group {k}": k for k in range(1, 5)}
+    sheet, seeds = SHEETS["limit"], {f"Group {k}": k for k in range(1, 4)}
     mean, scatter = measure(sheet, seeds).quantities
     for seed, found, spread in zip(seeds.values(), mean.estimates, scatter.estimates, strict=True):
         falls = [random_scene(seed).fall_of(k) for k in range(TOPS)]
         assert found.value == pytest.approx(np.mean(falls), abs=4 * 0.05 / TOPS**0.5)
         assert spread.value == pytest.approx(np.std(falls, ddof=1), abs=4 * 0.05 / TOPS**0.5)
-    assert sum(abs(one) <= 2 for one in mean.from_truth) >= 3  # fewer in one class of 70
+    assert sum(abs(one) <= 2 for one in mean.from_truth) >= 2  # fewer in one class of 60
 
 
 def test_a_key_has_the_values_and_truths_of_each_seed_and_the_worksheet_none(tmp_path):
