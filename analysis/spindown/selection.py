@@ -94,7 +94,7 @@ def statistics(
         chi_square=chi_square,
         reduced_chi_square=chi_square / freedom if chi_square is not None and freedom > 0 else None,
         aicc=misfit + 2 * k + 2 * k * (k + 1) / (n - k - 1) if n - k > 1 else None,
-        bic=misfit + k * float(np.log(n)) if freedom > 0 or chi_square is not None else None,
+        bic=misfit + k * float(np.log(n)) if freedom > 0 else None,  # else it fits any readings
         misfit=misfit,
         difference=None,
         weight=None,

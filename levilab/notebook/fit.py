@@ -85,6 +85,7 @@ FIT: Mapping[str, tuple[str, Callable[[FittedModel], Any]]] = MappingProxyType({
     "valuesdict": ("a function that returns the same", lambda of: lambda: {name: one.n for name, one in of.items()}),
     "best_fit": ("the curve at the readings, in SI", lambda of: of.eval()),
     "success": ("whether the fit converged", lambda of: bool(getattr(of._entry, "converged", True))),
+    "priors": ("names of parameters to which the readings add little", lambda of: getattr(of._entry, "priors", [])),
     "residual": ("reading less curve, in SI; NaN: not used.  lmfit's is divided by u, with the other sign", _residual),
 })  # fmt: skip
 #: Of the statistics in result.json, by their own names.

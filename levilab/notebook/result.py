@@ -480,7 +480,9 @@ class AnalysisResult(Exportable):
             best = " (best)" if name == self.best_model and len(self.models) > 1 else ""
             lines.append(f"{name}{best}: {', '.join(f'{_STATISTICS[key]} = {one:.4g}' for key, one in known.items())}")
         fitted = shown.get(model or self.best_model, self.values)
-        lines += ["", *(f"  {name} = {quantity!r}" for name, quantity in fitted.items()), ""]
+        priors = getattr(fitted, "priors", ())
+        marks = dict.fromkeys(priors, " (prior: known of tops beforehand)")
+        lines += ["", *(f"  {name} = {one!r}{marks.get(name, '')}" for name, one in fitted.items()), ""]
         lines += [f"  correlation of {one} and {other} = {r:+.3f}" for one, other, r in _correlations(fitted)]
         return "\n".join(lines).strip()
 

@@ -38,15 +38,16 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
     @property
     def text(self) -> str:
         """What the data say, in a few sentences."""
-        return verdict_in_doubt(self.combined) if self._is_doubtful else verdict_of_all(self.combined, self.runs)
+        return verdict_in_doubt(self.combined) if self.is_doubtful else verdict_of_all(self.combined, self.runs)
 
     @property
-    def _is_doubtful(self) -> bool:
+    def is_doubtful(self) -> bool:
+        """Whether no unit is sure, so that nothing of it is to be believed."""
         return all(source.readings.doubtful for source in self.sources)
 
     def about_all(self) -> Iterable[str]:
         """Yield remarks on the means, on the laws that are not excluded, and on what was asked for."""
-        if self._is_doubtful:
+        if self.is_doubtful:
             return
         yield from (*map(remark, self.combined.remarks), *self._left_out(), *self._of_laws(self.combined.fits))
         if self.options.laws:

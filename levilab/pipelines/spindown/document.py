@@ -27,7 +27,15 @@ from levilab.pipelines.spindown.report import (
     spindown_part,
     spindown_tables,
 )
-from levilab.pipelines.spindown.words import CORRELATION, QUANTITIES, SPINDOWN_ROW, SYMBOLS, remark, verdict_of_run
+from levilab.pipelines.spindown.words import (
+    CORRELATION,
+    QUANTITIES,
+    SPINDOWN_ROW,
+    SYMBOLS,
+    is_prior,
+    remark,
+    verdict_of_run,
+)
 from levilab.texts.text import Text
 
 if TYPE_CHECKING:
@@ -319,6 +327,7 @@ def _models(run: SpinDown) -> list[dict[str, Any]]:
             "covariance": None if fit.covariance is None else fit.covariance.tolist(),
             "statistics": statistics_of(fit.statistics),
             "converged": all(each.kind != "not converged" for each in fit.remarks),
+            "priors": [name for name in fit.parameters if is_prior(fit, name)],
             "warnings": [remark(each) for each in fit.remarks],
         }
         | ({"linearised": values_of(fit.linearised)} if fit.linearised else {})

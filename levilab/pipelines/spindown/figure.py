@@ -102,6 +102,8 @@ def short_figure(analysis: SpinDownAnalysis) -> Figure:
 
 def _finding(analysis: SpinDownAnalysis) -> str:
     """Return the verdict in one sentence."""
+    if analysis.is_doubtful:
+        return Text("Spin-down as it was read: the unit comes first, see the note")
     n, said = len(analysis.runs), finding(analysis.combined)
     return Text("Spin-down of {n} runs: {said}", n=n, said=said) if n > 1 else Text("Spin-down: {said}", said=said)
 

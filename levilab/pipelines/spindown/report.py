@@ -26,7 +26,15 @@ from levilab.pipelines.part import (
     title_of,
 )
 from levilab.pipelines.row import cells_of
-from levilab.pipelines.spindown.words import OF_RUN, STRAIGHT_LINES, SYMBOLS, is_seen, law_names, verdict_of_run
+from levilab.pipelines.spindown.words import (
+    OF_RUN,
+    STRAIGHT_LINES,
+    SYMBOLS,
+    is_prior,
+    is_seen,
+    law_names,
+    verdict_of_run,
+)
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Details, Listing, Note, Paragraph, Points, Tabular
 from levilab.present.numbers import (
@@ -323,7 +331,7 @@ def _quality(statistics: Statistics, runs: int) -> list[str]:
 
 #: For the terminal, where nothing else explains them.
 _WOBBLE_SYMBOLS = "δ: tilt of the moment; ν_r: resonance, below the last reading."
-_NUTATION = "K, with the laws: nutation."
+_NUTATION = "K, with the laws: nutation. (prior): known of tops beforehand, not from the readings."
 
 
 def count_table(analysis: SpinDownAnalysis, *, symbols: bool = False) -> Table | None:
@@ -430,7 +438,12 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
         subject="spin-down",
         heading="Spin-down of a levitated top",
         lead=Text("{readings} used", readings=how_many(n, "reading")),
-        result=(*_meaning(analysis), *_falls(analysis), *_laws(analysis), *_count(analysis)),
+        result=(
+            *(() if analysis.is_doubtful else _meaning(analysis)),
+            *_falls(analysis),
+            *_laws(analysis),
+            *_count(analysis),
+        ),
         figure=FigureText(
             title="Spin-down.",
             caption=(
@@ -577,8 +590,13 @@ def _constants_table(
 
 def _law_cells(analysis: SpinDownAnalysis, law: CombinedLaw, *, short: bool) -> tuple[str, ...]:
     name = Text("{law} (best)", law=law.name) if is_best(analysis, law.name) else law.name
+    fit = analysis.runs[0].fit(law.name) if len(analysis.runs) == 1 else None
     constants = [
-        Text("{symbol} = {value}", symbol=SYMBOLS[of], value=with_uncertainty(value))
+        Text(
+            "{symbol} = {value} (prior)" if fit and is_prior(fit, of) else "{symbol} = {value}",
+            symbol=SYMBOLS[of],
+            value=with_uncertainty(value),
+        )
         for of, value in law_constants(analysis, law.name).items()
         if not short or of in LAWS[law.name].constants
     ]

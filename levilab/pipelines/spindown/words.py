@@ -13,6 +13,7 @@ import numpy as np
 
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
+from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.verdict import is_simple
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, estimate, statistic
 from levilab.pipelines.sources import Doubting, note_of
@@ -142,6 +143,8 @@ _PERSONS = {"stokes": "Stokes", "newton": "Newton"}
 TOO_SMALL = 5e-10
 #: A tilt of the moment is mentioned from this multiple of its u on.
 SEEN = 3.0
+#: Part of u that what was known beforehand makes, from which a number is marked as a prior.
+PRIOR = 0.9
 
 
 def law_names(laws: Iterable[str]) -> str:
@@ -182,6 +185,12 @@ def is_seen(tilt: Estimate | None) -> bool:
     return tilt is not None and tilt.value is not None and bool(tilt.u) and tilt.value > SEEN * (tilt.u or 0.0)
 
 
+def is_prior(fit: LawFit, name: str) -> bool:
+    """Return whether a number is what was known of tops beforehand, to which the readings add little."""
+    part, u = fit.parts.get(name), fit.parameters[name].u
+    return name in WOBBLE and part is not None and bool(u) and part.tilt > PRIOR * (u or 0.0)
+
+
 def finding(found: Combined) -> str:
     """Return the verdict of all runs in a few words, for the head of a figure."""
     said, best = found.verdict, found.best
@@ -219,6 +228,7 @@ def _verdict(
         return enumeration([power if name == "power" else law_names([name]) for name in laws])
 
     simple, law = _simple(said), law_names([said.best])
+    compared = [name for name in said.needless if stats[name].difference is not None]
     how, others, advice = _how(said.best, constants[said.best]), said.indistinguishable[1:], ""
     if not said.describes:
         first = _no_law(found, runs, digits(best.rms_residual))
@@ -257,9 +267,7 @@ def _verdict(
         Text("They cannot distinguish it from {laws}.", laws=names(others)) if others and said.decided else "",
         advice,
         weak if said.weak else "",
-        _needless(said, names(said.needless))
-        if said.needless and (said.decided or len(simple) == 1) and said.describes
-        else "",
+        _needless(said, names(compared)) if compared and (said.decided or len(simple) == 1) and said.describes else "",
         _wobble(tilt),
     )
 

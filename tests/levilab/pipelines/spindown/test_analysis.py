@@ -17,6 +17,7 @@ from levilab.formats.columns import NoSuchColumn
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.document import SPINDOWN
+from levilab.pipelines.spindown.figure import _finding as finding_of
 from levilab.pipelines.spindown.readings import read_spin_file
 from levilab.pipelines.spindown.report import spindown_part, spindown_tables
 from levilab.pipelines.suits import save
@@ -182,9 +183,23 @@ def test_another_unit_taken_for_hertz_is_doubted(tmp_path, unit, factor):
     assert source.readings.doubtful
     assert found.text.startswith("The unit comes first: as it was read the")  # and no "fits best … known to"
     assert f"f=NAME [{unit}]" in source.warnings[0]
+    assert "describes" not in finding_of(found)  # nor has the figure
+    assert "von Kármán" not in str(spindown_part(found).result)
     stated = SPINDOWN.analyze([path], SpinDownOptions(columns={"t": "t", "f": f"f [{unit}]"}))
     assert stated.runs[0].frequency[0] == pytest.approx(40, abs=0.1)
     assert not stated.sources[0].readings.doubtful
+
+
+def test_what_was_known_beforehand_is_marked_and_no_law_wins_by_as_many_constants_as_readings(tmp_path):
+    t, nu = np.loadtxt(spin_down_csv(tmp_path / "my.csv", u=False), delimiter=",", skiprows=1, unpack=True)
+    np.savetxt(tmp_path / "few.csv", np.c_[t, nu][[0, len(t) // 2, -1]], delimiter=",", header="t,f", comments="")
+    found = SPINDOWN.analyze([tmp_path / "few.csv"], SpinDownOptions(reading_u=0.02, tilt="none"))
+    assert len(found.runs[0].time) == 3
+    assert {"mixed", "power"} <= set(found.combined.verdict.needless)
+    assert "mixed" not in found.text  # three constants fit any three readings
+    shown = spindown_tables(SPINDOWN.analyze([tmp_path / "my.csv"], SpinDownOptions(tilt="fitted")))
+    cells = " ".join(str(cell) for table in shown for row in table.rows for cell in row.cells)
+    assert "Hz (prior)" in cells
 
 
 @pytest.mark.parametrize(("u", "compared"), [(0.001, "BIC compares the laws"), (None, "too few to compare")])
