@@ -8,6 +8,7 @@ from levilab.cli.options import HEADING, Language, Paths, among, argument, flag,
 from levilab.cli.output import interruptible, message, result
 from levilab.pipelines.options import OF_REPORT, read_options
 from levilab.report.worksheets.sheets import SHEETS
+from levilab.texts.text import Text
 
 
 @takes_options(OF_REPORT, HEADING)
@@ -32,7 +33,7 @@ def of_class(
             message,
             heading,
         )
-    result(f"the class is in {written}")
+    result(Text("the class is in {file:s}", file=written))
 
 
 def worksheet(

@@ -35,8 +35,11 @@ def live(
         from levilab.runs.find import run_or_folder
 
         run_or_folder(run, out)
-    bench = " and the bench for practice, whose time stands still while no page is open"
-    said = f"Ctrl-C ends the view{bench if mock else '; a run goes on without it'}"
+    said = (
+        "Ctrl-C ends the view and the bench for practice, whose time stands still while no page is open"
+        if mock
+        else "Ctrl-C ends the view; a run goes on without it"
+    )
     serve(said, opens=not no_open, run=run, out=out, mock=mock, seed=seed, port=port, share=share, language=language)
 
 

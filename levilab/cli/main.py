@@ -13,6 +13,7 @@ import typer.core
 from levilab.cli import exit_codes
 from levilab.cli.importing import importing
 from levilab.cli.later import Later
+from levilab.cli.options import speak_from
 from levilab.cli.output import message, silence
 from levilab.cli.quantities import APPLICATION, in_options
 
@@ -26,6 +27,7 @@ class Commands(typer.core.TyperGroup):
             args = [*args[1:], "--help"]
         elif args in (["version"], ["-v"], ["-V"]):
             args = ["--version"]
+        speak_from(args)
         with importing():
             return super().make_context(info_name, args, parent, **extra)
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import inspect
 import math
+import os
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from levilab.errors import UsageError, list_known
-from levilab.texts.text import speak
+from levilab.texts.text import ENGLISH, languages, speak
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Collection
+    from collections.abc import Callable, Collection, Sequence
 
 
 def number(unit: str = "", *, low: float = -math.inf, high: float = math.inf) -> Callable[[Any], float]:
@@ -131,6 +133,14 @@ def named_scene(scene: str | None) -> str:
 
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON document and nothing else on standard output.")]
+
+
+def speak_from(args: Sequence[str]) -> None:
+    """Speak the language of the command line or the environment, before anything is refused."""
+    asked = [after for option, after in pairwise(args) if option == "--language"]
+    code = [os.environ.get("LEVILAB_LANGUAGE", ENGLISH), *asked][-1]
+    if code in languages():  # another one is refused where its option is read
+        speak(code)
 
 
 def _speak(language: str) -> str:

@@ -27,7 +27,9 @@ def print_json(document: Any, *, indent: int | None = 2, sort_keys: bool = False
 
 def result(text: str) -> None:
     """Print a line on standard output; names in it, which others chose, do not steer the terminal."""
-    typer.echo(printable(text))
+    from levilab.texts.text import in_language  # not for a help
+
+    typer.echo(printable(in_language(text)))
 
 
 def message(text: str) -> None:
@@ -51,7 +53,10 @@ def silence(stream: TextIO) -> None:
 
 def place_of_report(report: Path) -> str:
     """Return where a report will be, as a line; a folder that it makes may be a typing error."""
-    return f"the report is in {report}{'' if report.parent.exists() else ', in a new folder'}"
+    from levilab.texts.text import Text  # not for a help
+
+    there = "the report is in {file:s}" if report.parent.exists() else "the report is in {file:s}, in a new folder"
+    return Text(there, file=report)
 
 
 @contextlib.contextmanager

@@ -11,6 +11,7 @@ from levilab.cli.options import Json, Presets, Settings, flag, option, place, qu
 from levilab.cli.output import interruptible, message, print_json
 from levilab.cli.quantities import with_options
 from levilab.errors import UsageError
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from levilab.animation.request import AnimationRequest
@@ -193,7 +194,7 @@ def _simulate_map(
         run(store, workers_for(store.plan), share)
         found = store.load()
         for path in write_map(found, out):
-            message(f"wrote {path}")
+            message(Text("wrote {path:s}", path=path))
     for note in notes_of(plan):
         message(f"note: {note}")
     return as_document(found)

@@ -11,6 +11,7 @@ import typer
 from levilab.cli.options import SCENES, Json, Settings, argument, flag, named_scene, option, place, quantity
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.errors import DataError, UsageError, WorkersLost
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
@@ -92,7 +93,7 @@ def sweep(
     computed = (resume or not shown) and _compute(store, cores, scheduler)
     pictures = _show(store, as_json=as_json)
     for path in [store.path, *pictures] if computed else pictures:
-        message(f"wrote {path}")
+        message(Text("wrote {path:s}", path=path))
 
 
 def _is_store(scene: str) -> bool:

@@ -347,8 +347,12 @@ def _wanted_columns(
         if index is None:
             raise TableError(
                 path,
-                f"has no column '{shorten(title)}'; it has {quote_names(header)}: "
-                f"correct `columns` = {key}=NAME or NUMBER",
+                Text(
+                    "has no column '{title:s}'; it has {header:s}: correct `columns` = {key:s}=NAME or NUMBER",
+                    title=shorten(title),
+                    header=quote_names(header),
+                    key=key,
+                ),
             )
         if index in chosen.values():
             raise TableError(path, f"`columns` names column '{shorten(title)}' twice; each column holds one quantity")

@@ -36,6 +36,7 @@ from levilab.formats.texts import Text
 from levilab.formats.titles import dimension, unit_factor
 from levilab.formats.transposed import LIES
 from levilab.texts.note import Note
+from levilab.texts.text import Text as Said
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -382,15 +383,15 @@ def _number(path: Path, layout: Layout, column: Column, line: int, cell: str) ->
     if text == UNVALUED:
         what = f"column '{shorten(column.label)}' holds a formula without its value"
         raise TableError(path, f"{what}: open the file in Excel or LibreOffice, save it", line=line)
-    mark = "comma" if layout.dialect.decimal == "," else "point"
+    no_number = (
+        "'{cell:s}' stands in column '{column:s}', a number with decimal comma is expected: {do}"
+        if layout.dialect.decimal == ","
+        else "'{cell:s}' stands in column '{column:s}', a number with decimal point is expected: {do}"
+    )
     do = "correct it, or leave it empty if the reading was missed"
     if "±" in cell:
         do = "write what stands behind the ± into a column of its own, with the title u"
-    raise TableError(
-        path,
-        f"'{shorten(cell)}' stands in column '{shorten(column.label)}', a number with decimal {mark} is expected: {do}",
-        line=line,
-    )
+    raise TableError(path, Said(no_number, cell=shorten(cell), column=shorten(column.label), do=do), line=line)
 
 
 def _number_with_unit(path: Path, layout: Layout, column: Column, line: int, cell: str) -> float:
@@ -399,14 +400,18 @@ def _number_with_unit(path: Path, layout: Layout, column: Column, line: int, cel
     unit = unit_behind(text)
     kind = "time" if column.inverse else dimension(column.name)
     if unit_factor(unit, kind) != unit_factor(column.unit, kind):
-        what = f"'{shorten(cell)}' stands in column '{shorten(column.label)}', which is in {column.unit}"
-        raise TableError(path, f"{what}: write one unit in all rows", line=line)
+        other = "'{cell:s}' stands in column '{column:s}', which is in {unit:s}: write one unit in all rows"
+        values = {"cell": shorten(cell), "column": shorten(column.label), "unit": column.unit}
+        raise TableError(path, Said(other, **values), line=line)
     try:
         return layout.dialect.number(text[: -len(unit)].strip())
     except ValueError:
-        mark = "comma" if layout.dialect.decimal == "," else "point"
-        what = f"'{shorten(cell)}' has the other decimal mark, a number with decimal {mark} is expected"
-        raise TableError(path, f"{what}: correct it", line=line) from None
+        other = (
+            "'{cell:s}' has the other decimal mark, a number with decimal comma is expected: correct it"
+            if layout.dialect.decimal == ","
+            else "'{cell:s}' has the other decimal mark, a number with decimal point is expected: correct it"
+        )
+        raise TableError(path, Said(other, cell=shorten(cell)), line=line) from None
 
 
 def _left_out(line: int, text: str, why: str) -> str:

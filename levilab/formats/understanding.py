@@ -52,6 +52,7 @@ from levilab.formats.titles import (
 )
 from levilab.formats.transposed import LIES, set_upright
 from levilab.texts.note import of_file
+from levilab.texts.text import Text as Said
 
 TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: No such top floats far below or above these [Hz], linear theory says 21.65 to 80.6: the unit is in doubt there.
@@ -240,12 +241,22 @@ def _question(
     choices = []
     for unit in (*spins, *(unit for unit in ("rpm", "Hz") if unit not in spins)):
         factor = unit_factor(unit, "frequency") or 1.0
-        text = f"{unit} ({first * factor:.3g} to {last * factor:.3g} Hz)" if unit in spins else unit
+        range_ = "{unit:s} ({first:.3g} to {last:.3g} Hz)"
+        text = Said(range_, unit=unit, first=first * factor, last=last * factor) if unit in spins else unit
         choices.append(Choice(text, {**at, "f": f"{index + 1} [{unit}]"}))
     title = f" '{shorten(layout.header[index])}'" if index < len(layout.header) else ""
     *others, end = (choice.text for choice in choices)
-    seen = f"column {index + 1}{title} has the values {first:.4g} to {last:.4g} and {what}"
-    return Doubt("unit", f"{seen}: {', '.join(others)} or {end}?", index, tuple(choices), open=len(spins) > 1)
+    asked = Said(
+        "column {n}{title:s} has the values {first:.4g} to {last:.4g} and {what}: {units} or {end}?",
+        n=index + 1,
+        title=title,
+        first=first,
+        last=last,
+        what=what,
+        units=(*others,),
+        end=end,
+    )
+    return Doubt("unit", asked, index, tuple(choices), open=len(spins) > 1)
 
 
 def _turns_per_reading(layout: Layout, numbers: Sequence[float], time: Column | None) -> str:
@@ -263,7 +274,8 @@ def _unanswered(path: Path, doubt: Doubt) -> NoSuchColumn:
     example = ",".join(f"{key}={to}" for key, to in doubt.choices[0].columns.items())
     if doubt.open:
         example = re.sub(r"\[.*\]$", "[UNIT]", example)
-    return NoSuchColumn(path, f'{doubt.text} say `columns` = "{example}"', doubt=doubt)
+    text = Said('{question} say `columns` = "{example:s}"', question=doubt.text, example=example)
+    return NoSuchColumn(path, text, doubt=doubt)
 
 
 def _must_be_sure(plan: "Plan") -> "Plan":
@@ -285,7 +297,7 @@ def _unit_doubt(layout: Layout, column: Column, used: Iterable[Column]) -> Doubt
     if not numbers or is_possible_spin(median(numbers) * column.factor):
         return None
     time = next((one for one in used if one.name == "time_s"), None)
-    what = f"the unit {column.unit}" if column.written else f"no unit, and would be in {column.unit}"
+    what = Said("the unit {unit:s}" if column.written else "no unit, and would be in {unit:s}", unit=column.unit)
     return _question(layout, column.index, time, what=what)
 
 

@@ -469,7 +469,8 @@ def _of_file(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
 def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
     if not needs.take(run):
         kind = run.record.experiment
-        raise DoesNotSuit(f"{run.folder}: holds a {kind} run, {needs.name} needs a {needs.runs}")
+        other = "{path:s}: holds a {kind}, {analysis:s} needs a {needed}"
+        raise DoesNotSuit(Text(other, path=run.folder, kind=f"{kind} run", analysis=needs.name, needed=needs.runs))
     data = run.folder / needs.data
     if not data.exists():  # as after a kill before the first record
         raise DataError(f"{run.folder}: holds no {data.name}, so nothing was recorded; analyze another run")

@@ -25,7 +25,7 @@ from levilab.report.pdf.renderer import as_pdf, check_typst
 from levilab.report.reproduction import Asked, Heading
 from levilab.report.tables.values import folder_of, of_analysis, write_tables
 from levilab.runs.find import find_runs
-from levilab.texts.text import spoken
+from levilab.texts.text import Text, spoken
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -127,7 +127,7 @@ def format_of(output: Path) -> Format:
     """
     form = FORMATS.get(output.suffix.lower())
     if form is None:
-        raise UnknownFormat("out", "a name that ends in .html or .pdf is expected", value=output)
+        raise UnknownFormat("out", Text("a name that ends in .html or .pdf is expected"), value=output)
     form.check()
     with writing_report(output):
         check_writable(output)
@@ -208,9 +208,10 @@ def _without_result(results: Results) -> Iterator[str]:
         if origin.lacks_result
     }
     if lacking:
-        yield (
-            f"no result lies beside {list_in_words([*lacking])}: analyzed for the page; if levilab analyze wrote one "
-            "elsewhere (`out`), give that folder or file"
+        yield Text(
+            "no result lies beside {runs}: analyzed for the page; if levilab analyze wrote one elsewhere (`out`), give "
+            "that folder or file",
+            runs=list_in_words([*lacking]),
         )
 
 

@@ -99,12 +99,14 @@ def run_to_resume(name: Path, root: Path) -> Path:
     if folder.exists():
         return folder
     if name.name != str(name):
-        raise DataError(f"{name}: there is no such run; levilab runs lists those of a folder")
+        raise DataError(Text("{name:s}: there is no such run; levilab runs lists those of a folder", name=name))
     if not root.is_dir():
-        raise DataError(f"no run {name}, there is no folder {root} here: go to the folder that holds {root}")
+        nowhere = "no run {name:s}, there is no folder {root:s} here: go to the folder that holds {root:s}"
+        raise DataError(Text(nowhere, name=name, root=root))
     if runs_named(name.name, root):
-        raise DataError(f"more than one run in {root} is called {name}: say its whole name; levilab runs lists them")
-    raise DataError(f"no run {name} in {root}: levilab runs lists those that are there")
+        several = "more than one run in {root:s} is called {name:s}: say its whole name; levilab runs lists them"
+        raise DataError(Text(several, root=root, name=name))
+    raise DataError(Text("no run {name:s} in {root:s}: levilab runs lists those that are there", name=name, root=root))
 
 
 def run_or_folder(name: Path, root: Path = RUNS) -> Path:

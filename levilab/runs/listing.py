@@ -21,6 +21,7 @@ from levilab.present.numbers import short_name
 from levilab.present.terminal import print_rows, terminal
 from levilab.runs.find import RECORD, find_runs, must_be_searchable
 from levilab.runs.run import READINGS, Run, RunRecord
+from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -204,7 +205,7 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
     """Print the list of runs, and below it the faults of the broken ones."""
     console = terminal()
     if not runs:
-        console.print(f"no runs in {escape(str(root))}")
+        console.print(in_language(Text("no runs in {folder:s}", folder=escape(str(root)))))
         return
     heads = ["when (UTC)", "run", "what", "status", "readings", "length"]
     room = console.width - 80 if console.width >= ROOM_FOR_NOTES else 0

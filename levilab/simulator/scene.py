@@ -19,6 +19,7 @@ from levilab.settings import in_one_line
 from levilab.simulator.keys import SceneError, Table, UnknownScene, as_toml, nearest, parse_setting, set_key, short_text
 from levilab.simulator.laws import LAWS
 from levilab.simulator.parts import Base, Drag, Drive, Escape, Part, Start, TemperatureRise, Top, Washers
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -307,9 +308,12 @@ def preset(name: str) -> Scene:
     if name in presets():
         return _read_file(_scenes_folder() / f"{name}.toml", name)
     near = nearest(name, presets())
-    meant = f"did you mean {near}? Known" if near else "known"
-    known = ", ".join(presets())
-    raise UnknownScene(f"there is no scene {name!r}: {meant} are {known}; or give the path of a TOML file")
+    said = (
+        "there is no scene {name:s}: did you mean {near:s}? Known are {known:s}; or give the path of a TOML file"
+        if near
+        else "there is no scene {name:s}: known are {known:s}; or give the path of a TOML file"
+    )
+    raise UnknownScene(Text(said, name=repr(name), near=near, known=", ".join(presets())))
 
 
 def changes(scene: Scene) -> dict[str, Any] | None:

@@ -250,7 +250,7 @@ def write_class(
     ending = output.suffix.lower()
     form = FORMATS.get(ending)
     if form is None and ending != SPREADSHEET:
-        raise UnknownFormat("out", "a name that ends in .html, .pdf or .xlsx is expected", value=output)
+        raise UnknownFormat("out", Text("a name that ends in .html, .pdf or .xlsx is expected"), value=output)
     if form:
         form.check()
     with writing_report(output):

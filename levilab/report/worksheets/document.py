@@ -31,7 +31,7 @@ from levilab.report.groups.beside import class_of
 from levilab.report.groups.document import truth_text
 from levilab.report.page import FORMATS
 from levilab.report.worksheets.sheets import SHEETS, TOPS
-from levilab.texts.text import ENGLISH, in_language, language_of
+from levilab.texts.text import ENGLISH, Text, in_language, language_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -203,7 +203,8 @@ def write_worksheets(
     for sheet in (SHEETS[name] for name in experiments or SHEETS):
         contents = {sheet.experiment: worksheet(sheet, texts, seeds)}
         if keys:
-            tell(f"the key of {sheet.experiment}: {how_many(len(seeds), 'run')} on the virtual bench")
+            runs = how_many(len(seeds), "run")
+            tell(Text("the key of {sheet:s}: {runs} on the virtual bench", sheet=sheet.experiment, runs=runs))
             contents[f"{sheet.experiment}-key"] = key(sheet, texts, seeds, measure(sheet, seeds))
         with writing(f"{out}: could not be written"):
             out.mkdir(parents=True, exist_ok=True)
