@@ -71,6 +71,16 @@ def peers(session: nox.Session) -> None:
     session.run("python", str(PEERS / "run_pymeasure_suite.py"), str(source), "--server", "hislip")
 
 
+@nox.session
+def pymodaq(session: nox.Session) -> None:
+    """Test the plug-ins of docs/bluesky.md in PyMoDAQ, which brings Qt: 360 MB more than the other programs."""
+    install_wheel(session, "[simulate]")
+    session.install(
+        "pymodaq==5.3.8", "PyQt6==6.11.0", "pytest", "pytest-xdist", "hypothesis", "--constraint", str(CONSTRAINTS)
+    )
+    session.run("pytest", str(PEERS / "test_pymodaq.py"), *session.posargs)
+
+
 def unpacked_source(session: nox.Session, package: str) -> Path:
     """Return the folder of a package's source distribution; fetched once.  package: as in name==version."""
     folder = Path(session.create_tmp()).resolve()

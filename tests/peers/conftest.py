@@ -1,11 +1,12 @@
 """The ways by which other people's drivers reach a virtual instrument.
 
-PyMeasure has requirements of its own: these tests run in an environment of their own (`make peers`).  Where it is not
-installed nothing of this folder is collected.
+PyMeasure and PyMoDAQ have requirements of their own: these tests run in environments of their own (`make peers`,
+`nox --session pymodaq`).  A module whose program is not installed is not collected.
 """
 
 import contextlib
 from importlib.util import find_spec
+from pathlib import Path
 
 import pytest
 import pyvisa
@@ -15,8 +16,14 @@ from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.servers.server import BenchServer
 from levilab.world.bench import plug_in_serial
 
-if not find_spec("pymeasure"):
-    collect_ignore_glob = ["*"]
+#: The modules that need another program than PyMeasure.
+PROGRAMS = {"test_pymodaq.py": "pymodaq"}
+
+collect_ignore = [
+    module.name
+    for module in Path(__file__).parent.glob("test_*.py")
+    if not find_spec(PROGRAMS.get(module.name, "pymeasure"))
+]
 
 #: Where an instrument is plugged in unless a test says otherwise, and where one on a serial line is.
 ADDRESS, LINE = "TCPIP0::there.levilab::inst0::INSTR", "ASRLthere::INSTR"
