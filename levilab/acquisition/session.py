@@ -186,7 +186,9 @@ class Session(Generic[S]):
             wall = clock.wall_duration(left)
             clock.sleep(left * _NAP_S / wall if wall > _NAP_S else left)
 
-    def begin(self, start: Callable[[], None], *, resumed: str = "without driving again") -> None:
+    def begin(
+        self, start: Callable[[], None], *, resumed: str = "without driving again", reading_s: float = 0.0
+    ) -> None:
         """Bring the top to where reading begins: that moment is time zero.
 
         A resumed run is taken up where it was left, without starting again: a real top has gone on meanwhile; the one
@@ -195,6 +197,7 @@ class Session(Generic[S]):
         Args:
             start: brings the top there.
             resumed: how it goes on, for the event of a resumed run.
+            reading_s: how long a reading takes, if it is long; its time is the middle.
         """
         if self.earlier is None:
             start()
@@ -205,7 +208,7 @@ class Session(Generic[S]):
             with self._replay():
                 start()
             self.zero = self.bench.clock.now()
-            self.wait(self.rows[-1]["time_s"])
+            self.wait(self.rows[-1]["time_s"] + reading_s / 2)
         else:
             self.zero = self.bench.clock.now() - self.earlier.run.elapsed()
         self.began = self.now()

@@ -37,10 +37,13 @@ def message(text: str) -> None:
 
     A closed one, as with its terminal, ends nothing.
     """
-    from levilab.texts.text import in_language  # not for a help
+    line = text
+    with contextlib.suppress(OSError):  # no file can be opened any more, not even that of a module
+        from levilab.texts.text import in_language  # not for a help
 
+        line = printable(with_options(in_language(text)))
     try:
-        typer.echo(printable(with_options(in_language(text))), err=True)
+        typer.echo(line, err=True)
     except OSError:
         silence(sys.stderr)
 

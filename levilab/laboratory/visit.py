@@ -324,7 +324,7 @@ def visit(plan: Plan, status_of: Callable[[Exception], int | None]) -> Told:
             shutil.rmtree(_RUNS, ignore_errors=True)
             unbroken = Visit(replace(plan, events=()), status_of)
             unbroken.carry_out()
-            found += judge.same_rows(rows, unbroken.last_rows())
+            found += judge.same_rows(plan, rows, unbroken.last_rows())
         return Told(plan, tuple(found), tuple(laboratory.fate.trace), tuple(_story(laboratory)))
     finally:
         signal.signal(signal.SIGINT, before)

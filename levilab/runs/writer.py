@@ -193,13 +193,8 @@ class RunWriter:
     def update(self, **changes: Any) -> None:
         """Change entries of run.json.  Raises CannotWrite."""
         with _explain_errors("write run.json", self.folder):
-            self._rescue_if_lost()
             self.record = self.record.model_copy(update=changes)
-            try:
-                self._write_record()
-            except FileNotFoundError:  # the folder went at this moment
-                self._rescue_if_lost()
-                self._write_record()
+            self._write_in_place(self._write_record)
 
     def reading(self, row: Mapping[str, float | None]) -> None:
         """Append a row to readings.csv.  None becomes an empty cell.  Raises CannotWrite with the row in it.
@@ -314,10 +309,19 @@ class RunWriter:
             self.record = RunRecord.model_validate(self.record.model_dump() | ended)
 
     def finish(self, status: Status, **changes: Any) -> None:
-        """End the run: run.json gets its status, datapackage.json describes the files."""
+        """End the run: run.json gets its status, datapackage.json describes the files.
+
+        The status stands by then, and the run is whole without its description.  Raises CannotWrite for the status.
+        """
         self.update(status=status, ended_utc=utc_now(), **changes)
-        with _explain_errors("write datapackage.json", self.folder):
-            replace_atomically(self.folder / PACKAGE, _datapackage(self.folder, self.record))
+        try:
+            self._write_in_place(self._describe)
+        except OSError as error:
+            missing = "{file} is missing ({reason}): the run is whole without it; levilab export writes it into a .zip"
+            self.tell(Text(missing, file=PACKAGE, reason=error.strerror or str(error)))
+
+    def _describe(self) -> None:
+        replace_atomically(self.folder / PACKAGE, _datapackage(self.folder, self.record))
 
     def _append(self, name: str, line: str, *, sync: bool = True) -> None:
         """Append a line; with sync it is on the disk and kept in memory, too."""
@@ -342,6 +346,15 @@ class RunWriter:
         self._files[name] = _GrowingFile(path)
 
     # --- a folder that is removed under way ---
+
+    def _write_in_place(self, write: Callable[[], None]) -> None:
+        """Write something into the folder; once more where the folder went at this moment.  Raises OSError."""
+        self._rescue_if_lost()
+        try:
+            write()
+        except FileNotFoundError:
+            self._rescue_if_lost()
+            write()
 
     def _rescue_if_lost(self) -> None:
         """Write the run again if its files are no longer in their place.  Raises OSError."""

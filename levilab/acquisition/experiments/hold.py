@@ -80,7 +80,7 @@ def run(session: Session[HoldSettings]) -> None:
             else:
                 return
 
-    session.begin(drive, resumed="the drive was brought back to the spin")
+    session.begin(drive, resumed="the drive was brought back to the spin", reading_s=session.settings.interval_s)
     if not motors:  # a real top that has gone on without a drive
         drive()
     while session.now() < session.settings.longest_s:

@@ -62,6 +62,9 @@ FAILED_ONCE = {
     "no generator after a kill, and the drive on": left_on_before(*(Event("link", 1, 1, 0.05) for _ in range(3))),
     "Ctrl-C after a kill, and the drive on": left_on_before(Event("ctrl-c", 1, 1)),
     "a probe was zeroed outside of its chamber": a_scan(Event("mistypes", 0, 1)),
+    "a finished run could not be described": draw(400442),
+    "the folder went when the run was finished": draw(400597),
+    "a held spin was resumed half a reading early": draw(400407),
 }
 
 

@@ -169,6 +169,25 @@ def test_a_resumed_run_is_rescued_with_its_earlier_readings(tmp_path):
 
 
 @posix_only
+def test_a_folder_that_goes_when_the_run_is_finished_is_written_again(tmp_path, monkeypatch):
+    with create(tmp_path, []) as writer:
+        writer.reading(row(0))
+        write = RunWriter._write_record
+
+        def remove_after(one):
+            write(one)
+            if one.record.status == "finished" and one.folder.name == writer.folder.name:
+                monkeypatch.undo()
+                shutil.rmtree(one.folder)
+
+        monkeypatch.setattr(RunWriter, "_write_record", remove_after)
+        writer.finish("finished")
+    assert writer.folder.name.endswith("-rescued")
+    assert times(writer.folder) == [0]
+    assert Run.load(writer.folder).status == "finished"
+    assert (writer.folder / "datapackage.json").exists()
+
+
 @posix_only
 def test_readings_that_cannot_be_written_again_are_not_said_to_be_kept(tmp_path, monkeypatch):
     with create(tmp_path, []) as writer:

@@ -79,6 +79,18 @@ def test_the_datapackage_holds_units_and_hashes(tmp_path):
     assert [field["unit"] for field in readings["schema"]["fields"]] == ["s", "Hz", "Hz"]
 
 
+def test_a_run_that_cannot_be_described_is_finished_all_the_same(tmp_path, monkeypatch):
+    messages = []
+    monkeypatch.setattr("levilab.runs.writer.package", lambda *_, **__: fail_to_read())
+    with RunWriter.create(tmp_path, record(), tell=messages.append) as writer:
+        writer.reading(row(0))
+        writer.finish("finished")
+    assert Run.load(writer.folder).status == "finished"
+    assert not (writer.folder / "datapackage.json").exists()
+    (message,) = messages
+    assert message.startswith("datapackage.json is missing (Input/output error): the run is whole without it")
+
+
 def test_a_torn_last_line_is_left_out_with_a_warning(tmp_path):
     folder = written(tmp_path)
     whole = (folder / "readings.csv").read_bytes()
