@@ -9,6 +9,7 @@
   the mean pull of these not 0, the analysis would be wrong, and not only its priors;
 - readings of a top that only spins, 500 of each kind: u stated or not, neighbours correlated by 0, 0.3 and 0.7; and
   uncorrelated ones with a tilt allowed for;
+- the counts in full motion, and uncorrelated readings of a top that only spins, as ``--correlation none`` does;
 - readings that no law describes, 100 of each kind.
 
 It prints and keeps ``benchmarks/results/spindown_motion.json``: pulls (estimate − truth)/u, and what was said wrongly.
@@ -118,12 +119,17 @@ def summary(rows: list[list[float]], *quantities: str) -> dict[str, Any]:
     } | {name: share.mean(axis=0).round(4).tolist() for name, share in shares.items()}
 
 
-def motion(counts: list[tuple[dict[str, Any], np.ndarray, np.ndarray]], noise_hz: float, seed: int) -> dict[str, Any]:
-    """Return pulls of C, n and δ in full motion; of the mixed law neither C nor n is compared."""
+def motion(
+    counts: list[tuple[dict[str, Any], np.ndarray, np.ndarray]], noise_hz: float, seed: int, *, correlated: bool = True
+) -> dict[str, Any]:
+    """Return pulls of C, n and δ in full motion, and what u(C) is made of; of the mixed law neither C nor n counts.
+
+    correlated: whether the fit allows for noise whose neighbours are correlated.
+    """
     rng = np.random.default_rng(seed)
-    pulls, u, excluded, described = [], [], 0, 0
+    pulls, u, shares, excluded, described = [], [], [], 0, 0
     for keys, times, counted in counts:
-        run = fit_spin_down(times, counted + rng.normal(0, noise_hz, counted.size))
+        run = fit_spin_down(times, counted + rng.normal(0, noise_hz, counted.size), correlated=correlated)
         law = keys["drag.law"]
         names, exponent = LAWS[law].names, LAWS[law].exponent or float("nan")
         delta = float(np.arctan(keys["top.moment_tilt"][0] / keys["top.moment_tilt"][1]))
@@ -132,11 +138,16 @@ def motion(counts: list[tuple[dict[str, Any], np.ndarray, np.ndarray]], noise_hz
             pull(run, law, names[0], c), pull(run, "power", "exponent", exponent), pull(run, law, "moment_tilt", delta)
         ])  # fmt: skip
         u.append([(run.fit(law).parameters[names[0]].u or c) / c, run.fit("power").parameters["exponent"].u])
+        parts = run.fit(law).parts[names[0]]
+        shares.append(np.square([parts.scatter, parts.correlation, parts.tilt]))
         excluded, described = excluded + (law in run.verdict.excluded), described + run.verdict.describes
     return {
         "noise_hz": noise_hz, "tops": len(counts), "true_law_excluded": excluded / len(counts),
         "described": described,
         "median_u_relative_c_n": np.nanmedian(u, axis=0).round(4).tolist(),
+        "of_u_squared_scatter_correlation_tilt": [
+            round(float(np.median(part)), 2) for part in (np.array(shares) / np.sum(shares, axis=1)[:, None]).T
+        ],
     } | summary(pulls, "C", "n", "δ")  # fmt: skip
 
 
@@ -147,12 +158,15 @@ PRACTICE = {
 }  # fmt: skip
 
 
-def driven(scenes: dict[int, Scene], settings: dict[str, Any]) -> dict[str, Any]:
-    """Return pulls of C and n of tops that a drive has raised, by seed, as `levilab acquire spin` does it."""
+def driven(scenes: dict[int, Scene], settings: dict[str, Any], last: int | None = None) -> dict[str, Any]:
+    """Return pulls of C and n of tops that a drive has raised, by seed, as `levilab acquire spin` does it.
+
+    last: end of the readings that are analyzed; None: all are.
+    """
     pulls, explained = [], []
     for seed, scene in scenes.items():
         time, counted, release = _acquire(scene, seed, settings)
-        found = fit_spin_down(time, counted, settings["reading_u_hz"], release=release)
+        found = fit_spin_down(time[:last], counted[:last], settings["reading_u_hz"], release=release)
         pulls.append([
             pull(found, "disc", "c32", scene.drag.constants[0]), pull(found, "power", "exponent", 1.5)
         ])  # fmt: skip
@@ -239,18 +253,27 @@ def over_the_priors(u: float | None, seed: int, runs: int) -> dict[str, Any]:
 
 
 def only_spins(
-    rho: float, u: float | None, seed: int, runs: int, *, tilt: bool = False, time: np.ndarray = T
+    rho: float,
+    u: float | None,
+    seed: int,
+    runs: int,
+    *,
+    tilt: bool = False,
+    time: np.ndarray = T,
+    correlated: bool = True,
 ) -> dict[str, Any]:
     """Return pulls of the first spin, C and n of a disc, with noise whose neighbours are correlated.
 
-    tilt: whether the fit allows for a tilt, which is not there.
+    tilt: whether the fit allows for a tilt, which is not there; correlated: whether it allows for such noise.
     """
     rng = np.random.default_rng(seed)
     root = np.linalg.cholesky(rho ** np.abs(np.subtract.outer(np.arange(time.size), np.arange(time.size))))
     truth = spin("disc", time, 40.0, 2.34e-4)
     rows, excluded, described, chances = [], 0, 0, []
     for _ in range(runs):
-        run = fit_spin_down(time, truth + NOISE_HZ * root @ rng.normal(size=time.size), u, tilt=tilt)
+        run = fit_spin_down(
+            time, truth + NOISE_HZ * root @ rng.normal(size=time.size), u, tilt=tilt, correlated=correlated
+        )
         wanted = (("disc", "start_frequency", 40.0), ("disc", "c32", 2.34e-4), ("power", "exponent", 1.5))
         rows.append([pull(run, *each) for each in wanted])
         excluded, described = excluded + ("disc" in run.verdict.excluded), described + run.verdict.describes
@@ -325,6 +348,12 @@ if __name__ == "__main__":
     counts = [(keys, *count_until_it_falls(keys, asked.seed * 1000 + k)) for k, keys in enumerate(drawn)]
     found: dict[str, Any] = {"seed": asked.seed}
     found["full_motion"] = [motion(counts, noise, asked.seed) for noise in (0.0, 0.01, 0.03)]
+    found["full_motion_known_white"] = [
+        motion(counts, noise, asked.seed, correlated=False) for noise in (0.0, 0.01, 0.03)
+    ]
+    found["only_spins_known_white"] = [
+        only_spins(0.0, u, asked.seed, asked.runs, correlated=False) for u in (None, NOISE_HZ)
+    ]
     found["only_spins"] = [
         only_spins(rho, u, asked.seed, asked.runs) for rho in (0.0, 0.3, 0.7) for u in (None, NOISE_HZ)
     ]
@@ -337,11 +366,15 @@ if __name__ == "__main__":
     usual = preset("practice")
     practice = {seed: usual.changed(keys_of_seed(usual, seed)) for seed in (*range(100, 124), *range(200, 224))}
     found["driven_to_33_hz"] = driven(practice, PRACTICE)
+    found["driven_to_33_hz_without_the_last_reading"] = driven(practice, PRACTICE, -1)
     found["driven_to_40_hz"] = driven({k: draw_scene(k) for k in range(30_000, 30_060)}, {"reading_u_hz": None})
     found["excluded_at_rho_0.7"] = {
         name: excluded_at(0.7, asked.seed, 4 * asked.runs, known=known)
         for name, known in (("known", True), ("not known", False))
     }
+    found["excluded_over_the_prior_of_rho"] = float(
+        np.mean([excluded_at(rho, asked.seed + k, asked.runs // 2, known=False) for k, rho in enumerate(RHO)])
+    )
     found["no_law"] = [no_law(u, asked.seed, asked.odd) for u in (None, NOISE_HZ)]
     print(json.dumps(found, indent=1))
     RESULTS.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")

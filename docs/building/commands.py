@@ -173,14 +173,18 @@ SPIN_DOWNS = CHECKS.with_name("spindown_motion.json")
 def spin_downs() -> str:
     """Return the pulls of the kept study of spin-downs, in Markdown."""
     kept = json.loads(SPIN_DOWNS.read_text(encoding="utf-8"))
-    rows = [(f"full motion, {1e3 * row['noise_hz']:.0f} mHz added", row) for row in kept["full_motion"]]
+    ways = (("full_motion", ""), ("full_motion_known_white", ", `--correlation none`"))
+    rows = [(f"full motion, {1e3 * row['noise_hz']:.0f} mHz added{how}", row) for key, how in ways for row in kept[key]]
     rows += [(f"driven from 30 to {to} Hz", kept[f"driven_to_{to}_hz"]) for to in (33, 40)]
+    rows += [("driven from 30 to 33 Hz, without the last reading", kept["driven_to_33_hz_without_the_last_reading"])]
     rows += [(f"drawn from the priors{_stated(row)}", row) for row in kept["over_the_priors"]]
     rows += [
         (f"no tilt, {row['readings']} readings down to {row['last_hz']:.1f} Hz{_stated(row)}", row)
         for row in kept["tilt_allowed_for"]
     ]
     rows += [(f"tilt known to be none, ρ = {row['rho']:g}{_stated(row)}", row) for row in kept["only_spins"]]
+    white = kept["only_spins_known_white"]
+    rows += [(f"tilt known to be none, `--correlation none`{_stated(row)}", row) for row in white]
     heads = ["tops", "runs", "mean pull of C, n", "of it by the priors", "s.d.", *(head for head, *_ in _SHARES)]
     return f"| {' | '.join(heads)} |\n{'|---' * len(heads)}|\n" + "".join(
         f"| {' | '.join([name, str(row.get('runs') or row['tops']), *_of_c_and_n(row)])} |\n" for name, row in rows
