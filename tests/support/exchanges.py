@@ -35,6 +35,16 @@ def exchanges(rows):
     return pytest.mark.parametrize(("make", "steps"), found)
 
 
+def took(low, high):
+    """The bench's time is between these [s]."""
+    return lambda device: low <= device.clock.now() <= high
+
+
+def about(value, tolerance):
+    """A number, or numbers, within a tolerance."""
+    return pytest.approx(value, abs=tolerance)
+
+
 def carry_out(make, steps):
     """Go through an exchange with a new instrument."""
     device = make(VirtualClock())

@@ -15,7 +15,7 @@ from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from support import hostile
 from support.conversation import CLEAR
-from support.exchanges import carry_out, exchanges
+from support.exchanges import carry_out, exchanges, took
 from support.light import DUTY, pulses
 from support.wire import ask, cable, numbers, received, send
 
@@ -137,11 +137,6 @@ def configured(device, *messages):
     for message in messages:
         send(device, message.encode() + b"\n")
     return device
-
-
-def took(low, high):
-    """The bench's time is between these [s]."""
-    return lambda device: low <= device.clock.now() <= high
 
 
 def gives(count, question):

@@ -18,7 +18,7 @@ from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
 from support.conversation import CLEAR
-from support.exchanges import carry_out, exchanges
+from support.exchanges import carry_out, exchanges, took
 from support.light import pulses
 from support.wire import ask, errors, numbers, received, send
 
@@ -57,11 +57,6 @@ def of(*messages, signal=LIGHT, native=False):
 def gives(least, question, most=None):
     """A question is answered with this number of numbers."""
     return lambda device: least <= len(numbers(ask(device, question))) <= (most or least)
-
-
-def took(low, high):
-    """The bench's time is between these [s]."""
-    return lambda device: low <= device.clock.now() <= high
 
 
 READY, CLOSE = (of(FIXED_LEVEL, "ACQ:APER 0.1"),), pytest.approx(40.0, rel=1e-4)

@@ -10,7 +10,7 @@ import pytest
 
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from instruments.virtual.magnetometer.lakeshore_475 import Virtual475
-from support.exchanges import carry_out, exchanges
+from support.exchanges import about, carry_out, exchanges
 
 
 def meter(kind, field=0.0123, **options):
@@ -44,10 +44,6 @@ def is_unchanged(device):
 
 def near(value, rel):
     return pytest.approx(value, rel=rel)
-
-
-def about(value, tolerance):
-    return pytest.approx(value, abs=tolerance)
 
 
 NOT_UNDERSTOOD = ("FOO?", "RDGFIELD", "SYST:ERR?", "UNIT", "UNIT 5;UNIT?", "UNIT x;UNIT?", "?")

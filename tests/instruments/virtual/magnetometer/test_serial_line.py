@@ -22,27 +22,6 @@ def test_a_program_with_the_right_settings_is_understood():
     assert line.query_ascii_values("RDGFIELD?") == [pytest.approx(123.0, rel=1e-3)]
 
 
-def test_stop_bits_do_not_matter_to_who_listens():
-    assert resource(meter(), stop_bits=StopBits.two).query("UNIT?") == "1"
-
-
-@pytest.mark.parametrize(
-    "wrong",
-    [
-        {"baud_rate": 9600},
-        {"baud_rate": 115200},
-        {"parity": Parity.even},
-        {"parity": Parity.none, "data_bits": 8},
-        {"parity": Parity.none},
-        {"data_bits": 8},
-    ],
-)
-def test_a_program_with_wrong_settings_hears_nothing_that_it_could_take_for_an_answer(wrong):
-    line = resource(meter(), **wrong)
-    with pytest.raises((pyvisa.VisaIOError, UnicodeDecodeError)):
-        line.query("*IDN?")
-
-
 def test_settings_may_be_put_right_while_the_port_is_open():
     line = resource(meter(), parity=Parity.none, data_bits=8)
     with pytest.raises(pyvisa.VisaIOError) as silence:
@@ -70,10 +49,3 @@ def test_bytes_take_their_time_on_the_line():
     line.query("UNIT?")
     # six characters there, three back, ten bits each
     assert device.clock.now() == pytest.approx(9 * 10 / 9600, abs=1e-9)
-
-
-def test_pymeasures_way_to_open_the_port_and_to_read_it():
-    # what LakeShore425 of PyMeasure 0.16 asks of the library
-    line = resource(meter(), parity=1, timeout=500)
-    line.read_termination = "\n"
-    assert float(line.query("RDGFIELD?")) == pytest.approx(123.0, rel=1e-3)

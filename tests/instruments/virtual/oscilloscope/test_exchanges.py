@@ -7,10 +7,8 @@ real DSOX1102G; rigol-ds1000z 0.2.1 for the time base.
 import math
 import struct
 
-import pytest
-
 from support.conversation import CLEAR
-from support.exchanges import carry_out, exchanges
+from support.exchanges import about, carry_out, exchanges
 from support.scopes import (
     KEYSIGHT_READY,
     RIGOL_READY,
@@ -48,10 +46,6 @@ def HEADS(data):
 def has_points(count):
     """The record that is read has this number of bytes."""
     return lambda device: len(block(device, ":WAV:DATA?")[1]) == count
-
-
-def about(value, tolerance):
-    return pytest.approx(value, abs=tolerance)
 
 
 RIGOL, KEYSIGHT = of(rigol, pulses), of(keysight, pulses)
