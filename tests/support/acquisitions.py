@@ -18,6 +18,7 @@ from levilab.world.spin_world import SpinScene, SpinWorld
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from levilab.runs.run import Run
     from levilab.world.spin_world import World
 
 #: Counts before the drive is off: the spin at first, 27 while the drive takes hold, every 10 s of 25 on the way up, and
@@ -73,6 +74,16 @@ def mock(out: Path, seed: int | None = 1, **changes: Any) -> AcquisitionRequest:
     of_a_new_run = LET_GO_AT_ONCE if "scene" in changes else RAISED_QUICKLY
     settings = () if "resume" in changes else of_a_new_run
     return request_for("spin", AcquisitionOptions(mock=True, out=out, seed=seed, settings=settings, **changes))
+
+
+def kinds(run: Run) -> list[str]:
+    """The kinds of all events of a run."""
+    return [event["kind"] for event in run.events()]
+
+
+def texts(run: Run, *kinds: str) -> list[str]:
+    """The texts of the events of these kinds."""
+    return [event["text"] for event in run.events() if event["kind"] in kinds]
 
 
 def in_world(request: AcquisitionRequest, world: World) -> AcquisitionRequest:

@@ -28,7 +28,7 @@ from levilab.interruption import Interrupted, Stop
 from levilab.runs.channel import Channel
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import Phase, SpinScene, SpinWorld
-from support.acquisitions import Silent
+from support.acquisitions import Silent, texts
 
 CHANNELS = (Channel("time_s", "s", "bench clock"), Channel("drive_frequency_hz", "Hz", "generator"))
 #: Up to 30 Hz, where the top of a SpinScene begins, and on in quick steps; a top that has lost its lock is soon down.
@@ -62,10 +62,6 @@ def measured(run):
     return run.readings().column("drive_frequency_hz").tolist()
 
 
-def events(run, kind):
-    return [event["text"] for event in run.events() if event["kind"] == kind]
-
-
 @pytest.mark.parametrize(("speed", "says"), [(1.0, ", 40.00 Hz in 3:20 min"), (math.inf, "")])
 def test_a_ramp_that_a_person_waits_for_says_when_it_ends(speed, says):
     session = SimpleNamespace(bench=SimpleNamespace(clock=SimpleNamespace(speed=speed)))
@@ -82,13 +78,13 @@ def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(tmp_path, monkeypa
 
     run = swept(tmp_path, monkeypatch, [31.0, 32.0, 33.0], lose)
     assert (run.status, measured(run)) == ("finished", [31.0, 33.0])
-    assert "try 2 of 2" in events(run, "lock lost")[1]
-    (left_out,) = events(run, "left out")
+    assert "try 2 of 2" in texts(run, "lock lost")[1]
+    (left_out,) = texts(run, "left out")
     assert left_out == "the point of 32 Hz is left out: a spin of 31.20 Hz under a drive of 32.00 Hz"
     locked = [event["frequency_hz"] for event in run.events() if event["kind"] == "locked"]
     assert locked == pytest.approx([30.0, 31.0, 31.0], abs=0.2)  # 0.06 Hz of noise
     at = "the top follows the drive at "  # where the drive is, and what was counted
-    assert [text.split(":")[0] for text in events(run, "locked")] == [f"{at}{hz}.00 Hz" for hz in (30, 31, 31)]
+    assert [text.split(":")[0] for text in texts(run, "locked")] == [f"{at}{hz}.00 Hz" for hz in (30, 31, 31)]
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 
@@ -103,9 +99,9 @@ def test_a_top_that_falls_is_asked_for_and_the_sweep_goes_on(tmp_path, monkeypat
             session.wait(120.0)  # from 31.5 to below 24 Hz takes 90 s
 
     run = swept(tmp_path, monkeypatch, [31.0, 31.5, 32.0], weaken)
-    assert (run.status, measured(run), events(run, "left out")) == ("finished", [31.0, 31.5, 32.0], [])
-    assert len(events(run, "asked the person")) == 1
-    assert "no top seen under a drive of 31.50 Hz; try 1 of 2" in events(run, "lock lost")[0]
+    assert (run.status, measured(run), texts(run, "left out")) == ("finished", [31.0, 31.5, 32.0], [])
+    assert len(texts(run, "asked the person")) == 1
+    assert "no top seen under a drive of 31.50 Hz; try 1 of 2" in texts(run, "lock lost")[0]
 
 
 def test_a_top_that_no_drive_takes_up_again_ends_the_sweep_with_what_was_measured(tmp_path, monkeypatch):
@@ -124,7 +120,7 @@ def test_a_top_that_no_drive_takes_up_again_ends_the_sweep_with_what_was_measure
     left_out = [event for event in run.events() if event["kind"] == "left out"]
     assert [event["drive_frequency_hz"] for event in left_out] == [31.5, 32.0, 32.5]
     assert all("did not follow the drive to 31 Hz" in event["text"] for event in left_out)
-    assert events(run, "ended")[0].endswith("the sweep ends here; not tried: 33 Hz")
+    assert texts(run, "ended")[0].endswith("the sweep ends here; not tried: 33 Hz")
 
 
 def test_a_generator_that_fails_on_the_way_costs_no_point(tmp_path, monkeypatch):
@@ -136,9 +132,9 @@ def test_a_generator_that_fails_on_the_way_costs_no_point(tmp_path, monkeypatch)
             raise NoAnswer(session.bench.address("generator"), "OUTP1?", 1.0)
 
     run = swept(tmp_path, monkeypatch, [31.0, 31.5], fail)
-    assert (measured(run), events(run, "left out")) == ([31.0, 31.5], [])
-    assert len(events(run, "found again")) == 1
-    assert events(run, "lock lost") == []
+    assert (measured(run), texts(run, "left out")) == ([31.0, 31.5], [])
+    assert len(texts(run, "found again")) == 1
+    assert texts(run, "lock lost") == []
 
 
 @pytest.mark.parametrize(

@@ -143,11 +143,6 @@ def test_the_same_seed_gives_the_same_readings_and_another_one_others(usual, tmp
     assert first == again != other
 
 
-def test_what_was_shown_is_what_stands_in_the_folder(whole):
-    frame = whole.run.readings().frame
-    assert [float(text.split()[0]) for text in whole.show.readings] == [round(t, 2) for t in frame["time_s"]]
-
-
 def test_the_wire_log_holds_every_byte(usual):
     log = (usual.folder / "wire.log").read_text(encoding="utf-8")
     assert log.count("> b'READ?\\n'") == len(usual.readings().frame) + BEFORE + 2  # and two at the fall

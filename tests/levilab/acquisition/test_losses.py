@@ -14,7 +14,7 @@ from levilab.acquisition.session import MOST_LOSSES
 from levilab.acquisition.table import settings_of, with_settings
 from levilab.world import bench as benches
 from levilab.world.bench import VIRTUAL, virtual_bus
-from support.acquisitions import BEFORE, Silent, mock
+from support.acquisitions import BEFORE, Silent, kinds, mock
 
 
 def acquired(folder, monkeypatch, *faults):
@@ -30,10 +30,6 @@ def acquired(folder, monkeypatch, *faults):
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
     return acquire(mock(tmp_path_factory.mktemp("whole")), Silent())
-
-
-def kinds(run):
-    return [event["kind"] for event in run.events()]
 
 
 #: What a fault of the counter's eighth reading costs: nothing, or that reading.

@@ -9,11 +9,7 @@ from instruments.virtual.bench.faults import Fault
 from levilab.acquisition.loop import acquire
 from levilab.world import bench as benches
 from levilab.world.bench import virtual_bus
-from support.acquisitions import Silent, mock
-
-
-def events(run, kind):
-    return [event["text"] for event in run.events() if event["kind"] == kind]
+from support.acquisitions import Silent, mock, texts
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +23,7 @@ def test_a_spin_down_has_a_u_of_each_reading_and_ends_with_the_fall(spin_down):
     u = readings.column("spin_frequency_u_hz")
     assert np.median(u) == pytest.approx(0.015, rel=0.5)  # the bound of 3 s at 20 cm, docs/phone.md
     assert (np.diff(readings.column("spin_frequency_hz")) < 0).all()
-    assert "no line of a turning moment in the magnetic field any more: the top fell" in events(spin_down, "fell")[0]
+    assert "no line of a turning moment in the magnetic field any more: the top fell" in texts(spin_down, "fell")[0]
     assert readings.column("time_s")[0] > 0  # no sample from under the drive
 
 
@@ -60,5 +56,5 @@ def test_a_wifi_that_is_away_costs_a_reading_and_not_the_run(tmp_path, monkeypat
     monkeypatch.setattr(benches, "virtual_bus", with_faults)
     run = acquire(mock(tmp_path, counter="phyphox"), Silent())
     assert run.status == "finished"
-    assert len(events(run, "instrument lost")) == len(events(run, "found again")) == 1
-    assert "no answer" in events(run, "instrument lost")[0] or "nothing answers" in events(run, "instrument lost")[0]
+    assert len(texts(run, "instrument lost")) == len(texts(run, "found again")) == 1
+    assert "no answer" in texts(run, "instrument lost")[0] or "nothing answers" in texts(run, "instrument lost")[0]

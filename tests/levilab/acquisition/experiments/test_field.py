@@ -24,10 +24,13 @@ SHORT = FieldSettings(lowest_m=0.04, highest_m=0.08, step_m=0.01, readings=3, se
 BASE = Base(thickness_m=0.015, origin_m=0.0008, background_t=3e-5)
 
 
-def request_of(out, settings=SHORT, base=BASE, **changes):
-    """A scan of this base, its probe put in place exactly."""
-    world = SpinWorld(SpinScene(base=base), VirtualClock())
-    wiring = dataclasses.replace(virtual_wiring(world), **changes)
+def world_of(base=BASE):
+    return SpinWorld(SpinScene(base=base), VirtualClock())
+
+
+def request_of(out, settings=SHORT, wiring=None, **changes):
+    """A scan of a base, its probe put in place exactly."""
+    wiring = dataclasses.replace(wiring or virtual_wiring(world_of()), **changes)
     config = with_settings(Configuration(), "field", settings)
     return AcquisitionRequest("field", config, lambda: wiring, out=out, synthetic_how="a test")
 
@@ -50,18 +53,14 @@ def test_the_readings_are_the_base_field_within_their_uncertainty(tmp_path):
 def test_the_probe_is_zeroed_in_its_chamber_first(tmp_path):
     """The virtual gaussmeter shows 80 µT and more without it; the background is the base's surroundings', and stays."""
     asked = []
-    world = SpinWorld(SpinScene(base=Base(strength_t_m=1e-9, background_t=4e-5)), VirtualClock())
-    wiring = virtual_wiring(world)
+    wiring = virtual_wiring(world_of(Base(strength_t_m=1e-9, background_t=4e-5)))
 
     def person(task):
         asked.append(task)
         return wiring.person(task)
 
-    config = with_settings(Configuration(), "field", SHORT)
-    request = AcquisitionRequest(
-        "field", config, lambda: dataclasses.replace(wiring, person=person), out=tmp_path, synthetic_how="a test"
-    )
-    field = acquire(request, Silent()).readings().column("flux_density_t")
+    run = acquire(request_of(tmp_path, wiring=wiring, person=person), Silent())
+    field = run.readings().column("flux_density_t")
     assert [type(task) for task in asked] == [ShieldProbe] + [PlaceProbe] * 6
     assert field == pytest.approx(4e-5 * np.ones(5), abs=3e-6)
 
@@ -69,7 +68,7 @@ def test_the_probe_is_zeroed_in_its_chamber_first(tmp_path):
 @pytest.mark.parametrize(("lost", "warned"), [(0.0, False), (0.001, False), (0.02, True)])
 def test_a_drift_shows_at_the_height_that_is_read_again(tmp_path, lost, warned):
     """A ferrite loses 0.1 % in half a kelvin, which setting the height may hide, and 2 % in ten."""
-    world = SpinWorld(SpinScene(base=BASE), VirtualClock())
+    world = world_of()
     wiring = virtual_wiring(world)
     weaker = dataclasses.replace(BASE, strength_t_m=BASE.strength_t_m * (1 - lost))
 
@@ -79,11 +78,7 @@ def test_a_drift_shows_at_the_height_that_is_read_again(tmp_path, lost, warned):
             world.scene = dataclasses.replace(world.scene, base=weaker)
         return wiring.person(task)
 
-    config = with_settings(Configuration(), "field", SHORT)
-    request = AcquisitionRequest(
-        "field", config, lambda: dataclasses.replace(wiring, person=person), out=tmp_path, synthetic_how="a test"
-    )
-    run = acquire(request, Silent())
+    run = acquire(request_of(tmp_path, wiring=wiring, person=person), Silent())
     assert len(run.readings().frame) == 5
     (event,) = (one for one in run.events() if one["kind"] == "height read again")
     true = weaker.flux_density(0.05) - BASE.flux_density(0.05)
@@ -156,7 +151,7 @@ def test_an_interrupted_scan_goes_on_at_the_next_height(tmp_path):
 
 def test_a_magnetometer_that_is_reset_on_the_way_is_set_up_anew(tmp_path):
     """After the second height another program resets it: the third is read once more, in the range of the others."""
-    world = SpinWorld(SpinScene(base=BASE), VirtualClock())
+    world = world_of()
     bus = virtual_bus(world)
     meter = bus.instruments["ASRLmagnetometer.levilab::INSTR"]
 
@@ -168,9 +163,7 @@ def test_a_magnetometer_that_is_reset_on_the_way_is_set_up_anew(tmp_path):
 
     from instruments.virtual.bench.visa_library import library_for
 
-    wiring = dataclasses.replace(virtual_wiring(world), library=library_for(bus))
-    config = with_settings(Configuration(), "field", SHORT)
-    run = acquire(AcquisitionRequest("field", config, lambda: wiring, out=tmp_path, synthetic_how="a test"), Resets())
+    run = acquire(request_of(tmp_path, wiring=virtual_wiring(world), library=library_for(bus)), Resets())
     assert run.status == "finished"
     assert run.count() == 5
     assert [event["kind"] for event in run.events()].count("found again") == 1

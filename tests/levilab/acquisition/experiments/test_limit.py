@@ -27,7 +27,7 @@ from levilab.simulator.scene import preset
 from levilab.world.bursts import mean_pull
 from levilab.world.motion_world import MotionWorld
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
-from support.acquisitions import Impatient, Silent, in_world
+from support.acquisitions import Impatient, Silent, in_world, kinds
 
 #: From 30 Hz down to where a top falls within a minute, not held for long.
 QUICK = ("limit.drive_frequency_hz=24", "limit.ramp_hz_per_s=0.3", "limit.hold_s=1")
@@ -38,10 +38,6 @@ WEAK = ("limit.which=upper", "limit.drive_amplitude_vpp=5", "limit.hold_s=1", "l
 def mock(out, *settings, seed=1, **changes):
     options = AcquisitionOptions(mock=True, out=out, seed=seed, settings=settings, **changes)
     return request_for("limit", options)
-
-
-def kinds(run):
-    return [event["kind"] for event in run.events()]
 
 
 def causes(run):

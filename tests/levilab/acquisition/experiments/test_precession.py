@@ -22,7 +22,7 @@ from levilab.pipelines.precession.document import PRECESSION
 from levilab.runs.run import Run
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
-from support.acquisitions import Impatient, Silent
+from support.acquisitions import Impatient, Silent, texts
 from support.commands import command
 
 QUICK = {"hold_s": 1.0, "counts": 3, "gate_s": 0.5, "interval_s": 1.0, "ramp_hz_per_s": 0.2}
@@ -42,10 +42,6 @@ def request(out, world, **settings):
     return AcquisitionRequest(
         "precession", config, lambda: virtual_wiring(world, config.limits), out=out, synthetic_how="a test"
     )
-
-
-def events(run, *kinds):
-    return [event["text"] for event in run.events() if event["kind"] in kinds]
 
 
 def kept(out):
@@ -83,7 +79,7 @@ def test_a_sweep_in_full_motion_finds_a_locked_top(tmp_path):
     # of this run's gates; their u is the line's, the first estimate of the value stands in the readings
     np.testing.assert_allclose(found.fit.column("precession"), readings.column("precession_frequency_hz"), rtol=1e-9)
     assert not np.allclose(found.fit.column("u"), readings.column("precession_frequency_u_hz"))
-    assert events(run, "calmed") == []  # a drive that yielded when it took hold leaves no swing to be calmed
+    assert texts(run, "calmed") == []  # a drive that yielded when it took hold leaves no swing to be calmed
     assert all(one.coherence.locked for one in found.coherences)
 
 
@@ -123,7 +119,7 @@ def test_a_top_that_swings_is_calmed_at_each_point(tmp_path, monkeypatch):
     swing = Swing(frequency=0.25, size=0.3, crest=3.0)
     monkeypatch.setattr("levilab.acquisition.experiments.precession.swing_of", lambda _: swing)
     run = acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock())), Silent())
-    assert events(run, "calmed") == 3 * ["the top swung 0.30 turns about the drive: the drive was moved by this angle"]
+    assert texts(run, "calmed") == 3 * ["the top swung 0.30 turns about the drive: the drive was moved by this angle"]
     np.testing.assert_allclose(run.readings().column("spin_frequency_hz"), [30.5, 31.0, 32.0], atol=0.2)
 
 
@@ -150,13 +146,13 @@ def test_a_counter_that_fails_between_laser_and_tape_is_reached_again(tmp_path, 
     monkeypatch.setattr("levilab.acquisition.counting.prepare_counter", prepare)
     run = acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock())), Silent())
     assert run.count() == 3
-    assert len(events(run, "found again")) == 1
+    assert len(texts(run, "found again")) == 1
 
 
 def test_a_sweep_whose_time_is_over_says_so_once(tmp_path):
     run = acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock()), longest_s=20.0), Silent())
     assert 0 < run.count() < 3
-    assert len(events(run, "longest")) == 1
+    assert len(texts(run, "longest")) == 1
 
 
 def test_where_the_lock_is_lost_the_top_is_driven_up_anew(tmp_path):
@@ -165,9 +161,9 @@ def test_where_the_lock_is_lost_the_top_is_driven_up_anew(tmp_path):
     run = acquire(request(tmp_path, world, frequencies_hz=(30.1, 38.0, 46.0, 54.0, 62.0), ramp_hz_per_s=4.0), Silent())
     assert run.status == "finished"
     assert run.count() == 1
-    assert len(events(run, "lock lost")) == 6
-    assert [text.split()[3] for text in events(run, "left out")] == ["38", "46", "54"]
-    assert "the sweep ends here" in events(run, "ended")[0]
+    assert len(texts(run, "lock lost")) == 6
+    assert [text.split()[3] for text in texts(run, "left out")] == ["38", "46", "54"]
+    assert "the sweep ends here" in texts(run, "ended")[0]
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 
@@ -192,7 +188,7 @@ def test_a_counter_with_one_input_has_its_cable_changed_at_each_point(tmp_path):
     run = acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock()), laser_input=1), Silent())
     assert run.count() == 3
     there, back = "in place of the tape's", "the tape's phototransistor"
-    tasks = events(run, "asked the person")
+    tasks = texts(run, "asked the person")
     assert [next(words for words in (there, back) if words in text) for text in tasks] == 3 * [there, back]
 
 
@@ -210,7 +206,7 @@ def test_a_sweep_that_holds_the_top_nowhere_has_failed(tmp_path):
         acquire(request(tmp_path, Wobbling(SpinScene(), VirtualClock()), frequencies_hz=below), Silent())
     run = kept(tmp_path)
     assert run.status == "failed"
-    assert len(events(run, "left out")) == 3
+    assert len(texts(run, "left out")) == 3
 
 
 class MissedAt31(Wobbling):
@@ -227,11 +223,11 @@ def test_a_point_at_which_the_beam_is_hardly_cut_is_left_out(tmp_path):
     run = acquire(request(tmp_path, MissedAt31(SpinScene(), VirtualClock())), show)
     assert run.status == "finished"
     assert run.readings().column("drive_frequency_hz").tolist() == [30.5, 32.0]
-    (said,) = events(run, "left out")
+    (said,) = texts(run, "left out")
     assert said in show.messages
     assert re.search(r"31 Hz is left out: the laser was counted in 0 of 3 gates .*, 3 are needed: move the beam", said)
-    assert not events(run, "lock lost")
-    assert len(events(run, "drive on")) == 1
+    assert not texts(run, "lock lost")
+    assert len(texts(run, "drive on")) == 1
 
 
 @pytest.mark.parametrize(
