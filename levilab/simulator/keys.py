@@ -27,6 +27,7 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "damping": ("drag.law",),
     "constant": ("drag.coefficient",),
     "weight": ("top.mass_kg",),
+    "inertia": ("top.inertia_axial_kg_m2",),
     "dipole": ("top.moment_a_m2",),
     "magnetization": ("base.strength_t_m",),
     "order": ("base.field",),
