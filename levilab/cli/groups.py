@@ -6,9 +6,18 @@ from typing import Annotated, Any
 from levilab.cli.analyze import takes_options
 from levilab.cli.options import HEADING, Language, Paths, among, argument, flag, option, place, writable
 from levilab.cli.output import interruptible, message, result
+from levilab.errors import UsageError
 from levilab.pipelines.options import OF_REPORT, read_options
 from levilab.report.worksheets.sheets import SHEETS
 from levilab.texts.text import Text
+
+
+def _named_sheets(names: list[str] | None) -> list[str]:
+    """Return the experiments that are named; the keys of all four take minutes, and are not made by accident."""
+    if not names:
+        raise UsageError("EXPERIMENT", f"name some of {', '.join(SHEETS)}, as levilab worksheet spin, or all")
+    named: list[str] = among([*SHEETS, "all"], "experiment")(names)
+    return [*SHEETS] if "all" in named else named
 
 
 @takes_options(OF_REPORT, HEADING)
@@ -39,7 +48,7 @@ def of_class(
 def worksheet(
     experiments: Annotated[
         list[str] | None,
-        argument("[EXPERIMENT]…", f"Of {', '.join(SHEETS)}.", show_default="all", callback=among(SHEETS, "experiment")),
+        argument("EXPERIMENT…", f"Of {', '.join(SHEETS)}; or all.", callback=_named_sheets, show_default=False),
     ] = None,
     out: Annotated[Path, place("DIR", "Where the files are written.")] = Path("worksheets"),
     groups: Annotated[int, option("N", "How many, each with its seed.", min=1, max=500)] = 20,

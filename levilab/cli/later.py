@@ -139,7 +139,9 @@ def _explain_unknown(error: Any, name: str, command: Any) -> None:
             error.message, error.possibilities = f"{error.message}; {advice}", []
             return
     error.possibilities = [f"--{one}" for one in get_close_matches(word, known, cutoff=_ALIKE)]
-    if error.possibilities or not any(one.name == "settings" for one in command.params):
+    if not any(one.name == "settings" for one in command.params):
+        return
+    if error.possibilities and not _is_quantity(word):
         return
     if any(one.name == "list_settings" for one in command.params):  # an experiment
         error.message += f"; --set changes its settings, which levilab acquire {name} --settings lists"
@@ -150,6 +152,15 @@ def _explain_unknown(error: Any, name: str, command: Any) -> None:
     keys = similar_keys(preset("driven").as_table(), word.replace("-", "_"))
     example = " or ".join(f"--set {key}=…" for key in keys) or "as --set top.mass_kg=25g"
     error.message += f"; --set changes the scene: {example}"
+
+
+def _is_quantity(word: str) -> bool:
+    """Return whether a word is a quantity's name, which a scene's key may have: mass, of --masses, too."""
+    from levilab.simulator.keys import similar_keys
+    from levilab.simulator.scene import preset
+
+    keys = similar_keys(preset("driven").as_table(), word)
+    return any(key.rpartition(".")[2].split("_")[0] == word for key in keys)
 
 
 def _rewrap(text: str | None) -> str | None:

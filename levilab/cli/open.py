@@ -14,7 +14,7 @@ from levilab.pipelines.options import OF_FILES, read_options
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from levilab.formats.understanding import UnderstoodRun
+    from levilab.formats.understanding import UnderstoodColumn, UnderstoodRun
     from levilab.pipelines.look import Look
 
 #: First values of a column that the terminal shows.
@@ -131,7 +131,7 @@ def _print_look(look: "Look") -> None:
                 str(column.index + 1),
                 column.title,
                 QUANTITIES.get(column.quantity or "", (column.quantity or "–",))[0],
-                f"{column.unit} a turn" if column.inverse else column.unit,
+                _unit_of(column),
                 ", ".join(column.values[:_SHOWN]) + " …" * (len(column.values) > _SHOWN),
             )
             for column in run.columns
@@ -140,6 +140,15 @@ def _print_look(look: "Look") -> None:
         if rows:
             console.print(draw(table(f"{name} ({look.holds})" if look.holds else name, heads, rows)))
         _print_doubts(look, run)
+
+
+def _unit_of(column: "UnderstoodColumn") -> str:
+    from levilab.formats.titles import unit_factor
+
+    if not column.inverse:
+        return f"{column.unit}, differences" if column.unit == "turns" else column.unit
+    turns = round((unit_factor(column.unit, "time") or column.factor) / column.factor)
+    return f"{column.unit} a turn" if turns == 1 else f"{column.unit} for {turns} turns"
 
 
 def _print_doubts(look: "Look", run: "UnderstoodRun") -> None:

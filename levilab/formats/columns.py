@@ -14,6 +14,7 @@ from levilab.formats.titles import (
     LISTED,
     NAMES,
     QUANTITIES,
+    TOTAL,
     UNITS,
     Title,
     as_a_period,
@@ -21,6 +22,7 @@ from levilab.formats.titles import (
     dimension,
     foreign_unit,
     implied_unit,
+    is_total,
     is_unit,
     nearly_a_frequency,
     plain_name,
@@ -115,6 +117,11 @@ class Column:
     written: bool = False
     behind: bool = False
 
+    @property
+    def is_total(self) -> bool:
+        """Whether it counts turns since the start."""
+        return self.unit == TOTAL and not self.behind
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -208,6 +215,9 @@ def choose_columns(
             continue
         # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
         unit = written[name] or written.get(quantity)
+        if unit == TOTAL and name == quantity:
+            columns.append(Column(name, index, header[index], 1.0, unit=TOTAL, written=True))
+            continue
         if unit == "%" or (unit and dimension(name) == "frequency" and unit_factor(unit, "frequency") is None):
             factor = 0.01 if unit == "%" else unit_factor(unit, "time") or 1
             columns.append(Column(name, index, header[index], factor, inverse=unit != "%", unit=unit, written=True))
@@ -363,8 +373,11 @@ def _wanted_columns(
 def _stated_unit(path: Path, name: str, unit: str) -> str:
     kind = dimension(name)
     turns = kind == "frequency" and name in QUANTITIES
+    if turns and is_total(unit):
+        return TOTAL
     if not (_is_unit_of(unit, name) or (turns and unit_factor(unit, "time"))):
-        known = ", ".join(UNITS[kind]) + (", s and ms of a turn, turns in 10 s" if turns else "")
+        of_turns = ", s and ms of a turn, turns in 10 s, turns since the start as turns"
+        known = ", ".join(UNITS[kind]) + of_turns * turns
         raise TableError(path, f"`columns`: '{shorten(unit)}' is no unit of {kind}; known are {known}")
     return unit
 

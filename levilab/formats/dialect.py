@@ -56,6 +56,8 @@ _BEFORE_UNIT = re.compile(
     rf"(?<![^\s±])({_NUMBER})\s+"
     rf"(?=(?:{'|'.join(re.escape(name) for units in UNITS.values() for name in units)})(?:[\s±]|$))"
 )
+#: A row of units in brackets alone.
+_IN_BRACKETS = re.compile(r"\s*(?:\[[^\[\]]*\]\s*|\([^()]*\)\s*)+")
 Kind = Literal["number", "clock", "missing", "text"]
 
 
@@ -206,7 +208,7 @@ def clock_time(text: str, *, month_first: bool = False) -> float:
 
 
 # Of two that do equally well the first is taken. Comma with decimal comma needs quoted fields.
-SEPARATORS = ("\t", ";", ",", None)
+SEPARATORS = ("\t", ";", ",", "|", None)
 DIALECTS = tuple(Dialect(separator, decimal) for separator in SEPARATORS for decimal in (".", ","))
 
 
@@ -311,7 +313,8 @@ def _score(lines: Iterable[Line], rank: int) -> tuple[int, int, int, int]:
 def _split_at_blanks(line: str) -> list[str]:
     if '"' in line:
         return [field.strip('"') for field in re.findall(r'"[^"]*"|\S+', line)]
-    if any(mark in line for mark in "[(/"):  # "f [Hz]" and "f / Hz" are one title each
+    if any(mark in line for mark in "[(/") and not _IN_BRACKETS.fullmatch(line):
+        # "f [Hz]" and "f / Hz" are one title each
         line = re.sub(r"(?<!\s)\s+(?=[\[(/])|(?<=/)\s+", "", line)
     if "±" in line or "+" in line:
         line = _BEFORE_PERCENT.sub(r"\1", _AROUND_MARK.sub("±", line))

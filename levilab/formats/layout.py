@@ -230,7 +230,8 @@ def _header(above: list[Line], width: int) -> int | None:
 def _units(below: Sequence[Line]) -> tuple[str, ...]:
     """Return the fields of the line below the header, if it is a row of units."""
     if below and below[0].is_text:
-        fields = tuple(re.sub(r"^(in|en|i)\s+", "", field) for field in below[0].fields)
+        bare = (re.sub(r"^[\[(](.*)[\])]$", r"\1", field) for field in below[0].fields)
+        fields = tuple(re.sub(r"^(in|en|i)\s+", "", field) for field in bare)
         if any(is_unit(field) for field in fields):
             return fields
     return ()

@@ -399,12 +399,14 @@ def _number_with_unit(path: Path, layout: Layout, column: Column, line: int, cel
     text, _ = _text_and_scale(layout, column, cell)
     unit = unit_behind(text)
     kind = "time" if column.inverse else dimension(column.name)
-    if unit_factor(unit, kind) != unit_factor(column.unit, kind):
+    factors = unit_factor(unit, kind), unit_factor(column.unit, kind)
+    scale = factors[0] / factors[1] if column.behind and factors[0] and factors[1] else 1.0  # 40 Hz ± 30 mHz
+    if factors[0] != factors[1] and scale == 1:
         other = "'{cell:s}' stands in column '{column:s}', which is in {unit:s}: write one unit in all rows"
         values = {"cell": shorten(cell), "column": shorten(column.label), "unit": column.unit}
         raise TableError(path, Said(other, **values), line=line)
     try:
-        return layout.dialect.number(text[: -len(unit)].strip())
+        return scale * layout.dialect.number(text[: -len(unit)].strip())
     except ValueError:
         other = (
             "'{cell:s}' has the other decimal mark, a number with decimal comma is expected: correct it"

@@ -260,6 +260,15 @@ def _table(
     if not good.all():
         notes.append(_missed_warning(name, lines[~good], good.size, periods=any(column.inverse for column in present)))
         lines, kept = lines[good], {column: values[good] for column, values in kept.items()}
+    columns = _in_si(kept)
+    for total in [c for c in kept if c.is_total]:
+        columns, lines = _differences(columns, total.name), lines[1:]
+        notes.append(of_file("turns", f"{_seen(name, total)} counts turns since the start: {_OF_TOTALS}"))
+    return Table(path, columns, tuple(notes), header, lines, {c.name: c.factor for c in kept if not c.inverse})
+
+
+def _in_si(kept: "Mapping[Column, NDArray[np.float64]]") -> "dict[str, NDArray[np.float64]]":
+    """Return columns in SI by their names, of a period the frequency."""
     columns = {c.name: values if c.factor == 1 else values * c.factor for c, values in kept.items()}
     for name in [c.name for c in kept if c.inverse and c.name in QUANTITIES]:
         columns[name] = 1 / columns[name]
@@ -268,7 +277,21 @@ def _table(
     for c in kept:
         if c.unit == "%":
             columns[c.name] = columns[c.name] * np.abs(columns[COMPANIONS[c.name]])
-    return Table(path, columns, tuple(notes), header, lines, {c.name: c.factor for c in kept if not c.inverse})
+    return columns
+
+
+#: u of a difference of two counts, each cut to whole turns: two rectangular distributions, GUM 4.3.7 [turns].
+_U_OF_TURNS = 6**-0.5
+_OF_TOTALS = "each reading is the mean between two rows, at the middle of their times, with u of 0.41 turns"
+
+
+def _differences(columns: "Mapping[str, NDArray[np.float64]]", name: str) -> "dict[str, NDArray[np.float64]]":
+    """Return times and mean spins between rows, and their u, of turns that were counted since the start."""
+    time, turns = columns["time_s"], columns[name]
+    wait = np.diff(time)
+    with np.errstate(divide="ignore", invalid="ignore"):  # times that repeat are refused later
+        spin, u = np.diff(turns) / wait, _U_OF_TURNS / np.abs(wait)
+    return {"time_s": (time[1:] + time[:-1]) / 2, name: spin, companion(name): u}
 
 
 def _drop_unused(numbers: "dict[Column, NDArray[np.float64]]", wanted: Collection[str]) -> list[Column]:

@@ -43,6 +43,11 @@ NEED_UNITS = (
     "drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse", "vitesse_de_rotation", "varvtal",
     "velocidad", "velocidad_de_giro", "velocidad_de_rotación", "n",
 )  # fmt: skip
+#: Unit of a column that counts turns since the start, which only grow, and its other names.
+TOTAL = "turns"
+_TOTALS = (TOTAL, "counts", "pulses", "revolutions", "rotations", "umdrehungen", "impulse")
+#: Units of other quantities, which no column of ours has.
+_FOREIGN = ("°C", "C", "°F", "F", "K", "lx", "hPa", "Pa", "dB", "kg", "g", "A", "mA", "W", "%")
 #: Units in which the title says whether turns or radians are counted.
 _PER_SECOND = ("1/s", "s-1")
 
@@ -387,7 +392,13 @@ def foreign_unit(text: str, kind: str) -> str | None:
         return None
     form = re.fullmatch(r".*?[\[(]([^\[\]()]*)[\])]", text)
     unit = form[1] if form else text.rpartition("_")[2] if "_" in text else ""
-    return unit if unit and is_unit(unit) and unit_factor(unit, kind) is None else None
+    foreign = is_unit(unit) and unit_factor(unit, kind) is None
+    return unit if unit and (foreign or plain_unit(unit) in _FOREIGN) else None
+
+
+def is_total(unit: str) -> bool:
+    """Return whether a unit says that turns are counted since the start."""
+    return plain_unit(unit).casefold() in _TOTALS
 
 
 def implied_unit(text: str) -> str | None:

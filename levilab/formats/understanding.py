@@ -39,6 +39,7 @@ from levilab.formats.titles import (
     OTHER_SENSORS,
     OVER_TIME,
     QUANTITIES,
+    TOTAL,
     Title,
     as_a_period,
     companion,
@@ -230,9 +231,12 @@ def _question(
     """Return the question in which unit a column is, None where it can be in none or, if not always, in Hz alone."""
     numbers = _numbers(layout, index)
     spins = possible_spins(median(numbers)) if numbers else {}
-    if not always and list(spins) == ["Hz"]:
+    total = _spins_of_total(layout, numbers, time)
+    if total:
+        spins = {TOTAL: 0.0}
+    elif not always and list(spins) == ["Hz"]:
         return None
-    if numbers and (per_reading := _turns_per_reading(layout, numbers, time)):
+    elif numbers and (per_reading := _turns_per_reading(layout, numbers, time)):
         spins = {per_reading: 0.0} | spins
     if not spins:
         return None
@@ -243,6 +247,8 @@ def _question(
         factor = unit_factor(unit, "frequency") or 1.0
         range_ = "{unit:s} ({first:.3g} to {last:.3g} Hz)"
         text = Said(range_, unit=unit, first=first * factor, last=last * factor) if unit in spins else unit
+        if unit == TOTAL:
+            text = Said("turns since the start ({first:.3g} to {last:.3g} Hz)", first=total[0], last=total[-1])
         choices.append(Choice(text, {**at, "f": f"{index + 1} [{unit}]"}))
     title = f" '{shorten(layout.header[index])}'" if index < len(layout.header) else ""
     *others, end = (choice.text for choice in choices)
@@ -257,6 +263,22 @@ def _question(
         end=end,
     )
     return Doubt("unit", asked, index, tuple(choices), open=len(spins) > 1)
+
+
+def _spins_of_total(layout: Layout, numbers: Sequence[float], time: Column | None) -> list[float]:
+    """Return the spins [Hz] between readings of whole numbers that only grow, as turns since the start do; else none.
+
+    The numbers of the rows, 1, 2, 3, are no turns.
+    """
+    times = [time.factor * number for number in _numbers(layout, time.index)] if time else []
+    if len(times) != len(numbers) or len(numbers) <= 2 or not all(number.is_integer() for number in numbers):
+        return []
+    pairs = zip(pairwise(numbers), pairwise(times), strict=True)
+    steps = [(b - a, later - sooner) for (a, b), (sooner, later) in pairs]
+    if not all(turns > 0 and wait > 0 for turns, wait in steps) or {turns for turns, _ in steps} == {1}:
+        return []
+    spins = [turns / wait for turns, wait in steps]
+    return spins if is_possible_spin(median(spins)) else []
 
 
 def _turns_per_reading(layout: Layout, numbers: Sequence[float], time: Column | None) -> str:
@@ -291,7 +313,7 @@ def _must_be_sure(plan: "Plan") -> "Plan":
 
 def _unit_doubt(layout: Layout, column: Column, used: Iterable[Column]) -> Doubt | None:
     """Return the question about a spin that is taken in a unit in which no top has it."""
-    if column.name != _SPIN or column.inverse:
+    if column.name != _SPIN or column.inverse or column.is_total:
         return None
     numbers = _numbers(layout, column.index)
     if not numbers or is_possible_spin(median(numbers) * column.factor):
@@ -488,7 +510,9 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
         )
     for name in needed:
         if name not in {column.name for column in chosen}:
-            raise _total_of_turns(path, name, layout) or no_column(path, name, header, _which_columns(layout, [name]))
+            raise _total_of_turns(path, name, layout, chosen) or no_column(
+                path, name, header, _which_columns(layout, [name])
+            )
     chosen = tuple(sorted(chosen, key=lambda column: CANONICAL.index(column.name)))
     behind = [replace(one, name=companion(one.name), behind=True) for one in chosen if one.name in QUANTITIES]
     return Plan(path, text, layout, header, (*chosen, *behind), part.own, (*warnings, *doubts))
@@ -547,15 +571,13 @@ def _key(name: str) -> str:
     return next((short for short, long in SHORTHANDS.items() if long == name), name)
 
 
-def _total_of_turns(path: Path, name: str, layout: Layout) -> NoSuchColumn | None:
-    """Return the error for a table that has no spin but turns counted since the beginning, which only grow."""
+def _total_of_turns(path: Path, name: str, layout: Layout, chosen: Sequence[Column]) -> NoSuchColumn | None:
+    """Return the question for a table that has no spin but turns counted since the beginning, which only grow."""
+    time = next((column for column in chosen if column.name == "time_s"), None)
     for k, title in enumerate(layout.header if name == _SPIN else ()):
-        numbers = _numbers(layout, k)
-        if nearly_a_frequency(title) == OVER_TIME and len(numbers) > 2 and all(b > a for a, b in pairwise(numbers)):
-            what = f"'{shorten(title)}' only grows, as turns do that are counted since the beginning"
-            do = "write the mean spin between two readings, turns / time from the one to the other, as f [Hz] at the "
-            do += "middle of their times; in Python analyze(((t[1:] + t[:-1]) / 2, np.diff(n) / np.diff(t)))"
-            return NoSuchColumn(path, f"{what}: {do}; if each is of a time of its own, {OVER_TIME}")
+        if nearly_a_frequency(title) == OVER_TIME and _spins_of_total(layout, _numbers(layout, k), time):
+            doubt = _question(layout, k, time, always=True)
+            return _unanswered(path, doubt) if doubt else None
     return None
 
 
@@ -583,6 +605,13 @@ def no_column(path: Path, name: str, header: Sequence[str], doubt: Doubt | None 
     return NoSuchColumn(path, text, doubt=doubt)
 
 
+def _with_time(wanted: Mapping[str, str], filled: Sequence[str]) -> Mapping[str, str]:
+    """Return what is taken for what, of two columns without titles the other one as the time."""
+    left = [number for number in filled if number not in {title.split(" ")[0] for title in wanted.values()}]
+    alone = len(wanted) == 1 and {*wanted} <= {"f", _SPIN} and len(filled) == 2
+    return {"t": left[0], **wanted} if alone and left else wanted
+
+
 def _titles(
     path: Path, layout: Layout, wanted: Mapping[str, str], *, guess: bool
 ) -> tuple[tuple[str, ...], Mapping[str, str], list[str]]:
@@ -592,7 +621,7 @@ def _titles(
     numbers = tuple(str(n + 1) for n in range(layout.width))
     filled = [n for n in numbers if any(row[int(n) - 1 : int(n)] not in {(), ("",)} for row in layout.sample)]
     if wanted:
-        return numbers, wanted, []
+        return numbers, _with_time(wanted, filled), []
     if layout.header_line:
         raise NoSuchColumn(
             path,

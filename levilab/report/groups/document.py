@@ -264,4 +264,7 @@ def write_class(
     else:
         content = class_workbook(classes, date)
     write_content(output, content)
+    if tell:
+        found = ", ".join(f"{one.analysis.name} ({len(one.groups)})" for one in classes)
+        tell(Text("groups or runs side by side: {found:s}", found=found))
     return output

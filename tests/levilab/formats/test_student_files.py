@@ -92,6 +92,9 @@ def rows(form):
         (rows("{t} s ± 0.5 s   {f} Hz ± 0.03 Hz"), 0.03),
         ("t,f\n" + rows("{t},{f} ± 0.1 %"), [0.001 * f for f in SPINS]),
         (rows("{t} s   {f} Hz ± 0.1 %"), [0.001 * f for f in SPINS]),
+        ("t;f\n" + rows("{t} s;{f} Hz ± 30 mHz"), 0.03),
+        ("Zeit [s]|Frequenz [Hz]\n" + rows("{t}|{f}"), None),
+        ("t   f\n[s]   [Hz]\n" + rows("{t}   {f}"), None),
         (rows("{t} s   {f} Hz"), None),
         ("Zeit Frequenz\n" + rows("{t} s {f} Hz"), None),
         ("sec,Hz\n" + rows("{t},{f}"), None),
@@ -129,7 +132,7 @@ def test_a_column_in_which_some_rows_have_no_u_behind_the_number_says_so(count, 
 
 @pytest.mark.parametrize(
     ("cell", "do"),
-    [("38.5 Hz ± 30 mHz", "write one unit in all rows"), ("38.5 ± 1 %?", "into a column of its own, with the title u")],
+    [("38.5 Hz ± 30 ms", "write one unit in all rows"), ("38.5 ± 1 %?", "into a column of its own, with the title u")],
 )
 def test_a_number_behind_a_mark_that_cannot_be_used_is_quoted_as_it_stands(cell, do, tmp_path):
     path = tmp_path / "my.csv"
@@ -478,3 +481,23 @@ def test_a_stopwatch_may_say_so_in_its_title(tmp_path):
 def test_a_path_into_no_file_stays_a_path():
     assert texts.locate(Path("no/such/file.csv")) == (Path("no/such/file.csv"), "")
     assert texts.locate(FILES / "excel.xlsx" / "Messung") == (FILES / "excel.xlsx", "Messung")
+
+
+def test_turns_since_the_start_are_a_question_whose_first_answer_gives_the_mean_spins(tmp_path):
+    """Against the counts themselves: differences over time, with u of two counts cut to whole turns."""
+    t, n = np.arange(0.0, 200.0, 10.0), np.floor(390 * np.arange(20) - 3.0 * np.arange(20) ** 2)
+    path = tmp_path / "counts.csv"
+    np.savetxt(path, np.c_[t, n], fmt="%d", delimiter=",", header="Zeit (s),Impulse", comments="")
+    (run,) = understand(path).runs
+    (doubt,) = run.doubts
+    assert doubt.choices[0].text == "turns since the start (38.7 to 27.9 Hz)"
+    table = read_table(path, columns=doubt.choices[0].columns)
+    assert table.column("time_s").tolist() == [*np.arange(5.0, 190.0, 10.0)]
+    np.testing.assert_array_equal(table.column("spin_frequency_hz"), np.diff(n) / 10)
+    assert table.column("spin_frequency_u_hz") == pytest.approx(np.full(19, 0.0408), abs=1e-4)  # √(1/6) turns in 10 s
+    assert "counts turns since the start" in table.warnings[0]
+
+
+def test_of_two_columns_without_titles_the_other_one_is_the_time(tmp_path):
+    (tmp_path / "my.txt").write_text(rows("{t} {f}"), encoding="utf-8")
+    assert read_table(tmp_path / "my.txt", columns={"f": "2 [Hz]"}).column("time_s")[1] > 0
