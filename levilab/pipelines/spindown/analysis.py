@@ -52,6 +52,8 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
         yield from (*map(remark, self.combined.remarks), *self._left_out(), *self._of_laws(self.combined.fits))
         if self.options.laws:
             yield f"drag laws other than {enumeration(self.options.laws)} are left out, as asked"
+        if self.options.correlation == "none":
+            yield "the noise of the readings is taken to be white, as asked: u is too small where it is not"
         if any(run.has_tilt for run in self.runs) and not is_seen(self.combined.tilt):
             yield TILT_ALLOWED
 

@@ -123,9 +123,13 @@ def test_readings_between_two_spins_are_fitted_and_the_result_says_so(tmp_path):
 
 def test_the_laws_that_are_asked_for_are_fitted_and_the_others_have_no_numbers(tmp_path):
     path = spin_down_csv(tmp_path / "a.csv")
-    found = SPINDOWN.analyze([path], SpinDownOptions(tilt="none", **read_options({"laws": "disc,stokes"})))
+    found = SPINDOWN.analyze(
+        [path], SpinDownOptions(tilt="none", correlation="none", **read_options({"laws": "disc,stokes"}))
+    )
     assert [fit.name for fit in found.combined.fits] == ["stokes", "disc"]
     assert "drag laws other than stokes and disc are left out, as asked" in found.all_warnings
+    assert any("taken to be white" in note for note in found.all_warnings)
+    assert found.runs[0].correlation is None
     part = SPINDOWN.document(found, tmp_path)["runs"][0]
     values = {column.name: column.read(part) for column in SPINDOWN.row}
     assert values["disc_c32_per_sqrt_rad_s"] == pytest.approx(2.34e-4, rel=0.01)  # 0.15 % by 0.03 Hz
