@@ -215,6 +215,15 @@ def stamp(path: Path) -> tuple[int, int, int] | None:
     return found.st_mtime_ns, found.st_size, found.st_ino
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder and those above it, all of them on the disk.  Raises OSError."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    for path in reversed(missing):
+        with contextlib.suppress(FileExistsError):
+            computer().make_folder(path)
+        computer().sync_folder(path.parent)
+
+
 def replace_atomically(path: Path, content: str | bytes) -> None:
     """Write a file so that a reader sees the old one or the new one, whole, whatever happens meanwhile.
 

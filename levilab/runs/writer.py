@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, Self
 from analysis.numbers import how_many
 from levilab.computer import computer, utc_now
 from levilab.errors import DataError
-from levilab.files import CannotWrite, replace_atomically
+from levilab.files import CannotWrite, make_folder, replace_atomically
 from levilab.runs import traces
 from levilab.runs.events import RunEvent
 from levilab.runs.find import RECORD, must_take_runs
@@ -85,7 +85,7 @@ class RunWriter:
         """
         must_take_runs(out)
         with _explain_errors("create the run folder", out, safe=""):
-            _make_folder(out)
+            make_folder(out)
             writer = cls(_new_folder(out, record.experiment), record, tell)
             writer._created = True
             try:
@@ -484,18 +484,9 @@ def _refuse_special(path: Path) -> None:
         raise OSError(errno.EINVAL, f"{path.name} is no regular file")
 
 
-def _make_folder(folder: Path) -> None:
-    """Make a folder and those above it, all of them on the disk."""
-    missing = [path for path in (folder, *folder.parents) if not path.exists()]
-    for path in reversed(missing):
-        with contextlib.suppress(FileExistsError):
-            computer().make_folder(path)
-        computer().sync_folder(path.parent)
-
-
 def _folder_beside(old: Path) -> Path:
     """Return a new folder whose name says that it continues another one."""
-    _make_folder(old.parent)
+    make_folder(old.parent)
     name = re.sub(r"-rescued(-\d+)?$", "", old.name)
     for number in count(1):
         folder = old.with_name(f"{name}-rescued" + (f"-{number}" if number > 1 else ""))

@@ -18,7 +18,7 @@ import numpy as np
 
 from levilab.computer import computer, utc_now
 from levilab.errors import DataError
-from levilab.files import CannotWrite, locked, writing
+from levilab.files import CannotWrite, locked, make_folder, writing
 from levilab.simulator.keys import short_text
 from levilab.software import software_versions
 from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
@@ -103,6 +103,8 @@ class Store:
         """
         import zarr
 
+        from levilab.sweeps.durable import DurableStore
+
         if path is None:
             return cls._in(zarr.storage.MemoryStore(), None, plan, begin)
         taken = f"{path} is there already: give another place with `out`, or go on with it by `resume`"
@@ -111,8 +113,8 @@ class Store:
         part = path.with_name(f".{path.name}.{computer().process}.part")
         with writing(f"{path} cannot be made"):
             try:
-                path.parent.mkdir(parents=True, exist_ok=True)
-                cls._in(str(part), part, plan, begin)
+                make_folder(path.parent)
+                cls._in(DurableStore(part), part, plan, begin)
                 computer().move(part, path)
             except OSError as error:
                 if path.exists():  # another process was quicker
@@ -171,8 +173,12 @@ class Store:
         """Open a store.  Raises DataError where there is none."""
         import zarr
 
+        from levilab.sweeps.durable import DurableStore
+
         try:
-            return cls._of(zarr.open_group(str(path), mode="r+" if writable else "r"), path)
+            return cls._of(
+                zarr.open_group(DurableStore(path, read_only=not writable), mode="r+" if writable else "r"), path
+            )
         except DataError:
             raise
         except KeyError as error:
@@ -243,21 +249,8 @@ class Store:
         with writing(f"{self.path}: cannot be written", "free space, then go on with `resume`"):
             for column in columns_of(self.plan.observables):
                 self.array(column.name)[chunk.box] = np.asarray(values[column.name], dtype=column.dtype)
-            self._sync(chunk)
             self.array(DONE)[chunk.number] = 1
         self.marks[chunk.number] = 1
-
-    def _sync(self, chunk: Chunk) -> None:
-        """Wait until a chunk's files are on the disk: a power cut must not leave a mark without values."""
-        if self.path is None:
-            return
-        place = [str(k) for k in np.unravel_index(chunk.number, self.plan.grid)]
-        for column in columns_of(self.plan.observables):
-            file = self.path.joinpath(column.name, "c", *place)
-            if file.exists():  # a chunk without any value has none
-                with computer().open(file, "r+b") as open_file:
-                    computer().sync(open_file)
-                computer().sync_folder(file.parent)
 
     def known_points(self, chunk: Chunk) -> NDArray[np.bool_]:
         """Return which points of a chunk are computed, or filled in."""

@@ -126,7 +126,7 @@ def test_a_store_that_is_moved_while_it_is_written_is_an_error_that_names_it(tmp
 
 def test_a_store_whose_marks_are_torn_is_an_error(tmp_path):
     run(Store.create(tmp_path / "map.zarr", plan()))
-    (tmp_path / "map.zarr" / "done" / "c" / "0").write_bytes(b"")  # as a power cut may leave a file
+    (tmp_path / "map.zarr" / "done" / "c" / "0").write_bytes(b"")  # as a damaged disk may leave a file
     with pytest.raises(DataError, match="no store of a sweep"):
         Store.open(tmp_path / "map.zarr")
 
