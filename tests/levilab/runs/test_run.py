@@ -79,7 +79,7 @@ def test_the_datapackage_holds_units_and_hashes(tmp_path):
     assert [field["unit"] for field in readings["schema"]["fields"]] == ["s", "Hz", "Hz"]
 
 
-def test_a_run_that_cannot_be_described_is_finished_all_the_same(tmp_path, monkeypatch):
+def test_a_run_that_cannot_be_described_is_finished(tmp_path, monkeypatch):
     messages = []
     monkeypatch.setattr("levilab.runs.writer.package", lambda *_, **__: fail_to_read())
     with RunWriter.create(tmp_path, record(), tell=messages.append) as writer:

@@ -1,7 +1,6 @@
 """A store keeps what was computed, and any reader of Zarr can read it."""
 
 import json
-import os
 import shutil
 
 import numpy as np
@@ -76,19 +75,6 @@ def test_a_store_of_an_earlier_version_is_read(tmp_path):
     again = Store.open(tmp_path / "map.zarr")
     assert again.plan.as_table() == made.plan.as_table()
     assert again.notes() == []
-
-
-def test_values_are_on_the_disk_before_their_mark(tmp_path, monkeypatch):
-    made = Store.create(tmp_path / "map.zarr", plan())
-    marks = []
-    monkeypatch.setattr(os, "fsync", lambda _: marks.append(int(made.group["done"][:].sum())))
-    for task in tasks_of(made):
-        made.write(task.part, made_up(task))
-    files = [
-        file for column in ("survived", "lifetime_s") for file in (tmp_path / "map.zarr" / column / "c").glob("*/*")
-    ]
-    assert len(marks) >= len(files) > made.plan.chunk_count
-    assert sorted(set(marks)) == list(range(made.plan.chunk_count))
 
 
 def test_two_processes_cannot_write_into_one_store(tmp_path):
