@@ -1,6 +1,6 @@
 """A place of a Zarr store whose files are whole and on the disk before they have their names.
 
-Zarr's own gives a file its name before its bytes are on the disk: a loss of power may leave marks that nobody can read.
+Zarr's own gives a file its name before its bytes are on the disk: a loss of power may leave marks that cannot be read.
 """
 
 from __future__ import annotations
