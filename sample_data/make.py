@@ -37,6 +37,7 @@ from numpy.typing import NDArray
 
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.crosscheck.subjects.sway import field_of_top
 from levilab.crosscheck.subjects.tune import draw_world, keep_diary
 from levilab.pipelines.tune.owner import write_owner
 from levilab.present.progress import Display
@@ -508,6 +509,24 @@ def write_track() -> None:
     print(f"sway: {len(rows)} frames")
 
 
+#: The record of a phone above that top: its length, samples per second, distance and place beside the axis, and the
+#: moment across the axis; noise of a sample and field of the base there.
+FIELD_S, SAMPLES, ABOVE_M, ASIDE_M, ACROSS_A_M2 = 60.0, 100.0, 0.12, 0.003, 0.02
+FIELD_NOISE_UT, BASE_UT = 0.12, (36.0, -21.0, 2240.0)
+
+
+def write_field() -> None:
+    """Make the record of a phone that lies above the swaying top; its last digits depend on the processor."""
+    motion = simulate(preset("undriven").changed(TRACK_SCENE), FIELD_S, rate=SAMPLES, tolerance=1e-6)
+    field = 1e6 * field_of_top(motion, ABOVE_M, ASIDE_M, ACROSS_A_M2) + BASE_UT
+    field += np.random.default_rng(24).normal(0, FIELD_NOISE_UT, field.shape)
+    head = '"Time (s)","Magnetic Field x (µT)","Magnetic Field y (µT)","Magnetic Field z (µT)"'
+    rows = [f"{t:.2f},{x:.2f},{y:.2f},{z:.2f}" for t, (x, y, z) in zip(motion.time[:-1], field[:-1], strict=True)]
+    text = "\n".join(["# SYNTHETIC, made by sample_data/make.py", head, *rows, ""])
+    (HERE / "sway" / "phone.csv").write_text(text, encoding="utf-8", newline="\n")
+    print(f"sway: {len(rows)} samples of a phone above it")
+
+
 def write_diary() -> None:
     """Make the file of an owner who follows `levilab tune` on three days, as the cross-check has one."""
     by = np.random.default_rng(24)
@@ -569,5 +588,6 @@ if __name__ == "__main__":
         precession_sweep()
         upper_limits()
         write_track()
+        write_field()
     if "--sound" in sys.argv[1:]:
         write_sound()

@@ -4,14 +4,19 @@ from analysis.sway.geometry import Geometry, geometric_magnetism
 from analysis.sway.known import Known
 from analysis.sway.lines import Swings, mirrored, swings_in_window, swings_of
 from analysis.sway.orbit import slow_swings
+from analysis.sway.sensor import Sensor, image, slow_part, without_image
 
 __all__ = [
     "Geometry",
     "Known",
+    "Sensor",
     "Swings",
     "geometric_magnetism",
+    "image",
     "mirrored",
+    "slow_part",
     "slow_swings",
     "swings_in_window",
     "swings_of",
+    "without_image",
 ]

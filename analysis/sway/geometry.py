@@ -144,7 +144,8 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
     seen, shift = small.sum(axis=1), np.abs(shifts.sum(axis=1))
     resonance = np.array([_doubt(one) for one in swings])
     resonance *= np.maximum(np.abs(seen), [_USUAL * (one.frequency[1] - one.frequency[0]) for one in swings])
-    shift_u = shift * np.hypot(SHIFT_U, NEXT_SHIFT_U * np.array([one.size for one in swings]) ** 2)
+    size_u = np.array([2 * one.size_u for one in swings])  # the shift goes with the square
+    shift_u = shift * np.hypot(np.hypot(SHIFT_U, size_u), NEXT_SHIFT_U * np.array([one.size for one in swings]) ** 2)
     leans = np.array([_lean(*one, known) for one in placed])
     value, half = REFERENCE_HZ * float(np.mean(seen / spin)), np.empty(0)
     for _ in range(_ROUNDS):  # Ω_g is the split but for some percent, which hardly depend on it
@@ -156,17 +157,17 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
         doubt, mistake = np.abs(factor) * (resonance + shift_u), np.abs(factor) * mistaken
         total = np.sqrt(u_shares**2 + doubt**2 + mistake**2)
         value, u_lines, chi_square = _mean(shares, total, u_shares)
-    lean = float(np.mean(leans))
+    lean, lean_u = float(np.mean(leans)), math.hypot(LEAN_U, float(size_u.mean()))
     parts = {
         "lines": u_lines,
         "amplitude": float(np.average(doubt, weights=1 / total**2)),
         "mistake": float(np.average(mistake, weights=1 / total**2)),
         "motion": MOTION_U * abs(value),
-        "lean": LEAN_U * lean * abs(value),
+        "lean": lean_u * lean * abs(value),
     }
     u = math.hypot(*parts.values())
     far = np.array([PRECESSION_SHIFT_U * float(np.sum(one.amplitude[:2] ** 2)) for one in swings])
-    less = Corrections(shifts, leans, LEAN_U, far, np.hypot(resonance + shift_u, mistaken), MOTION_U)
+    less = Corrections(shifts, leans, lean_u, far, np.hypot(resonance + shift_u, mistaken), MOTION_U)
     measured = Estimate(value, u, "Hz")
     of_base, predicted, parts_predicted = _predict(each, heights, known)
     share = (predicted.value or 0.0) / REFERENCE_HZ

@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError, NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewReadings
 from analysis.lines import spectral_lines
-from analysis.sway.vertical import BESIDE, VERTICAL_U_HZ, Vertical, beside, of_heights, of_places, vertical_swing
+from analysis.sway.vertical import ALONE, BESIDE, VERTICAL_U_HZ, Vertical, beside, of_heights, of_places, vertical_swing
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from analysis.lines import Line
+    from analysis.sway.vertical import Beside
 
 Array = NDArray[np.float64]
 Places = NDArray[np.complex128]
@@ -73,6 +74,7 @@ class Swings:
         noise: standard deviation of a coordinate [m].
         misfit: −2 times the logarithm of the likelihood and the priors, but for a constant.
         backwards: amplitude of the strongest line where a precession would be that turns against the spin [m].
+        size_u: relative standard uncertainty that all amplitudes have in common.
     """
 
     time: float
@@ -84,6 +86,7 @@ class Swings:
     noise: float
     misfit: float
     backwards: float = 0.0
+    size_u: float = 0.0
 
     def turned(self, k: int) -> Swings:
         """Return the same with the other line for the backward swing, 0, or the forward one, 1.
@@ -112,7 +115,9 @@ class Swings:
         return math.hypot(self.u[0], self.u[1])
 
 
-def swings_of(times: Array, places: Places, heights: Array | None = None, *, window: float = WINDOW_S) -> list[Swings]:
+def swings_of(
+    times: Array, places: Places, heights: Array | None = None, *, window: float = WINDOW_S, rising: bool = False
+) -> list[Swings]:
     """Return the swings of all windows in which they stand out.
 
     Args:
@@ -120,6 +125,7 @@ def swings_of(times: Array, places: Places, heights: Array | None = None, *, win
         places: x + iy, shape (n,) [m], seen so that the spin is positive.
         heights: shape (n,) [m]; None where they are not known.
         window: [s].
+        rising: whether the vertical swing is seen in the places itself, too, as by a magnetometer that leans.
 
     Raises:
         TooFewReadings, ShapesDiffer, NotFinite, TimesNotIncreasing: see `analysis.errors`.
@@ -132,7 +138,7 @@ def swings_of(times: Array, places: Places, heights: Array | None = None, *, win
     parts = [slice(*ends) for ends in itertools.pairwise(borders.tolist()) if ends[1] - ends[0] >= FEWEST]
 
     def look(part: slice, near: Sequence[Swings]) -> Swings | None:
-        return swings_in_window(t[part], s[part], None if z is None else z[part], near=near)
+        return swings_in_window(t[part], s[part], None if z is None else z[part], near=near, rising=rising)
 
     found: list[Swings] = []
     used = []
@@ -180,7 +186,7 @@ def _refuse_unless_finite(quantity: str, values: Array | Places) -> None:
 
 
 def swings_in_window(
-    t: Array, s: Places, heights: Array | None = None, *, near: Sequence[Swings] = ()
+    t: Array, s: Places, heights: Array | None = None, *, near: Sequence[Swings] = (), rising: bool = False
 ) -> Swings | None:
     """Return the swings of one window; None where they do not stand out.
 
@@ -189,6 +195,7 @@ def swings_in_window(
         s: shape (n,) [m].
         heights: shape (n,) [m]; None where they are not known.
         near: swings at nearby times, from which the search starts, too.
+        rising: see `swings_of`.
     """
     lines = _spectrum(t, s)
     forward, seen = _peaks(lines, SLOW_HZ)[:2], _peaks(lines, (-SLOW_HZ[1], -SLOW_HZ[0]))[:_TRIED]
@@ -199,15 +206,17 @@ def swings_in_window(
     starts = [one.frequency[:2] for one in near]
     starts += [np.array([backward, forward[0]]) for backward in {*seen, seen[0] - apart, seen[0] + apart}]
     starts += [np.array([backward, one]) for backward in seen[:2] for one in forward[1:]]
-    fits = [_fit(t, s, start, np.zeros(2), _expected(t, heights, start)) for start in starts]
+    rows = BESIDE + ALONE if rising else BESIDE
+    fits = [_fit(t, s, start, np.zeros(2), _expected(t, heights, start), rows=rows) for start in starts]
     best = min(fits, key=lambda one: one.swings.misfit)
     ahead, back = _precession(t, best.rest), _precession(t, best.rest.conj())
     slow = best.swings.frequency
     expected, rise = _expected(t, heights, slow), best.vertical(t, s).value
     if ahead is None:
-        best = _fit(t, s, slow, np.zeros(2), expected, rise=rise)
+        best = _fit(t, s, slow, np.zeros(2), expected, rows=rows, rise=rise)
     else:
-        best = _fit(t, s, np.append(slow, ahead.frequency), np.array([0, 0, ahead.slope]), expected, rise=rise)
+        start, slopes = np.append(slow, ahead.frequency), np.array([0, 0, ahead.slope])
+        best = _fit(t, s, start, slopes, expected, rows=rows, rise=rise)
     return replace(best.swings, vertical=best.vertical(t, s), backwards=0.0 if back is None else back.amplitude)
 
 
@@ -264,16 +273,20 @@ class _Fit(NamedTuple):
     waves: Places
     still: Array
     expected: Vertical
+    rows: Beside
 
     def vertical(self, t: Array, s: Places) -> Vertical:
         """Return the vertical swing by the lines beside the slow ones, wherever they are [Hz]."""
-        return of_places(t - t.mean(), s, self.waves, self.still, self.expected)
+        return of_places(t - t.mean(), s, self.waves, self.still, self.expected, rows=self.rows)
 
 
-def _fit(t: Array, s: Places, start: Array, slopes_start: Array, known: Vertical, *, rise: float | None = None) -> _Fit:
+def _fit(
+    t: Array, s: Places, start: Array, slopes_start: Array, known: Vertical, *, rows: Beside, rise: float | None = None
+) -> _Fit:
     """Return the swings of greatest likelihood near a start [Hz] with slopes [Hz/s], shape (2 or 3,).
 
-    known: of the vertical swing without the places; rise: where it is looked for first, there unless given [Hz].
+    known: of the vertical swing without the places; rows: of the lines beside the slow ones; rise: where the vertical
+    swing is looked for first, there unless given [Hz].
     """
     late, half, count = t - t.mean(), float(t[-1] - t[0]) / 2, start.size
     frequency, slope = start.copy(), slopes_start.copy()
@@ -288,7 +301,7 @@ def _fit(t: Array, s: Places, start: Array, slopes_start: Array, known: Vertical
     for _ in range(_STEPS):
         waves = np.exp(quarter * (frequency + late[:, None] * slope / 2))
         up = np.exp(quarter[:, 0] * rise)
-        lines = beside(waves, up)
+        lines = beside(waves, up, rows)
         linear = np.concatenate([waves, lines, still], axis=1)
         normal = linear.conj().T @ linear + 1e-9 * t.size * np.eye(linear.shape[1])
         amplitudes = np.linalg.solve(normal, linear.conj().T @ s)
@@ -296,8 +309,9 @@ def _fit(t: Array, s: Places, start: Array, slopes_start: Array, known: Vertical
         noise = math.sqrt(float(np.sum(np.abs(rest) ** 2)) / (2 * (t.size - linear.shape[1] - count)))
         moving = waves * amplitudes[:count]
         turned = quarter[:, 0] * 0
-        for (i, sign), part in zip(BESIDE, (lines * amplitudes[count:-2]).T, strict=True):
-            moving[:, i] += part
+        for (i, sign), part in zip(rows, (lines * amplitudes[count:-2]).T, strict=True):
+            if i is not None:
+                moving[:, i] += part
             turned += sign * part
         slopes = np.concatenate(
             [quarter * moving, quarter * late[:, None] / 2 * moving, (quarter[:, 0] * turned)[:, None]], axis=1
@@ -329,4 +343,4 @@ def _fit(t: Array, s: Places, start: Array, slopes_start: Array, known: Vertical
         noise=noise,
         misfit=2 * t.size * math.log(noise**2) + float(off @ off),
     )
-    return _Fit(found, rest, waves, still, known)
+    return _Fit(found, rest, waves, still, known, rows)

@@ -71,7 +71,9 @@ def of_heights(late: Array, heights: Array, expected: Vertical, beat: float) -> 
     return _posterior(misfit, expected, float(np.ptp(late)))
 
 
-def of_places(late: Array, places: Places, waves: Places, still: Array, expected: Vertical) -> Vertical:
+def of_places(
+    late: Array, places: Places, waves: Places, still: Array, expected: Vertical, *, rows: Beside
+) -> Vertical:
     """Return the vertical swing as the lines beside the slow swings have it.
 
     Args:
@@ -80,23 +82,28 @@ def of_places(late: Array, places: Places, waves: Places, still: Array, expected
         waves: the slow swings first, shape (n, 2 or 3).
         still: what else is in the places, shape (n, k).
         expected: without them.
+        rows: of the lines.
     """
     others = np.linalg.qr(np.concatenate([waves, still], axis=1))[0]
     rest = places - others @ (others.conj().T @ places)
 
     def misfit(rise: float) -> float:
-        return _misfit(rest, beside(waves, np.exp(2j * np.pi * late * rise)), others)
+        return _misfit(rest, beside(waves, np.exp(2j * np.pi * late * rise), rows), others)
 
     return _posterior(misfit, expected, float(np.ptp(late)))
 
 
-#: The lines beside the slow swings: of which swing, and which times the vertical swing is added.
-BESIDE = ((1, -1), (0, 1), (1, 1), (0, -1))
+#: Of lines: of which swing, or of none, and which times the vertical swing is added.
+Beside = tuple[tuple[int | None, int], ...]
+#: The lines beside the slow swings, and those of the vertical swing alone.
+BESIDE: Beside = ((1, -1), (0, 1), (1, 1), (0, -1))
+ALONE: Beside = ((None, 1), (None, -1))
 
 
-def beside(waves: Places, up: Places) -> Places:
-    """Return the waves of the lines beside the slow swings, shape (n, 4), by those of the vertical swing, (n,)."""
-    return np.stack([waves[:, i] * (up if sign > 0 else up.conj()) for i, sign in BESIDE], axis=1)
+def beside(waves: Places, up: Places, rows: Beside) -> Places:
+    """Return the waves of lines, a column each, by those of swings and of the vertical swing, shape (n,)."""
+    turned = ((1 if i is None else waves[:, i], up if sign > 0 else up.conj()) for i, sign in rows)
+    return np.stack([wave * rise for wave, rise in turned], axis=1)
 
 
 def _misfit(rest: NDArray[np.number], lines: NDArray[np.number], others: NDArray[np.number]) -> float:
@@ -134,4 +141,6 @@ def _posterior(misfit: Callable[[float], float], expected: Vertical, length: flo
     values = np.concatenate([values, [whole(rise) for rise in fine.tolist()]])[first]
     weights = np.exp((values.min() - values) / 2) * np.gradient(grid)
     mean = float(np.average(grid, weights=weights))
-    return Vertical(mean, math.sqrt(float(np.average((grid - mean) ** 2, weights=weights))))
+    between = float(np.interp(mean, grid, np.gradient(grid)))  # what is sharper than the grid has a u of its step
+    scatter = math.sqrt(float(np.average((grid - mean) ** 2, weights=weights)))
+    return Vertical(mean, max(scatter, between / math.sqrt(12)))

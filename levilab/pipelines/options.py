@@ -278,6 +278,12 @@ class LimitOptions(InputOptions):
     near: float | None = field(default=None, metadata=_NEAR)
 
 
+def _length(text: str, typed: str) -> Any:
+    """Return the field of a length [m] that is typed in millimetres."""
+    about = _about(text, kind=float, metavar="MM", typed=typed, unit="mm", factor=1e-3, above=0.0)
+    return field(default=None, metadata=about)
+
+
 @dataclass(frozen=True)
 class SwayOptions(InputOptions):
     """Options of the slow swings of a top."""
@@ -294,6 +300,10 @@ class SwayOptions(InputOptions):
     spin_hz: float | None = field(default=None, metadata=_about(
         "Spin of the top, where no column has it.", kind=float, metavar="HZ", typed="spin", unit="Hz", above=0.0,
     ))  # fmt: skip
+    sensor_m: float | None = _length(
+        "Of a record of the field: distance of the top from the phone above it, or from two vertical probes beside it.",
+        "sensor",
+    )
 
 
 @dataclass(frozen=True)
@@ -304,12 +314,6 @@ class HoldOptions(InputOptions):
         "A spin-down of the same top, a run or a file: its drag is compared, and the tilt of its moment counts.",
         kind=Path, metavar="PATH", read=Path,
     ))  # fmt: skip
-
-
-def _length(text: str, typed: str) -> Any:
-    """Return the field of a length [m] that is typed in millimetres."""
-    about = _about(text, kind=float, metavar="MM", typed=typed, unit="mm", factor=1e-3, above=0.0)
-    return field(default=None, metadata=about)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The slow swings of a top in full motion, filmed while it spins down: geometric magnetism."""
+"""The slow swings of a top in full motion, filmed, and recorded by a phone above it: geometric magnetism."""
 
 from __future__ import annotations
 
@@ -17,11 +17,20 @@ from levilab.simulator.single import simulate
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from numpy.typing import NDArray
+
+    from levilab.simulator.trajectory import Trajectory
+
+    Array = NDArray[np.float64]
+
 #: Frames per second, and length of the film [s].
 RATE, DURATION_S = 120.0, 110.0
-#: Error of a coordinate [m]; standard uncertainties of the mass [kg] and of the radii of the base [m].
-NOISE_M, _WEIGHED_U_KG, _CALLIPER_U_M = (
-    PRIORS["sway"][name].b for name in ("noise", "mass as weighed", "radius as measured")
+#: Of the moment, across the axis: about 2°.
+_ACROSS = 0.03
+#: Error of a coordinate [m] and of a sample of the field [T]; standard uncertainties of the mass [kg] and of the radii
+#: of the base [m].
+NOISE_M, _FIELD_NOISE_T, _WEIGHED_U_KG, _CALLIPER_U_M = (
+    PRIORS["sway"][name].b for name in ("noise", "noise of the field", "mass as weighed", "radius as measured")
 )
 
 
@@ -46,7 +55,7 @@ def draw_scene(seed: int) -> Scene:
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:
-    """Try one film of a drawn top.
+    """Try one film of a drawn top, and the record of a phone above it, whose magnetometer shows the spin, too.
 
     True are (I₃ω₃/m)(B′/2B)² where a top of its mass floats at rest, and all of the spin's angular momentum.
     """
@@ -64,7 +73,8 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     inner, outer = by.normal((base.inner_radius_m, base.outer_radius_m), _CALLIPER_U_M).tolist()
     device.write_text(
         f"[base]\ninner_radius_m = {inner}\ninner_radius_u_m = {_CALLIPER_U_M}\nouter_radius_m = {outer}\n"
-        f"outer_radius_u_m = {_CALLIPER_U_M}\n[top]\nmass_kg = {weighed}\nmass_u_kg = {_WEIGHED_U_KG}\n"
+        f"outer_radius_u_m = {_CALLIPER_U_M}\n[top]\n"
+        f"moment_a_m2 = {abs(top.moment_a_m2)}\nmass_kg = {weighed}\nmass_u_kg = {_WEIGHED_U_KG}\n"
         f"inertia_transverse_kg_m2 = {top.inertia_transverse_kg_m2}\ninertia_axial_kg_m2 = {top.inertia_axial_kg_m2}\n",
         encoding="utf-8",
     )
@@ -72,12 +82,41 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     (found,) = analysis.analyze([track], analysis.options_from({"device": read_device(device)})).runs
     b, slope, _ = stability_of(scene).field(np.array([place.height]))[:, 0]
     truth = top.inertia_axial_kg_m2 / top.mass_kg * float(slope / (2 * b)) ** 2 * found.geometry.spin
+    draw = drawing("sway", by)
+    record, far = folder / "phone.csv", draw("distance")
+    field = field_of_top(motion, far, draw("aside"), _ACROSS * top.moment_a_m2) * (1.0, draw("gains"), 1.0)
+    field += _FIELD_NOISE_T * by.standard_normal(field.shape)
+    heads = ",".join(("Time (s)", *(f"Magnetic field {axis} (T)" for axis in "xyz")))
+    np.savetxt(record, np.column_stack([motion.time, field])[:-1], "%.10f", ",", header=heads, comments="")
+    options = {"device": read_device(device), "sensor_m": PRIORS["sway"]["distance"].a}
+    (by_field,) = analysis.analyze([record], analysis.options_from(options)).runs
     return [
         pull_of("geometric magnetism", found.geometry.measured, truth),
         pull_of("joint ratio", found.geometry.joint.ratio, 1.0),
+        pull_of("geometric magnetism, by the field", by_field.geometry.measured, truth),
     ]
 
 
+def field_of_top(motion: Trajectory, far: float, aside: float, across: float) -> Array:
+    """Return the field of a top's dipole above the height at which its motion begins, shape (n, 3) [T].
+
+    Args:
+        motion: of the top.
+        far: how far above [m].
+        aside: from the axis of the base [m].
+        across: moment across the top's axis, which turns with the spin [A m²].
+    """
+    turns = np.concatenate([[0.0], np.cumsum((motion.spin_hz[1:] + motion.spin_hz[:-1]) / 2 * np.diff(motion.time))])
+    spun = np.stack([np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns), 0 * turns], axis=1)
+    moment = motion.scene.top.moment_a_m2 * motion.axis + across * spun
+    way = np.array([aside, 0.0, motion.position[0, 2] + far]) - motion.position
+    size = np.linalg.norm(way, axis=1)[:, None]
+    along = np.sum(moment * way, axis=1)[:, None] / size**2
+    return np.asarray(1e-7 * (3 * along * way - moment) / size**3)
+
+
 SUBJECT = Subject(
-    "sway", "the slow swings of a top in full motion, filmed while it spins down: geometric magnetism", trial
+    "sway",
+    "the slow swings of a top in full motion, filmed and by a phone's magnetometer above it: geometric magnetism",
+    trial,
 )

@@ -114,17 +114,23 @@ def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRu
             )
         )
     known, unknown = known_of(source, options)
-    times, places = readings.time, readings.x + 1j * readings.y
+    places, sensor = readings.x + 1j * readings.y, readings.sensor
+
+    def look(places: NDArray[np.complex128]) -> list[Swings]:
+        found = swings_of(readings.time, places, readings.height, rising=sensor is not None)
+        return [sensor.corrected(one) for one in found] if sensor else found
+
     try:
-        swings = swings_of(times, places, readings.height)
+        swings = look(places)
         view = mirrored(swings)
-        if view:
-            swings = swings_of(times, places.conj(), readings.height)
-        at = np.interp([one.time for one in swings], times, np.abs(spin))
+        beside = sensor is not None and not sensor.above  # they see a precession that is one of their own tilt
+        if view if not beside else np.mean([one.split for one in swings]) < 0:
+            swings = look(places.conj())
+        at = np.interp([one.time for one in swings], readings.time, np.abs(spin))
         geometry = geometric_magnetism(swings, at, known)
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error
-    return SwayRun(tuple(swings), at, geometry, view, _in_words(geometry), unknown)
+    return SwayRun(tuple(swings), at, geometry, False if beside else view, _in_words(geometry), unknown)
 
 
 def _in_words(found: Geometry) -> str:

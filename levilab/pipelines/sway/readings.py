@@ -1,18 +1,25 @@
-"""Places of a top over time, seen from above: of a file, or of a simulated motion."""
+"""Places of a top over time, seen from above: of a file, of a simulated motion, or of the field above the top."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from analysis.sway import Sensor, image, slow_part, without_image
 from levilab.errors import DataError
 from levilab.formats.columns import NoSuchColumn, TableError
+from levilab.formats.device import Device
 from levilab.formats.table import read_run_readings, read_table, refuse
 from levilab.formats.understanding import Request, plan_of
+from levilab.pipelines.field.device import THESIS
 from levilab.pipelines.options import SwayOptions
 from levilab.pipelines.sources import Readings
+from levilab.pipelines.spin.analysis import DISTANCE_U_M
+from levilab.pipelines.spin.magnetometer import FieldRecord
+from levilab.pipelines.spindown.readings import field_readings
 from levilab.runs.run import STATES
 from levilab.texts.text import Text
 
@@ -30,8 +37,11 @@ if TYPE_CHECKING:
 #: Columns of a table that are looked at, and those without which it is no track.
 QUANTITIES = ("time_s", "x_m", "y_m", "height_m", "spin_frequency_hz")
 NEEDED = QUANTITIES[:3]
-#: Of a magnetometer's record.
-_FIELD = ("time_s", "flux_density_x_t", "flux_density_y_t")
+#: Of a magnetometer's record; the first three are needed.
+_FIELD = ("time_s", "flux_density_x_t", "flux_density_y_t", "flux_density_z_t", "spin_frequency_hz")
+#: Relative u of the thesis's moment, for another top: those that float on a base differ by less.  Share of the image
+#: that a phone's calibration does not make.
+_MOMENT_U, _UNLIKE = 0.1, 0.2
 #: How the names of a film's track and of its spin end.
 _TRACKS, _SPIN = ".tracks.csv", ".spin.csv"
 #: Columns of a film from beside; the spin falls by this much at least [Hz]; order of its polynomial; fewest pictures.
@@ -50,6 +60,7 @@ class SwayReadings(Readings):
         height: [m]; None where the table has none, or not for each place.
         spin: [Hz]; None where the table has none.
         warnings: about the file.
+        sensor: what saw the top's field, from which the places are; None: they were seen.
     """
 
     time: Array
@@ -58,6 +69,7 @@ class SwayReadings(Readings):
     height: Array | None
     spin: Array | None
     warnings: tuple[str, ...]
+    sensor: Sensor | None = None
 
     compared: ClassVar[tuple[str, ...]] = ("time", "y", "x")
 
@@ -67,24 +79,64 @@ def read_track_file(path: Path, options: InputOptions) -> SwayReadings:
     try:
         table = read_table(path, quantities=QUANTITIES, needed=NEEDED, **options.of_tables | {"guess": False})
     except NoSuchColumn as missing:
-        raise (_field_alone(path) or missing) from None
+        if (of_field := _of_field(path, options)) is not None:
+            return of_field
+        raise missing from None
     readings = _readings(table)
     readings = readings if readings.spin is not None else _with_spin_beside(path, readings)
     return _with_heights(path, readings, options)
 
 
-def _field_alone(path: Path) -> NoSuchColumn | None:
-    """Return the error for a table of a magnetic field; None for any other."""
+def _of_field(path: Path, options: InputOptions) -> SwayReadings | None:
+    """Return the track in a record of the top's field; None for any other table.
+
+    Three components are those of a phone above the top; two are those of two vertical probes beside it.  Raises
+    NoSuchColumn: the distance is not known.
+    """
     try:
-        plan_of(path, Request({}, _FIELD, _FIELD, guess=False))
+        plan_of(path, Request(options.columns or {}, _FIELD, _FIELD[:3], guess=False))
     except TableError:
         return None
-    return NoSuchColumn(
-        path,
-        "holds the magnetic field: it gives the frequencies of the swings, not their size, nor the tilt of the "
-        "precession, which the split is corrected by; move the top by a known distance to learn how many µT a "
-        "millimetre makes, and write columns x [mm] and y [mm], or film the top",
-    )
+    far = options.sensor_m if isinstance(options, SwayOptions) else None
+    if far is None:
+        raise NoSuchColumn(
+            path,
+            "holds the magnetic field: the option `sensor`, the distance of the top from the phone above it, or from "
+            "two vertical probes beside it, is expected; a record from another place has not the places of the top",
+        )
+    table = read_table(path, quantities=_FIELD, needed=_FIELD[:3], **options.of_tables | {"guess": False})
+    time, x, y = (table.column(name) for name in _FIELD[:3])
+    if time.size < _FEWEST or np.any(np.diff(time) <= 0):
+        raise DataError(f"{path}: {_FEWEST} samples or more, at times that increase, are expected")
+    z, spin = (table.columns.get(name) for name in _FIELD[3:])
+    device = (options.device if isinstance(options, SwayOptions) else None) or Device()
+    moment, u = THESIS["moment"][0], _MOMENT_U
+    if device.top.moment_a_m2 is not None:
+        moment, u = device.top.moment_a_m2, device.top.moment_u_a_m2 / device.top.moment_a_m2
+    sensor = Sensor(far, DISTANCE_U_M, moment, u, z is not None, device.gravity_m_s2)
+    if spin is None and z is not None and getattr(options, "spin_hz", None) is None:
+        record = FieldRecord(time, np.stack([x, y, z], axis=1), ("x", "y", "z"), ())
+        with suppress(DataError):  # too short, or without the line of the spin: then the spin is asked for
+            found = field_readings(path, record, options)
+            spin = np.interp(time, found.time, found.frequency)
+    even, places = slow_part(time, np.asarray(x + 1j * y) / sensor.gain)
+    share = image(even, places)
+    places = without_image(places, share)
+    height = None if z is None else slow_part(time, z)[1].real / sensor.gain
+    spin = None if spin is None else np.interp(even, time, spin)
+    notes = []
+    if abs(share) > _UNLIKE:
+        text = (
+            "the gains of x and y, or the angle between them, are {share:.0f} % off, which is taken away: is the "
+            "magnetometer where it should be?"
+        )
+        notes.append(Text(text, share=100 * abs(share)))
+    if z is None:
+        text = (
+            "probes beside the top do not show the sense of the spin: the one in which the split is positive is taken"
+        )
+        notes.append(Text(text))
+    return SwayReadings(even, places.real, places.imag, height, spin, (*table.warnings, *notes), sensor)
 
 
 def _with_spin_beside(path: Path, readings: SwayReadings) -> SwayReadings:

@@ -11,7 +11,7 @@ from analysis.stability import SymmetricTop, modes
 from analysis.sway import Known, Swings, geometric_magnetism, mirrored, slow_swings, swings_of
 from analysis.sway.lines import NoSwings
 from analysis.sway.orbit import NoSwing
-from analysis.sway.vertical import Vertical, beside, of_heights, of_places
+from analysis.sway.vertical import BESIDE, Vertical, beside, of_heights, of_places
 from levilab.simulator import preset, simulate
 
 RING = Ring(1.40e-3, 0.0, 0.0, 0.030, 0.055)
@@ -89,8 +89,8 @@ def test_the_vertical_swing_has_its_uncertainty(fresh, seen, strength):
             found = of_heights(late, heights, expected, 0.7400 + 0.5945)
         else:
             places = waves @ [4e-3, 6e-3] + noise * fresh.normal(size=(2, late.size)).T @ [1, 1j]
-            places += beside(waves, np.exp(2j * np.pi * rise * late)) @ (strength / 2 * np.exp(1j * first))
-            found = of_places(late, places, waves, np.ones((late.size, 1)), expected)
+            places += beside(waves, np.exp(2j * np.pi * rise * late), BESIDE) @ (strength / 2 * np.exp(1j * first))
+            found = of_places(late, places, waves, np.ones((late.size, 1)), expected, rows=BESIDE)
         pulls.append((found.value - rise) / found.u)
         u.append(found.u)
     assert abs(np.mean(pulls)) < 3 / np.sqrt(trials)  # three standard errors, as of the standard deviation

@@ -19,6 +19,7 @@ from support.commands import command
 from support.paths import ROOT
 
 TRACK = ROOT / "sample_data/sway/track.csv"
+PHONE = TRACK.with_name("phone.csv")
 TRUE_HZ = 0.17490  # (I₃ω₃/m)(B′/2B)² of the thesis's base and inertias, 25.30 g, where it floats, at 30 Hz
 SWAY = ANALYSES["sway"]
 #: The top of the sample data.
@@ -73,11 +74,46 @@ def test_without_a_spin_nothing_is_said_and_an_option_gives_it(found, tmp_path):
     assert abs(geometry.measured.value - TRUE_HZ) < 3 * geometry.measured.u
 
 
-def test_a_record_of_the_field_is_refused_with_the_reason(tmp_path):
-    rows = [(f"{k / 100:.2f}", f"{np.sin(k / 9):.3f}", f"{np.cos(k / 9):.3f}", "40.0") for k in range(300)]
-    titles = ("Time (s)", "Magnetic field x (µT)", "Magnetic field y (µT)", "Magnetic field z (µT)")
-    with pytest.raises(DoesNotSuit, match="how many µT a millimetre makes"):
-        analyze(write(tmp_path / "phone.csv", titles, rows), device=DEVICE, spin_hz=35.0)
+def test_a_phone_above_the_top_shows_the_split_and_the_spin_of_the_film(found):
+    with pytest.raises(DoesNotSuit, match="the option `sensor`"):
+        analyze(PHONE, device=DEVICE)
+    (ran,) = (whole := analyze(PHONE, device=DEVICE, sensor_m=0.12)).runs
+    geometry, film = ran.geometry, found.runs[0]
+    assert abs(geometry.measured.value - TRUE_HZ) < 3 * geometry.measured.u
+    assert geometry.measured.u < 0.03 * TRUE_HZ
+    assert ran.spin[:3] == pytest.approx(film.spin[:3], abs=0.05)  # windows whose middles are 0.3 s apart, of 0.15 Hz/s
+    # the place and the moment: 1 %; three times the error of an amplitude in a film, 2.5 µm
+    assert ran.swings[1].amplitude == pytest.approx(film.swings[1].amplitude, rel=0.03, abs=8e-6)
+    assert ran.swings[1].vertical.u < film.swings[1].vertical.u  # by the third component
+    # the folded spin of a record of 100 samples a second is the slower one: a note of the spin-down's
+    assert whole.all_warnings == []
+
+
+def test_unlike_axes_of_a_magnetometer_are_noticed_and_taken_away(tmp_path):
+    t, x, y, z = np.loadtxt(PHONE, delimiter=",", skiprows=2, encoding="utf-8").T
+    skewed = np.column_stack([t, x, 1.6 * y + 0.1 * x, z])
+    path = tmp_path / "skewed.csv"
+    titles = "Time (s),Magnetic field x (µT),Magnetic field y (µT),Magnetic field z (µT)"
+    np.savetxt(path, skewed, "%.3f", ",", header=titles, comments="", encoding="utf-8")
+    skewed = analyze(path, device=DEVICE, sensor_m=0.12)
+    measured = skewed.runs[0].geometry.measured
+    assert abs(measured.value - TRUE_HZ) < 3 * measured.u
+    (note,) = skewed.all_warnings
+    assert "23 % off" in note  # (1.6 − 1)/(1.6 + 1)
+
+
+def test_two_probes_beside_the_top_show_the_split_but_not_the_sense(found, tmp_path):
+    rows = rows_of(TRACK)
+    titles = ("t [s]", "Bx [µT]", "By [µT]", "f [Hz]")
+    # 3K/d = 2.14 µT/mm at 10 cm; the second probe is 5 mm nearer; its sense is the other one
+    field = [(r["t [s]"], f"{2.14 * float(r['x [mm]']):.4f}", f"{-2.63 * float(r['y [mm]']):.4f}", r["spin [Hz]"])
+             for r in rows]  # fmt: skip
+    (ran,) = (probes := analyze(write(tmp_path / "probes.csv", titles, field), device=DEVICE, sensor_m=0.1)).runs
+    assert abs(ran.geometry.measured.value - TRUE_HZ) < 3 * ran.geometry.measured.u
+    assert "sense of the spin" in " ".join(probes.all_warnings)
+    assert ran.swings[0].amplitude[:2] == pytest.approx(found.runs[0].swings[0].amplitude[:2], rel=0.15)
+    with pytest.raises(DataError, match="the spin is not known"):
+        analyze(write(tmp_path / "alone.csv", titles[:3], [row[:3] for row in field]), device=DEVICE, sensor_m=0.1)
 
 
 def test_all_lines_together_agree_with_the_split(found):
