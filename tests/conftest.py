@@ -48,6 +48,7 @@ SLOW = """
 #: Files with tests of ten seconds and more: they go first of all, so that at the end no worker waits for another's.
 LONGEST = """
     levilab/live/test_practice.py  levilab/live/test_open.py  levilab/reproduce/test_run.py  test_documentation.py
+    levilab/notebook/test_jupyterlab.py
 """
 
 
