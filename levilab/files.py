@@ -98,7 +98,10 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 #: Ends of names of files that people give where a folder is expected.
-_OF_FILES = frozenset({".png", ".pdf", ".svg", ".jpg", ".html", ".json", ".csv", ".txt", ".xlsx", ".nc", ".h5", ".zip"})
+_OF_FILES = frozenset({
+    ".png", ".pdf", ".svg", ".jpg", ".gif", ".mp4", ".html", ".md", ".docx", ".json", ".toml", ".csv", ".txt", ".xlsx",
+    ".nc", ".h5", ".zip",
+})  # fmt: skip
 
 
 def check_folder(name: str, folder: Path | None) -> None:

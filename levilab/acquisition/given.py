@@ -13,10 +13,11 @@ from pydantic import ValidationError
 from levilab.acquisition import experiments
 from levilab.bench.config import Limits
 from levilab.errors import UsageError
+from levilab.formats.typed import read_masses, read_temperature
 from levilab.present.units import split
 from levilab.settings import hint_about
 from levilab.simulator.keys import SceneError, parse_setting
-from levilab.texts.text import Sentences, Text
+from levilab.texts.text import Sentences, Text, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -26,6 +27,17 @@ if TYPE_CHECKING:
 _TYPES = {"number": "a number", "integer": "a whole number", "string": "a text", "boolean": "true or false"}
 #: Lists as they are typed, by the type of what stands in them.
 _LISTS = {"integer": "[1, 3]", "number": "[44.0, 38.0]", "string": '["tape", "laser"]'}
+
+
+def read_conditions(temperature: str | None, washers: str | None) -> tuple[float | None, tuple[float, ...] | None]:
+    """Return temperature [°C] and masses of washers [kg] that were typed; None: not given.  Raises UsageError."""
+    found: list[Any] = []
+    for name, text, read in (("temperature", temperature, read_temperature), ("washers", washers, read_masses)):
+        try:
+            found.append(None if text is None else read(text))
+        except ValueError as error:
+            raise UsageError(name, text_of(error), value=text or None) from error
+    return found[0], found[1]
 
 
 def settings_without_bench(experiment: str) -> ExperimentSettings:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import secrets
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
 from analysis.numbers import digits
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiment import CounterSettings
-from levilab.acquisition.given import with_given_settings
+from levilab.acquisition.given import read_conditions, with_given_settings
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
 from levilab.bench.config import BenchConfig, ConfigError, read_bench
@@ -20,7 +20,6 @@ from levilab.bench.kinds import COUNTER, KINDS, estimates_u
 from levilab.bench.person import ask_no_person
 from levilab.bench.wiring import described_wiring
 from levilab.errors import DataError, LevilabError, UsageError
-from levilab.formats.typed import read_masses, read_temperature
 from levilab.runs.find import run_to_resume
 from levilab.runs.run import LONGEST_GROUP, Run
 from levilab.settings import in_one_line
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     from levilab.bench.wiring import Wiring
     from levilab.simulator.scene import Scene
 
-T = TypeVar("T")
 
 HOW = (
     "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, {what}, "
@@ -131,6 +129,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
     _check_given(config, without, experiment)
     config = with_settings(config, experiment, _suited(config, experiment))
     _refuse_unused(options, config, experiment)
+    temperature_c, washers_kg = read_conditions(options.temperature, options.washers)
     request = AcquisitionRequest(
         experiment,
         config,
@@ -138,8 +137,8 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
         out=options.out,
         group=_group(options.group),
         note=options.note,
-        temperature_c=_typed("temperature", options.temperature, read_temperature),
-        washers_kg=_typed("washers", options.washers, read_masses),
+        temperature_c=temperature_c,
+        washers_kg=washers_kg,
         wire_log=options.wire_log,
         resume=run,
         named=named,
@@ -178,13 +177,6 @@ def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: boo
             raise UsageError(name, Text("goes with a new run: a resumed run keeps its {name}", name=name))
     if options.realtime and not virtual:
         raise UsageError("realtime", "goes with `mock`: a real bench always keeps to the wall clock")
-
-
-def _typed(name: str, text: str | None, read: Callable[[str], T]) -> T | None:
-    try:
-        return None if text is None else read(text)
-    except ValueError as error:
-        raise UsageError(name, text_of(error), value=text or None) from error
 
 
 def _group(typed: str | None) -> str:

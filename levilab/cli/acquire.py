@@ -116,7 +116,11 @@ def acquire_experiment(
         *[SHORT["upper"]] * upper,
     )
     with importing():
-        if given and mock and not (bench or resume):  # wrong ones are refused before the rest is imported
+        if temperature or washers:  # wrong ones are refused before the rest is imported
+            from levilab.acquisition.given import read_conditions
+
+            read_conditions(temperature, washers)
+        if given and mock and not (bench or resume):
             from levilab.acquisition.given import settings_without_bench, with_given_settings
 
             with_given_settings(settings_without_bench(experiment), experiment, given)

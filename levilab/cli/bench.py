@@ -28,7 +28,7 @@ def bench_init(
     library: Annotated[
         str, option("NAME", "PyVISA's library: @py is its own, '' a vendor's, @levilab virtual.")
     ] = "@py",
-    out: Annotated[Path, place("FILE", "The file to write.")] = Path("bench.toml"),
+    out: Annotated[Path, place("FILE", "The file to write.", (".toml",))] = Path("bench.toml"),
     force: Annotated[
         bool, flag("Replace the file if it is there; write one to fill in if no instrument answers.", "--force")
     ] = False,

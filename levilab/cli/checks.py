@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from levilab.cli import exit_codes
-from levilab.cli.options import Json, among, argument, existing_paths, flag, option, place, writable
+from levilab.cli.options import Json, among, argument, existing_paths, flag, option, place
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.crosscheck.names import ROWS
 from levilab.errors import UsageError
@@ -43,7 +43,7 @@ def crosscheck(
             "--calibrate",
         ),
     ] = False,
-    out: Annotated[Path | None, place("DIR", "Write crosscheck.json and .png there.", callback=writable)] = None,
+    out: Annotated[Path | None, place("DIR", "Write crosscheck.json and .png there.")] = None,
     as_json: Json = False,
 ) -> None:
     """Check the analyses, and end with 1 where an estimate or an uncertainty is wrong."""
@@ -80,8 +80,8 @@ def reproduce(
         place(
             "FILE",
             r"The report; its ending, .html or .pdf, chooses the format.  PDF needs levilab\[pdf].",
+            (".html", ".pdf"),
             show_default="reproduce.html, and none with --json",
-            callback=writable,
         ),
     ] = None,
     only: Annotated[

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import HEADING, Language, Paths, among, argument, flag, option, place, writable
+from levilab.cli.options import HEADING, Language, Paths, among, argument, flag, option, place
 from levilab.cli.output import interruptible, message, result
 from levilab.errors import UsageError
 from levilab.pipelines.options import OF_REPORT, read_options
@@ -24,7 +24,7 @@ def _named_sheets(names: list[str] | None) -> list[str]:
 def of_class(
     paths: Paths = None,
     out: Annotated[
-        Path, place("FILE", "The file to write; its ending is .html, .pdf or .xlsx.", callback=writable)
+        Path, place("FILE", "The file to write; its ending is .html, .pdf or .xlsx.", (".html", ".pdf", ".xlsx"))
     ] = Path("class.html"),
     language: Language = "en",  # noqa: ARG001 - its callback speaks it
     **given: Any,

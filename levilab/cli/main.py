@@ -15,7 +15,7 @@ from levilab.cli.importing import importing
 from levilab.cli.later import Later
 from levilab.cli.options import speak_from
 from levilab.cli.output import message, silence
-from levilab.cli.quantities import APPLICATION, in_options
+from levilab.cli.quantities import APPLICATION, command_of, in_options
 
 
 class Commands(typer.core.TyperGroup):
@@ -297,7 +297,7 @@ def main() -> None:
     # where another program has a core (docs/speed.md)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        app()
+        command_of(app)()
     except BrokenPipeError:  # the reader closed the pipe
         for stream in (sys.stdout, sys.stderr):
             silence(stream)

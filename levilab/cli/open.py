@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from levilab.cli.analyze import takes_options, write_and_print
-from levilab.cli.options import Json, Language, argument, existing_paths, flag, place, writable
+from levilab.cli.options import Json, Language, argument, existing_paths, flag, place
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.errors import NoneUsable, UsageError
 from levilab.pipelines.options import OF_FILES, read_options
@@ -30,7 +30,7 @@ def open_files(
         ),
     ] = None,
     keep: Annotated[bool, flag("Keep the options in FILE.levilab.toml, which every analysis reads.", "--keep")] = False,
-    out: Annotated[Path | None, place("FILE", "Write the report, .html or .pdf.", callback=writable)] = None,
+    out: Annotated[Path | None, place("FILE", "Write the report, .html or .pdf.", (".html", ".pdf"))] = None,
     browser: Annotated[
         bool | None,
         flag(

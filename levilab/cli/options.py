@@ -63,9 +63,24 @@ def quantity(metavar: str, unit: str, text: str, *, low: float = -math.inf, high
     return option(metavar, text, parser=number(unit, low=low, high=high), **more)
 
 
-def place(metavar: str, text: str, **more: Any) -> Any:
-    """Return the option for where a command writes, which has one name in all of them; see `option`."""
-    return option(metavar, text, "--out", "-o", **more)
+def place(metavar: str, text: str, endings: Collection[str] = (), **more: Any) -> Any:
+    """Return the option for where a command writes, which has one name in all of them; see `option`.
+
+    Args:
+        metavar: of a folder DIR or NAME.zarr, which refuses the names of files.
+        text: the help.
+        endings: of the files that the command writes; it refuses others.
+        more: of typer.Option.
+    """
+
+    def check(path: Path | None) -> Path | None:
+        if path is not None and endings and path.suffix.lower() not in endings:
+            *some, last = endings
+            named = f"{', '.join(some)} or {last}" if some else last
+            raise UsageError("out", f"a name that ends in {named} is expected", value=path)
+        return writable(path) if endings else folder(path)
+
+    return option(metavar, text, "--out", "-o", **{"callback": check, **more})
 
 
 def writable(path: Path | None) -> Path | None:
@@ -84,7 +99,7 @@ def folder(path: Path | None) -> Path | None:
         from levilab.files import check_folder
 
         check_folder("out", path)
-    return path
+    return path if path is None or path.suffix == ".zarr" else writable(path)
 
 
 def existing_paths(paths: list[Path] | None) -> list[Path] | None:

@@ -23,25 +23,39 @@ APPLICATION: list[typer.Typer] = []
 
 
 @cache
-def option_names() -> dict[str, tuple[str, str]]:
+def option_names(*, made: bool = False) -> dict[str, tuple[str, str]]:
     """Return quantity → the options that set it and switch it off (empty if there is none), of all commands.
 
     A quantity has the name of the parameter by which a command takes it.
+
+    Args:
+        made: of the commands alone whose options are read already, as those of the one that was called.
     """
     return {
         parameter.name: (parameter.opts[0], next(iter(parameter.secondary_opts), ""))
         for app in APPLICATION
-        for parameter in _parameters(typer.main.get_command(app))
+        for parameter in _parameters(command_of(app), made=made)
         if parameter.opts[0].startswith("--")
     }
 
 
-def _parameters(command: Any) -> Iterator[Any]:
+#: The command of an application, which is not made anew: those below it that were called keep their options.
+command_of = cache(typer.main.get_command)
+
+
+def _parameters(command: Any, *, made: bool) -> Iterator[Any]:
     if isinstance(command, Later):
+        if made and "command" not in vars(command):
+            return
         command = command.command
     yield from command.params
     for below in getattr(command, "commands", {}).values():
-        yield from _parameters(below)
+        yield from _parameters(below, made=made)
+
+
+def _option(name: str) -> tuple[str, str] | None:
+    """Return the options of a quantity; commands that were not called are asked last, for their imports."""
+    return option_names(made=True).get(name) or option_names().get(name)
 
 
 def in_options(error: Exception) -> str:
@@ -50,7 +64,7 @@ def in_options(error: Exception) -> str:
 
     if not isinstance(error, UsageError):
         return with_options(in_language(text_of(error)))
-    head = option_names().get(error.name, (error.name, ""))[0]
+    head = (_option(error.name) or (error.name, ""))[0]
     given = head if error.value is None else f"{head} {error.value}"
     return f"{given}: {with_options(in_language(error.text))}"
 
@@ -59,11 +73,10 @@ def with_options(text: str) -> str:
     """Return a message with options in the place of quantities."""
     if not _QUANTITY.search(text):
         return text
-    names = option_names()
 
     def option(match: re.Match[str]) -> str:
         name, setting = match[1], match[2] or ""
-        found = names.get(name) or names.get(name.rpartition("_")[0])  # `height_m` is --height, which takes a number
+        found = _option(name) or _option(name.rpartition("_")[0])  # `height_m` is --height, which takes a number
         if found is None:
             return match[0]
         on, off = found

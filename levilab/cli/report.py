@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from levilab.cli.analyze import takes_options
-from levilab.cli.options import HEADING, Json, Language, Paths, argument, existing_path, flag, option, place, writable
+from levilab.cli.options import HEADING, Json, Language, Paths, argument, existing_path, flag, option, place
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.pipelines.options import OF_REPORT, read_options
 
@@ -17,7 +17,7 @@ def report(
         place(
             "FILE",
             r"The file to write; its ending, .html or .pdf, chooses the format.  PDF needs levilab\[pdf].",
-            callback=writable,
+            (".html", ".pdf"),
         ),
     ] = Path("report.html"),
     tables: Annotated[
@@ -70,7 +70,7 @@ def runs(
     folder: Annotated[
         Path | None, argument("[DIR]", "The folder to search.", readable=False, show_default="runs")
     ] = None,
-    out: Annotated[Path | None, place("DIR", "The same, as acquire has it.", readable=False)] = None,
+    out: Annotated[Path | None, place("DIR", "The same, as acquire has it.", readable=False, callback=None)] = None,
     last: Annotated[int | None, option("N", "The latest N runs alone.", min=1)] = None,
     as_json: Json = False,
 ) -> None:

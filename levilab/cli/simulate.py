@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from levilab.cli.options import Json, Presets, Settings, flag, option, place, quantity, writable
+from levilab.cli.options import Json, Presets, Settings, flag, option, place, quantity
 from levilab.cli.output import interruptible, message, print_json
 from levilab.cli.quantities import with_options
 from levilab.errors import UsageError
@@ -203,9 +203,7 @@ def _simulate_map(
 @benchmark_app.command("simulator", epilog="Example: levilab benchmark simulator --out speed")
 def benchmark_simulator(
     quick: Annotated[bool, flag("Fewer points and repetitions: a first look.", "--quick")] = False,
-    out: Annotated[
-        Path | None, place("DIR", "Write simulator.json and simulator.png there.", callback=writable)
-    ] = None,
+    out: Annotated[Path | None, place("DIR", "Write simulator.json and simulator.png there.")] = None,
     as_json: Json = False,
 ) -> None:
     r"""Measure speed and error of the simulator, with scipy's and heyoka's integrators on the same motion.
@@ -223,9 +221,7 @@ def benchmark_estimators(
     trials: Annotated[int, option("N", "Traces of each kind; 400 take about ten minutes.", min=10)] = 400,
     case: Annotated[list[str] | None, option("NAME", "Only this hard case, as '50 Hz'; repeatable.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Other traces of the same kinds.")] = 2026,
-    out: Annotated[
-        Path | None, place("DIR", "Write estimators.json and estimators.png there.", callback=writable)
-    ] = None,
+    out: Annotated[Path | None, place("DIR", "Write estimators.json and estimators.png there.")] = None,
     as_json: Json = False,
 ) -> None:
     """Measure error and speed of the estimators of a pulse frequency, beside an FFT, an autocorrelation and find_peaks.

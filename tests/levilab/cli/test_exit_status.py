@@ -32,7 +32,31 @@ WRONG_USAGE = {
     f"analyze spindown {SAMPLE} --reading-u 0": "--reading-u 0: ",
     f"analyze spindown {SAMPLE} --reading-u -0.1": "--reading-u -0.1: ",
     f"analyze spindown {SAMPLE} --reading-u nan": "--reading-u nan: ",
-    f"analyze spindown {SAMPLE} -o out.png": "--out out.png: a folder is expected",
+    **{
+        f"{words} -o out.png": "--out out.png: a folder is expected"
+        for words in (
+            f"analyze spindown {SAMPLE}",
+            "acquire spin --mock",
+            "simulate undriven",
+            "worksheet spin",
+            "live",
+            "sweep undriven --sweep start.spin_hz=20:22:2",
+            "stability undriven --map",
+            "crosscheck spin",
+        )
+    },
+    **{
+        f"{words} -o out.png": "--out out.png: a name that ends in"
+        for words in (
+            f"report {SAMPLE}",
+            f"export {SAMPLE}",
+            f"open {SAMPLE}",
+            f"class {SAMPLE}",
+            "reproduce",
+            "bench init",
+        )
+    },
+    "worksheet": "EXPERIMENT: name some of spin, limit",
     f"export {SAMPLE} {SCOPE} -o x.nc": "one run, file or sweep is exported at a time",
     "simulate undriven --set top.mass_kg=25lb": "--set: top.mass_kg = '25lb': a number in kg, g or mg is expected",
     "acquire spin --mock --set gate_s=3x": "--set: spin.gate_s = '3x': a number in s, ms",
@@ -121,7 +145,7 @@ FAILURES = {
     "runs file": "file: is a file",
     "simulate nowhere.toml": "nowhere.toml: there is no such file",
     "simulate undriven --duration 0.01 --out file": "choose another place with --out",
-    "stability undriven --map --out file": "give another folder with --out",
+    "stability undriven --map --out file": "choose another place with --out",
     "bench check --bench other.toml": "other.toml: there is no such file",
     "bench init --library @levilab --out nowhere/bench.toml": "nowhere is no folder",
     "bench init --library @levilab": "bench.toml is there already",
