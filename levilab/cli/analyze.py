@@ -10,7 +10,7 @@ import typer
 
 from analysis.numbers import how_many
 from levilab.cli.later import Later, NamedLast
-from levilab.cli.options import Json, Language, Paths, existing_path, flag, number, option, place
+from levilab.cli.options import Json, Language, Paths, existing_path, flag, folder, number, option, place
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError
@@ -110,7 +110,7 @@ def _command(kind: str) -> Callable[..., None]:
                 show_default="save; with --table no-save",
             ),
         ] = None,
-        out: Annotated[Path | None, place("DIR", "Write them there instead.")] = None,
+        out: Annotated[Path | None, place("DIR", "Write them there instead.", callback=folder)] = None,
         table: Annotated[
             Path | None,
             option(

@@ -78,7 +78,8 @@ def place(metavar: str, text: str, endings: Collection[str] = (), **more: Any) -
             *some, last = endings
             named = f"{', '.join(some)} or {last}" if some else last
             raise UsageError("out", f"a name that ends in {named} is expected", value=path)
-        return writable(path) if endings else folder(path)
+        named = path if endings else folder(path)
+        return named if named is None or named.suffix == ".zarr" else writable(named)
 
     return option(metavar, text, "--out", "-o", **{"callback": check, **more})
 
@@ -99,7 +100,7 @@ def folder(path: Path | None) -> Path | None:
         from levilab.files import check_folder
 
         check_folder("out", path)
-    return path if path is None or path.suffix == ".zarr" else writable(path)
+    return path
 
 
 def existing_paths(paths: list[Path] | None) -> list[Path] | None:
