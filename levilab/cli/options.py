@@ -78,8 +78,8 @@ def place(metavar: str, text: str, endings: Collection[str] = (), **more: Any) -
             *some, last = endings
             named = f"{', '.join(some)} or {last}" if some else last
             raise UsageError("out", f"a name that ends in {named} is expected", value=path)
-        named = path if endings else folder(path)
-        return named if named is None or named.suffix == ".zarr" else writable(named)
+        target = path if endings else folder(path)
+        return target if target is None or target.suffix == ".zarr" else writable(target)
 
     return option(metavar, text, "--out", "-o", **{"callback": check, **more})
 
