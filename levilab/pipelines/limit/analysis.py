@@ -24,7 +24,7 @@ from levilab.runs.events import RunEvent
 from levilab.simulator.keys import SceneError
 from levilab.simulator.published.printed import published
 from levilab.simulator.scene import Scene, scene_of
-from levilab.stability.thesis import is_thesis_device
+from levilab.stability.thesis import ISLANDS_HZ, is_thesis_device
 from levilab.texts.note import Note
 from levilab.texts.text import Sentences, Text
 
@@ -86,6 +86,9 @@ RESONANCE = "resonance of the wobble"
 #: Names of what other experiments reached.  Simon's top is another one: it is compared as a part of its own edge.
 THESIS_HIGHEST, THESIS_LOOSE = "thesis's highest spin", "the same with loose washers"
 SIMON = "Simon's top 3, as a part of its upper edge"
+#: From there on a simulated top is up or lost by its start; half-width of that spin [Hz], by which an error of the
+#: simulation that is a tenth moves it.
+ISLANDS, ISLANDS_WITHIN_HZ = "where the islands of simulated tops begin", 1.0
 #: Name → spin that the thesis's device reached, as printed.
 _REACHED = {
     THESIS_HIGHEST: published("thesis")["measured.highest"],
@@ -113,11 +116,12 @@ class Device:
     def expected_spins(self, which: Which) -> dict[str, tuple[float, float]]:
         """Name → spin that a limit is compared with, and its standard uncertainty [Hz]."""
         if which == "upper":
-            reached = {name: (one.value, one.rounding / 3**0.5) for name, one in _REACHED.items() if self.is_thesis}
+            reached = {name: (one.value, one.rounding / 3**0.5) for name, one in _REACHED.items()}
+            of_thesis = {ISLANDS: (ISLANDS_HZ[0], ISLANDS_WITHIN_HZ / 3**0.5)} | reached
             return {
                 UPPER_EDGE: (self.linear_upper_hz, 0.0),
                 SIMON: (_simon_share() * self.linear_upper_hz, 0.0),
-            } | reached
+            } | (of_thesis if self.is_thesis else {})
         resonance = {} if self.resonance_hz is None else {RESONANCE: (self.resonance_hz, 0.0)}
         return {LOWER_EDGE: (self.linear_lower_hz, 0.0)} | resonance
 
