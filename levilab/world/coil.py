@@ -16,6 +16,8 @@ from levilab.world.timeline import Timeline
 
 Array = NDArray[np.float64]
 Edges = Callable[[float, float, bool], Array]
+#: A top that floats passes its tape in less: whether a pulse is under way is told by the edges before [s].
+_PULSE_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -63,19 +65,36 @@ class _Stretch:
         signal = voltage(replace(self.output, amplitude=bursts.amplitude), turns, times)
         return np.where(playing, signal, self.output.offset)
 
+    def trains(self, first: float, last: float, edges: Edges) -> tuple[Array, Array]:
+        """Return when trains of cycles behind a gate start and end [s], with those from first to last."""
+        rate, delay = self.output.frequency, self.output.closes or 0.0
+        start = max(self.cycles.at(first), self.origin - self.turns % 1.0 / rate)
+        since = max(start, self.origin) - delay
+        closes, opens = (edges(since, last, rising) + delay for rising in (True, False))
+        before = [edges(since - _PULSE_S, since, rising).max(initial=-math.inf) for rising in (True, False)]
+        # a cycle that is under way is completed; one that begins needs an open gate
+        return gated_trains(start, 1 / rate, closes, opens, closed=start == self.origin and before[0] > before[1])
+
     def _gated_field(self, times: Array, edges: Edges) -> Array:
         """Return the field of cycles behind a gate that pulses at the trigger input close."""
-        rate, delay, first = self.output.frequency, self.output.closes or 0.0, float(times[0])
-        start = max(self.cycles.at(first), self.origin - self.turns % 1.0 / rate)
-        since, last = max(start, self.origin) - delay, float(times[-1])
-        closes, opens = (edges(since, last, rising) + delay for rising in (True, False))
-        starts, ends = gated_trains(start, 1 / rate, closes, opens)
+        rate, first = self.output.frequency, float(times[0])
+        starts, ends = self.trains(first, float(times[-1]), edges)
         train = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
         begun, until = float(starts[train[0]]), min(first, float(ends[train[0]]))
-        self.cycles.cut(first)
-        self.cycles.append(first, begun + max(math.ceil((until - begun) * rate - 1e-9) - 1, 0) / rate)
-        signal = voltage(self.output, rate * (times - starts[train]), times)
-        return np.where(times < ends[train], signal, self.output.offset)
+        if begun <= first:
+            self.cycles.cut(first)
+            self.cycles.append(first, begun + max(math.ceil((until - begun) * rate - 1e-9) - 1, 0) / rate)
+        playing = (times >= starts[train]) & (times < ends[train])
+        turns = rate * np.where(playing, times - starts[train], 0.0)
+        return np.where(playing, voltage(self.output, turns, times), self.output.offset)
+
+    def turns_at(self, time: float, edges: Edges | None) -> float:
+        """Return the turns that the waveform has made; of one that waits for its gate none."""
+        if self.output.closes is None or edges is None:
+            return self.turns + self.output.frequency * (time - self.origin)
+        starts, ends = self.trains(time, time, edges)
+        k = max(int(np.searchsorted(starts, time, side="right")) - 1, 0)
+        return self.output.frequency * (time - float(starts[k])) if starts[k] <= time < ends[k] else 0.0
 
 
 class Coil:
@@ -107,17 +126,15 @@ class Coil:
         if not same:
             self.history.append(time, self._next(last, time, output))
 
-    @staticmethod
-    def _next(last: _Stretch, time: float, output: Output) -> _Stretch:
+    def _next(self, last: _Stretch, time: float, output: Output) -> _Stretch:
         if not last.output.amplitude:
             return _Stretch(output, time, 0.0)
         burst = output.burst
         if burst is not None and burst.period is not None:  # bursts that start by themselves keep their rhythm
             same = (last.output.burst, last.output.frequency) == (burst, output.frequency)
             return _Stretch(output, last.origin if same else time, 0.0)
-        turns = last.turns + last.output.frequency * (time - last.origin)
         # the random bits repeat after 127 turns, all others after one
-        return _Stretch(output, time, turns % 127.0)
+        return _Stretch(output, time, last.turns_at(time, self._edges) % 127.0)
 
     def turns(self, time: float) -> float:
         """Return the turns that the waveform has made at this time, without the phase that it is set to."""

@@ -189,6 +189,37 @@ def test_a_gated_field_is_the_same_in_blocks_of_all_phases_of_a_pulse():
         assert coil.field(np.arange(first, 12_000) / 1000) == pytest.approx(whole[first:], abs=1e-9)
 
 
+def gate_of(*pulses):
+    """Return the edges of pulses from and to some times [s]."""
+    return lambda start, stop, rising: np.array([p[not rising] for p in pulses if start <= p[not rising] <= stop])
+
+
+def test_no_cycle_passes_a_gate_that_is_closed_at_the_start():
+    times = np.arange(1000) / 1000
+    coil = Coil(gate_of((-0.05, 0.13), (0.5, 0.6)))
+    coil.change(0.0, Output("SQU", 10.0, 1.0, 0.0, burst=Burst(math.inf, None), closes=0.0))
+    for field in (coil.field(times), np.concatenate([coil.field(part) for part in np.split(times, 100)])):
+        assert np.flatnonzero(field)[0] == 130
+        assert not field[(times > 0.5305) & (times < 0.5995)].any()  # the cycle that began at 0.43 s is completed
+        assert field[(times > 0.1305) & (times < 0.5295)].all()
+
+
+def test_a_change_of_frequency_keeps_the_phase_that_the_waits_of_a_gate_leave():
+    times = np.arange(1000) / 1000
+    gated = Output("SIN", 10.0, 1.0, 0.0, burst=Burst(math.inf, None), closes=0.0)
+    coil = Coil(gate_of((0.05, 0.13), (0.50, 0.60)))  # cycles from 0.13 s on, then from 0.6 s on
+    coil.change(0.0, gated)
+    coil.change(0.345, replace(gated, frequency=20.0))  # at 0.15 turns of a cycle
+    field = coil.field(times)
+    after = (times > 0.3455) & (times < 0.5)
+    assert field[after] == pytest.approx(np.sin(2 * np.pi * (0.15 + 20.0 * (times[after] - 0.345))), abs=1e-9)
+    coil.change(0.55, replace(gated, frequency=25.0))  # while it waits
+    field = coil.field(times)
+    assert not field[(times > 0.5505) & (times < 0.5995)].any()
+    late = times > 0.6005
+    assert field[late] == pytest.approx(np.sin(2 * np.pi * 25.0 * (times[late] - 0.6)), abs=1e-9)
+
+
 def test_an_edge_doubled_within_a_burst_starts_none():
     edges = np.sort(np.concatenate([np.arange(30) / 30, np.arange(30) / 30 + 0.004]))
     assert burst_starts(edges, 1 / 33) == pytest.approx(np.arange(30) / 30)
