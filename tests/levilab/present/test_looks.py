@@ -4,11 +4,8 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from levilab.present.looks import LOOKS, TOGETHER
-
-Array = NDArray[np.float64]
 
 #: What the colour-blind see of linear red, green and blue: Machado, Oliveira, Fernandes (IEEE TVCG 15, 1291, 2009),
 #: severity 1.

@@ -24,7 +24,6 @@ from levilab.world.base import Base
 from support.figures import faults
 
 #: A top alone: the base is taken from the run.
-TOP_OF_THESIS = Device.model_validate({"top": {"moment_a_m2": 0.714}})
 #: The base as it is.
 CALLIPER = Device.model_validate(
     {"base": {"inner_radius_m": 0.03, "inner_radius_u_m": 0.0, "outer_radius_m": 0.055, "outer_radius_u_m": 0.0,

@@ -25,7 +25,6 @@ from support.pages import Page
 pytestmark = pytest.mark.usefixtures("drawn_figures")  # texts of a figure, and its ids, are in the page, too
 
 EVIL = "</script></style></svg><b onclick=x>{{7*7}}${x}\"'&"
-NAMES = ("a", EVIL)
 
 
 def document(text):
