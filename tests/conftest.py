@@ -61,7 +61,7 @@ def pytest_collection():
     """
     gc.disable()
     compiled = Path(__file__).parent / "__pycache__"
-    if "PYTEST_XDIST_WORKER" in os.environ and not sys.dont_write_bytecode:
+    if "PYTEST_XDIST_WORKER" in os.environ and compiled.is_dir() and not sys.dont_write_bytecode:
         with FileLock(compiled / "first.lock"):
             if not any(compiled.glob("test_*.pyc")):
                 return (yield)

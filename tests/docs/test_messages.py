@@ -5,7 +5,8 @@ import re
 
 import pytest
 
-from support.paths import DOCS, ROOT
+from support.paths import DOCS
+from support.sources import sources
 
 QUOTED = re.findall(r"^### (.+)$", (DOCS / "messages.md").read_text(encoding="utf-8"), re.MULTILINE)
 
@@ -22,8 +23,7 @@ def as_printed(node):
 @pytest.fixture(scope="module")
 def texts():
     """Every literal text of the program."""
-    sources = (path for room in ("levilab", "instruments") for path in (ROOT / room).rglob("*.py"))
-    nodes = (node for path in sources for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    nodes = (node for tree in sources().values() for node in ast.walk(tree))
     return "\n".join(filter(None, map(as_printed, nodes)))
 
 
