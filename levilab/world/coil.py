@@ -16,7 +16,7 @@ from levilab.world.timeline import Timeline
 
 Array = NDArray[np.float64]
 Edges = Callable[[float, float, bool], Array]
-#: A top that floats passes its tape in less: whether a pulse is under way is told by the edges before [s].
+#: A top that floats passes its tape in less: the edges before show whether a pulse is under way [s].
 _PULSE_S = 0.2
 
 
