@@ -196,9 +196,12 @@ class Visit:
         typed: dict[str, Any] = dict(plan.typed) if life.number == 0 else {}
         if "settings" in typed:
             settings = (*settings, typed.pop("settings"))
+        models = plan.models if plan.mock and resume is None else {}  # a bench file names them
         options = AcquisitionOptions(
             mock=plan.mock,
             bench=None if plan.mock else _BENCH,
+            counter=models.get("counter"),
+            scope=models.get("oscilloscope"),
             out=_RUNS,
             seed=plan.seed if plan.mock and resume is None else None,
             settings=settings,
