@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -19,6 +20,7 @@ from levilab.present.document.blocks import (
     Paragraph,
     Picture,
     Section,
+    Tabular,
     Verdict,
     Warnings,
     with_marks,
@@ -115,13 +117,18 @@ def blocks_of_part(
         for doubtful in (True, False)
     )
     doubts = [Warnings(grave)] if grave else []
-    values = part.values if asked.short and part.values else part.result
+    numbers = tuple(block for block in part.result if isinstance(block, Tabular))[:1]
+    values = part.values or numbers if asked.short else part.result
     blocks = [
         section("Result", "result", *doubts, Verdict(_verdict(found)), *values),
         section("Figure", "figure", picture_of(analysis, found, part, short=asked.short)),
-        *([section("Notes", "notes", Warnings(notes))] if notes else []),
     ]
-    if not asked.short:
+    if asked.short:
+        under = _conditions(found, part) if len(found.sources) == 1 else ()
+        both: list[Block] = [*([Warnings(notes)] if notes else []), *under]
+        blocks += [section("Notes and conditions" if under else "Notes", "notes", *both)] if both else []
+    else:
+        blocks += [section("Notes", "notes", Warnings(notes))] if notes else []
         blocks += [_budget(analysis, found), *_trials(analysis, found, made=asked.crosscheck)]
         blocks += [section(part.runs_title, "runs", *part.runs)] if part.runs else []
     return with_marks(blocks, mark_of(found.sources))
@@ -177,6 +184,7 @@ def picture_of(analysis: Analysis[A], found: A, part: ReportPart, *, short: bool
         draw=partial(analysis.figure, found, short=words is part.short_figure),
         points=() if many else words.points,
         raster=many,
+        most_inch=_SHORT_INCH if short else math.inf,
     )
 
 
@@ -207,6 +215,21 @@ def _lead(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
     count = sum(map(len, found.grouped_warnings))
     notes = Text("{n} notes", n=count) if count > 1 else "1 note" if count else "no notes"
     return Text("{inputs}, {used}, {notes}", inputs=count_inputs(found.sources), used=part.lead, notes=notes)
+
+
+#: Height of the figure in a short report, which leaves room for the rest of the page [inch].
+_SHORT_INCH = 3.0
+#: What a short report says of its input, unless it is longer than some lines.
+_SHORT_LETTERS = 300
+_SHORT_FACTS = frozenset({"Group", "Note", "Temperature", "Washers", "When", "Drive", "Conditions"})
+
+
+def _conditions(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> tuple[Note, ...]:
+    """Return under which conditions the only input was measured, in a line."""
+    facts = describe([About(found.sources[0], part, part.inputs[0], several=False)]).facts
+    said = [Text("{name}: {texts}", name=one.name, texts=one.texts) for one in facts if one.name in _SHORT_FACTS]
+    few = [text for text in said if len(text) <= _SHORT_LETTERS]
+    return (Note(Sentences(*few, between=". ")),) if few else ()
 
 
 def _measurements(results: Results, parts: Sequence[ReportPart]) -> Section:

@@ -14,6 +14,8 @@ const USUAL_HZ = [20, 35];
 /** A count is shown until the next should be there, a gate and this time after its own gate [s]; then, and after a jump
  * that no top makes [Hz], there is a gap. */
 const COUNTED_S = 2, JUMP_HZ = 1;
+/** The counts whose slope is shown [s]: a free top's is then known to some percent. */
+const TREND_S = 12;
 /** Changes of the drive's frequency that are kept, to count its turns: a ramp makes two a second. */
 const MOST_CHANGES = 100;
 const LEFT = 58, LEAST_RIGHT_PX = 84, TOP = 10, BOTTOM = 34, GAP = 24;
@@ -47,6 +49,14 @@ export function openHistory() {
     get latest() {
       const last = counts.at(-1);
       return last && drives.at(-1)[0] - last[3] <= 2 * (last[3] - last[0]) + COUNTED_S ? last : null;
+    },
+
+    /** The slope of the counts of the last seconds, behind the last gap [Hz/s]; NaN where they are few. */
+    get trend() {
+      const whole = counts.slice(counts.findLastIndex(([, spin]) => !Number.isFinite(spin)) + 1), now = drives.at(-1)?.[0];
+      const last = whole.filter(([time]) => time >= now - TREND_S), mean = (k) => last.reduce((sum, row) => sum + row[k], 0) / last.length;
+      const [time, spin] = [mean(0), mean(1)], sum = (of) => last.reduce((all, row) => all + of(row[0] - time, row[1] - spin), 0);
+      return last.length < 3 ? NaN : sum((t, f) => t * f) / sum((t) => t * t);
     },
 
     /** When the drive began its last period before a time; the time itself while it is off [s]. */

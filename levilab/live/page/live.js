@@ -6,7 +6,7 @@ import {drawHistory, openHistory} from "./history.js";
 import {drawReadings, drawRecords, saidOf, sheet, tableOf} from "./plot.js";
 import {openPractice, watchPractice} from "./practice.js";
 import {openSound} from "./sound.js";
-import {between, by, fixed, lapse, make, option, phrase, put, short, turnLanguage, typeset, write} from "./words.js";
+import {LANGUAGE, between, by, fixed, lapse, make, option, phrase, put, short, turnLanguage, typeset, write} from "./words.js";
 
 /** Least time between two spoken readings; an event is spoken at once, if it is not older [ms]. */
 const SPOKEN_EVERY_MS = 30_000, NEWS_MS = 10_000;
@@ -325,7 +325,7 @@ function showCounter(bench, last) {
   const spin = live.spin_frequency_hz ?? before.spin_frequency_hz ?? live.spin_seen_hz ?? before.spin_seen_hz;
   write("spin-value", Number.isFinite(spin) ? fixed(spin, 4) : NO_VALUE);
   stale("spin-value", !bench || bench.silent);
-  const trend = practice && data.about?.status !== "running" ? NaN : data.trend;  // that of the run, while it is recorded
+  const trend = practice && data.about?.status !== "running" ? history.trend : data.trend;  // that of the run, while it is recorded
   const much = Math.abs(trend) >= 0.0005;
   write("trend", Number.isFinite(trend) ? `${much ? (trend < 0 ? "↓ " : "↑ ") : "→ "}${fixed(trend, 4)} Hz/s` : "–");
   const counting = bench?.counting ?? data.about?.settings?.counter;
@@ -629,7 +629,10 @@ function showChoices() {
   for (const run of listed.runs) {
     if (run.name === seen.run && data.about) run.status = data.about.status;
     const status = run.status === "finished" ? "" : STATES[run.status] || run.status;
-    const text = [run.title ? phrase(run.title) : run.name, run.group, run.started_utc.slice(0, 16).replace("T", " "), status];
+    // what differs stands first: the group, and the time of a run of today
+    const begun = run.started_utc && new Date(run.started_utc), today = begun && begun.toDateString() === new Date().toDateString();
+    const when = begun && (today ? begun.toLocaleTimeString(LANGUAGE, {timeStyle: "short"}) : begun.toLocaleString(LANGUAGE, {dateStyle: "short", timeStyle: "short"}));
+    const text = [run.group, run.title ? phrase(run.title) : run.name, when, run.name === seen.run ? "" : status];
     const row = [...by("run").options].find(({value}) => value === run.name);
     if (row) put(row, {textContent: text.filter(Boolean).join(", ")});
   }

@@ -125,14 +125,16 @@ export function drawReadings(paper, data, pointed) {
   c.textAlign = "center";
   for (const mark of xMarks) c.fillText(fixed(mark, decimals(xMarks)), toX(mark / fx), bottom + 11);
   c.fillText(named(data.xAxis), (edge + width - RIGHT) / 2, height - 8);
-  upright(c, named(data.yAxis), 11, (TOP + split) / 2);
+  const room = c.measureText(named(data.yAxis)).width < split - TOP ? split : bottom;
+  upright(c, named(data.yAxis), 11, (TOP + room) / 2);
   if (fit) {
     c.strokeStyle = paint.soft;
     line(c, [[edge, middle, width - RIGHT, middle]]);
     c.textAlign = "right";
     const power = 10 ** Math.floor(Math.log10(0.8 * reach * fy));
     const one = [5, 2, 1].map((k) => k * power).find((k) => k <= 0.8 * reach * fy);
-    for (const mark of [-one, 0, one]) c.fillText(short(mark, 2), edge - 7, toLeft(mark / fy));
+    const apart = toLeft(0) - toLeft(one / fy) >= 15;  // else the zero would lie on its neighbours
+    for (const mark of apart ? [-one, 0, one] : [-one, one]) c.fillText(short(mark, 2), edge - 7, toLeft(mark / fy));
     c.textAlign = "left";
     c.fillText(phrase("readings − fit"), edge, bottom - below - 10);
     c.strokeStyle = paint.line;

@@ -1,8 +1,9 @@
 // The bench for practice: controls that send commands, and the guide that shows how far one is.
 
+import {read} from "./connection.js";
 import {numberField} from "./field.js";
 import {showResult} from "./result.js";
-import {by, fixed, lapse, local, make, option, phrase, put, short, write} from "./words.js";
+import {LANGUAGE, by, fixed, lapse, local, make, option, phrase, put, short, write} from "./words.js";
 
 /** What the fields of the drive set. */
 const KEYS = {frequency: "frequency_hz", amplitude: "amplitude_vpp"};
@@ -281,6 +282,10 @@ export function openPractice(about, command, run, isOwn, allowed) {
     const done = {
       drive: bench.took_hold, tune: bench.tuned_up || now.busy, record: recorded, analyze: recorded && now.analyzed === name, report: recorded && now.read === name,
     };
+    if (recorded && now.looked !== name) {  // another page may have analyzed it
+      now.looked = name;
+      read(`run/${encodeURIComponent(name)}/analysis?language=${LANGUAGE}`).then((found) => { if (found?.verdict?.length) now.analyzed = name; });
+    }
     const items = [...by("guide").children], last = items.map((item) => Boolean(done[item.dataset.step])).lastIndexOf(true);
     items.forEach((item, k) => {  // a run drives the top itself: it has done the steps before it
       put(item, {className: k <= last ? "done" : k === last + 1 ? "now" : ""});

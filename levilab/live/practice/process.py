@@ -220,11 +220,12 @@ class PracticeProcess:
             self._fell = why
         else:
             self._voice.say(why)
+        self._look_at_task(fell_after=after)
 
-    def _look_at_task(self, answer: float | None = None) -> None:
+    def _look_at_task(self, answer: float | None = None, fell_after: float | None = None) -> None:
         """See whether the goal of the task under way is reached."""
-        drive = self.drive
-        look = Look(self.clock.now(), self.top.floats(), self._spin, drive.output_hz, drive.follows, answer)
+        drive, now = self.drive, self.clock.now()
+        look = Look(now, self.top.floats(), self._spin, drive.output_hz, drive.follows, answer, fell_after)
         if task := self.tasks.look(look):
             found = task.found(self.top.scene)
             if found:  # its top stays as a person made it float

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -31,6 +31,7 @@ class Look:
         drive_hz: None while the output is off [Hz].
         follows: whether the drive holds the top.
         answer: that a person gave.
+        fell_after_s: how long a top was up that has fallen since the last look [s]; None: none has.
     """
 
     time_s: float
@@ -39,6 +40,7 @@ class Look:
     drive_hz: float | None
     follows: bool
     answer: float | None = None
+    fell_after_s: float | None = None
 
     @property
     def is_held(self) -> bool:
@@ -197,6 +199,8 @@ class Tasks:
     def look(self, look: Look) -> Task | None:
         """Return the task under way if its goal is reached at a moment."""
         task = TASKS.get(self.name)
+        if task and (after := look.fell_after_s) and task.holds(replace(look, floats=True)):  # until it fell
+            look, self._since = replace(look, floats=True), look.time_s - after
         if task is None or not task.holds(look):
             self._since, self.share = None, 0.0
             return None

@@ -154,6 +154,7 @@ def field_part(analysis: FieldAnalysis) -> ReportPart:
             Tabular("field-follows", follows_table(analysis.values), Sentences(*_FOLLOWS.each, means)),
             Tabular("field-scans", scans_table(analysis), _SCANS, first_column_wraps=True),
         ),
+        values=(Tabular("field-follows", follows_table(analysis.values), VALUE_U),),
         figure=FigureText(
             title="Field of the base.",
             caption=(

@@ -9,6 +9,7 @@ in a form of its own.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar
 
@@ -212,6 +213,7 @@ class Picture:
         draw: returns the matplotlib figure, a new one at each call.
         points: what answers to the pointer; a format without a pointer passes over it.
         raster: whether it is so full of lines or points that PNG is smaller than a drawing of lines.
+        most_inch: its greatest height on paper; a higher one is made smaller [inch].
     """
 
     name: str
@@ -221,6 +223,7 @@ class Picture:
     draw: Callable[[], Figure]
     points: tuple[Points, ...] = ()
     raster: bool = False
+    most_inch: float = math.inf
 
 
 @dataclass(frozen=True)

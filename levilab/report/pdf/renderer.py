@@ -180,8 +180,8 @@ class _Drawing:
         return {
             "file": name,
             "format": kind,
-            "floats": shape > TALL,
-            "width": min(100.0, 100 * TALLEST / WIDE / shape),
+            "floats": shape > TALL and picture.most_inch > TALLEST,
+            "width": min(100.0, 100 * min(TALLEST, picture.most_inch) / WIDE / shape),
         }
 
 

@@ -185,10 +185,10 @@ def test_a_run_grows_is_torn_reloaded_and_ends(served: Hall, page: Page, tmp_pat
         for limits, said in (("-3, 21", "at most 25 s"), ("-9, -1", ""), ("80, 140", "about 80 s to 2:20 min")):
             assert page.evaluate(f"import('/page/words.js').then(({{between}}) => between({limits}))") == said
     chosen = "document.querySelector('#run option:checked').textContent"
-    until(page, f"/^spin-down, Group 7, [-0-9]+ [:0-9]+, running$/.test({chosen})")
+    until(page, f"/^Group 7, spin-down, [-0-9/.,:APM ]+$/.test({chosen})")
     page.evaluate("void (window.fetch = () => new Promise(() => {}))")  # the list needs no second answer of the server
     run.say(status="finished")
-    until(page, f"/^spin-down, Group 7, [-0-9]+ [:0-9]+$/.test({chosen}) && document.body.dataset.state === 'finished'")
+    until(page, f"/^Group 7, spin-down, [-0-9/.,:APM ]+$/.test({chosen}) && document.body.dataset.state === 'finished'")
 
 
 def test_two_views_of_a_run_one_closed_and_opened_again_and_the_folder_deleted(

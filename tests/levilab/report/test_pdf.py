@@ -7,6 +7,7 @@ from functools import cache, partial
 
 import pytest
 
+from levilab.pipelines.suits import recall_suiting
 from levilab.present.document.blocks import (
     Banner,
     Document,
@@ -20,8 +21,10 @@ from levilab.present.document.blocks import (
 )
 from levilab.present.style import as_pdf as as_pdf_page
 from levilab.present.tables import table
+from levilab.report.document import document_of
 from levilab.report.page import write_report
 from levilab.report.pdf.renderer import NoTypst, as_pdf, files_of, fonts, settle
+from levilab.report.reproduction import Asked
 from support.commands import command
 from support.documents import drawn, of_all_blocks
 from support.paths import ROOT
@@ -149,6 +152,12 @@ def test_a_first_page_of_several_chapters_says_what_each_found():
     ]
     assert data_of(Document("t", "", (chapters[0], last)))["chapters"] == []
     assert pages_of(Document("t", "", (*chapters, last))) == 4
+
+
+@pytest.mark.parametrize("run", ["spin-down-1", "precession-sweep", "field-scan"])
+def test_a_short_report_of_a_run_is_one_page(sample_data, run):
+    asked = Asked(short=True, crosscheck=False)
+    assert pages_of(document_of(recall_suiting([sample_data / run], {}), (), asked)) == 1
 
 
 def test_what_is_synthetic_is_marked_on_every_page():

@@ -522,6 +522,9 @@ def test_a_goal_has_to_be_there_without_a_break() -> None:
     fast = replace(held, spin_hz=57.1, drive_hz=57.2)
     assert shares("fast", held, fast, replace(fast, floats=False)) == [0.0, 1.0, 0.0]
     assert shares("catch", replace(held, drive_hz=None), held) == [0.0, 1.0]
+    fell = replace(held, time_s=99.0, floats=False)  # looks are rare where time runs fast: what the top did counts
+    assert shares("mass", replace(fell, fell_after_s=21.0), fell) == [1.0, 0.0]
+    assert shares("mass", replace(fell, fell_after_s=19.0), fell) == pytest.approx([0.95, 0.0])
 
 
 def test_what_the_bench_cannot_do_is_refused_with_what_to_do(session: Script) -> None:
