@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from levilab.pipelines.limit.analysis import LOWER_EDGE, RESONANCE, UPPER_EDGE
+from levilab.pipelines.limit.analysis import ISLANDS, LOWER_EDGE, RESONANCE, UPPER_EDGE
 from levilab.present.drawing import SMALL, headline, panel, synthetic_mark
 from levilab.present.looks import BLACK, GREEN, GREY, LOOKS, MARKERS, ORANGE, PURPLE, SKY, VERMILION, YELLOW
 from levilab.present.numbers import with_uncertainty
@@ -30,7 +30,12 @@ if TYPE_CHECKING:
 #: Of runs: colours that theory does not have.
 _COLOURS = (BLACK, GREEN, SKY, ORANGE, YELLOW, GREY)
 _MEAN = LOOKS["fit"].colour
-_THEORY = {LOWER_EDGE: (VERMILION, "--"), UPPER_EDGE: (VERMILION, "--"), RESONANCE: (PURPLE, ":")}
+_THEORY = {
+    LOWER_EDGE: (VERMILION, "--"),
+    UPPER_EDGE: (VERMILION, "--"),
+    RESONANCE: (PURPLE, ":"),
+    ISLANDS: (PURPLE, "-."),
+}
 #: A line of theory so many times farther from the mean than the farthest limit would squeeze the limits: it is named at
 #: the edge of the panel.
 _NEAR = 2.5
