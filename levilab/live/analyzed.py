@@ -12,7 +12,7 @@ import threading
 from typing import TYPE_CHECKING, Any
 
 from levilab.files import stamp
-from levilab.pipelines.result import RESULT, beside
+from levilab.pipelines.result import beside
 from levilab.texts.text import ENGLISH, Text, text_from
 
 if TYPE_CHECKING:
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 #: Figures that stand beside an input, and its report.
 FIGURES = re.compile(r"[a-z][a-z-]{0,30}\.(png|svg)")
 REPORT = "report.html"
+#: The analysis of a film's pictures, whose result does not have the name of the first: that would be of its sound.
+_OF_FILM = "video"
 #: An analysis that takes longer than this is given up [s].
 _LONGEST_S = 600.0
 #: An analysis that is given up ends at once; the longest wait for that [s].
@@ -55,30 +57,35 @@ class Analyses:
         self._is_over = False
         self._lock = threading.Lock()
 
-    def begin(self, path: Path, options: Sequence[str] = (), language: str = ENGLISH) -> None:
+    def begin(
+        self, path: Path, options: Sequence[str] = (), language: str = ENGLISH, of_film: Sequence[str] = ()
+    ) -> None:
         """Analyze an input and write its report, if that is not under way; earlier ones stay until then.
 
         Args:
             path: of the input.
             options: words that say how it is read.
             language: of figures and report.
+            of_film: words for the analysis alone: the report takes what they say from the result.
         """
         if path in self.running:
             return
         self.running[path] = "analyze"
         self.failed.pop(path, None)
         place = beside(path)
-        files = (place.file(RESULT), place.file(REPORT), *(place.file(name) for name in _figures(place)))
+        files = (*place.results(_OF_FILM), place.file(REPORT), *(place.file(name) for name in _figures(place)))
         self._before |= {file: stamp(file) for file in files}
         self._threads = {thread for thread in self._threads if thread.is_alive()}
-        thread = threading.Thread(target=self._analyze, args=(path, [*options, "--language", language]), daemon=True)
+        thread = threading.Thread(
+            target=self._analyze, args=(path, [*options, "--language", language], of_film), daemon=True
+        )
         thread.start()
         self._threads.add(thread)
 
-    def _analyze(self, path: Path, options: Sequence[str]) -> None:
+    def _analyze(self, path: Path, options: Sequence[str], of_film: Sequence[str]) -> None:
         try:
             for words in (
-                ["analyze", str(path), *options],
+                ["analyze", str(path), *options, *of_film],
                 ["report", str(path), *options, "--output", str(beside(path).file(REPORT))],
             ):
                 self.running[path] = words[0]
@@ -135,13 +142,14 @@ class Analyses:
         Results of an earlier analysis are not shown for one that is under way or has failed.
         """
         place = beside(path)
+        result = next(filter(self._is_new, place.results(_OF_FILM)), None)
         return {
             "step": self.running.get(path, ""),
             "failed": self.failed.get(path, ""),
             "figures": [name for name in _figures(place) if self._is_new(place.file(name))],
             "report": REPORT if self._is_new(place.file(REPORT)) else "",
             "analysis": "",
-        } | (_result(place.file(RESULT)) if self._is_new(place.file(RESULT)) else {})
+        } | (_result(result) if result else {})
 
     def _is_new(self, path: Path) -> bool:
         """Return whether a file is there, and was not before the analysis that was asked for last."""

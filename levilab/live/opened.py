@@ -13,9 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError, UsageError
+from levilab.formats.film import NoFilm, open_film
+from levilab.formats.kinds import AUDIO
 from levilab.formats.understanding import understand
 from levilab.pipelines.correction import ENDING, read_correction, read_file_options, write_correction
-from levilab.pipelines.look import look_as_kept, look_at
+from levilab.pipelines.look import Look, look_as_kept, look_at
+from levilab.pipelines.options import read_options
 from levilab.texts.text import Text
 
 if TYPE_CHECKING:
@@ -58,10 +61,12 @@ class OpenedFile:
 
     Attributes:
         options: by which it is read, beside those that are kept with it.
+        rim_mm: of a film whose pictures are looked at, the diameter of the top's rim [mm].
     """
 
     path: Path
     options: dict[str, Any] = field(default_factory=dict)
+    rim_mm: float | None = None
 
     @property
     def words(self) -> list[str]:
@@ -69,6 +74,11 @@ class OpenedFile:
         columns = ",".join(f"{key}={to}" for key, to in (self.options.get("columns") or {}).items())
         given = {**self.options, "columns": columns or None}
         return [word for key, value in given.items() if value is not None for word in (f"--{key}", str(value))]
+
+    @property
+    def words_of_film(self) -> list[str]:
+        """Those for the analysis of its pictures, which the report takes from the result."""
+        return [] if self.rim_mm is None else ["--rim", f"{self.rim_mm:g}"]
 
 
 @dataclass
@@ -158,13 +168,26 @@ class Opened:
         """
         one = self.get(key)
         if options is not None:
-            one.options = read_file_options({name: value for name, value in options.items() if value is not None})
+            given = {name: value for name, value in options.items() if value is not None}
+            rim = given.pop("rim_mm", None)
+            if rim is not None and not isinstance(rim, (int, float)):
+                raise UsageError("rim", "a diameter in mm is expected", value=rim)
+            read_options({"rim": rim}, typed=True)
+            one.rim_mm, one.options = rim, read_file_options(given)
         problem: dict[str, Any] = {}
         try:
             used, look = {**read_correction(one.path), **one.options}, look_as_kept(one.path, one.options)
         except LevilabError as error:
             used, look, problem = one.options, look_at(one.path, one.options), {"problem": str(error)}
-        return look.as_dict() | {"file": key, "options": used, "words": one.words} | problem
+        size = _size_of_film(one.path)
+        if size and one.rim_mm is not None:
+            look, problem = Look(one.path, size, ()), {}
+        elif size and look.problem:
+            wanted = Text("a film: the diameter of the top's rim, which is its scale, is wanted below")
+            look, problem = Look(one.path, size, ()), {"problem": wanted}
+        of_film = {} if one.rim_mm is None else {"rim_mm": one.rim_mm}
+        about = {"file": key, "options": used | of_film, "film": bool(size)}
+        return look.as_dict() | about | {"words": [*one.words, *one.words_of_film]} | problem
 
     def keep(self, key: str) -> str:
         """Write how a file is read beside it.  Returns the name of that file.  Raises UsageError, CannotWrite."""
@@ -176,3 +199,19 @@ class Opened:
         if not isinstance(key, str) or key not in self.files:
             raise UsageError("file", "is not open any more: drop it again")
         return self.files[key]
+
+
+def _size_of_film(path: Path) -> str:
+    """Return the size and length of a film, as text; empty for another file."""
+    if not path.name.casefold().endswith(AUDIO.suffixes):
+        return ""
+    try:
+        film = open_film(path)
+    except NoFilm:  # sound alone, or without the extra: its sound is still read
+        return ""
+    return Text(
+        "a film of {width} × {height} pixels, {length:.1f} s",
+        width=film.width,
+        height=film.height,
+        length=film.duration or 0.0,
+    )

@@ -491,7 +491,7 @@ def _keep(hall: Hall, wanted: dict[str, Any]) -> dict[str, Any]:
 
 def _analyze_file(hall: Hall, wanted: dict[str, Any]) -> dict[str, Any]:
     one = hall.opened.get(wanted.get("file"))
-    hall.analyses.begin(one.path, one.words, wanted["language"])
+    hall.analyses.begin(one.path, one.words, wanted["language"], one.words_of_film)
     return {}
 
 

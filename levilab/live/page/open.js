@@ -76,12 +76,14 @@ function show() {
   by("channel").replaceChildren(...look.channels.map((name) => option(name)));
   by("channel").closest("label").hidden = look.channels.length < 2;
   by("channel").selectedIndex = Math.max(0, look.runs[0]?.columns.findIndex(({quantity}) => quantity === "signal") ?? 0);
+  by("film").hidden = !look.film;
+  rim.set(String(look.options.rim_mm ?? ""));
   rate.set(look.rate === null ? "" : String(Number(look.rate.toPrecision(9))));
   const notes = [...new Set(look.runs.flatMap(({warnings}) => warnings))];
   by("notes").replaceChildren(...notes.map((text) => make("li", inWords(text))));
   const asks = look.runs.some(({problem, doubts}) => problem && doubts.length);
   hold(asks ? phrase("Answer the question above first.") : look.problem ? phrase("It is not read; the reason stands above.") : "");
-  by("keep").disabled = Boolean(look.problem) || !look.words.length;
+  by("keep").disabled = Boolean(look.problem) || !look.words.length || Boolean(look.options.rim_mm);
   by("again").disabled = !look.words.length;
   write("command", ["levilab analyze", look.name, ...look.words].map((word, k) => k && /[^\w.,=/-]/.test(word) ? `"${word}"` : word).join(" "));
   const used = look.runs.flatMap(({columns}) => columns).filter(({quantity}) => quantity).map(({title, quantity, unit}) => phrase("{column} is {quantity} in {unit}", {column: title || phrase("a column"), quantity: wordsOf(quantity), unit}));
@@ -198,6 +200,7 @@ function change(column, run, {quantity, unit}) {
 }
 
 by("channel").addEventListener("change", () => correct({...optionsNow(), channel: by("channel").value}));
+const rim = numberField("rim", (value) => correct({...optionsNow(), rim_mm: Number.isNaN(value) ? null : value}), true);
 const rate = numberField("rate", (value) => correct({...optionsNow(), rate: value}));
 by("again").addEventListener("click", () => correct({}));
 by("keep").addEventListener("click", async () => {

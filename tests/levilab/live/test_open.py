@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 
+from levilab.errors import UsageError
 from levilab.live.opened import LONGEST_NAME, MOST_FILES, Opened, OpenedFile, plain_name
 from levilab.pipelines.correction import read_correction
 from levilab.texts.text import Text, as_tables
@@ -286,6 +287,31 @@ def test_the_oldest_file_is_closed_when_many_are_open(tmp_path: Path) -> None:
     opened = Opened(tmp_path)
     keys = [opened.add(tmp_path / f"{k}.csv") for k in range(MOST_FILES + 3)]
     assert list(opened.files) == keys[3:]
+
+
+@pytest.mark.slow
+def test_a_film_is_followed_in_its_pictures_once_its_scale_is_known(hall: Hall, watched: Callable[..., Page]) -> None:
+    film = shutil.copy(SAMPLES / "video" / "top.mp4", hall.root.parent / "top.mp4")
+    key = hall.opened.add(film)
+    page = watched()
+    page.goto(address(hall, token=True).replace("/#", f"/open?file={key}#"))
+    until(page, "window.levilab?.look?.film")
+    assert "diameter of the top's rim" in page.inner_text("#problem")
+    assert page.get_by_role("button", name="Analyze").is_disabled()
+    page.get_by_label("Rim of the top").fill("300")
+    page.get_by_label("Rim of the top").press("Enter")
+    assert "from 1 to 200" in page.inner_text("#rim-wrong")
+    page.get_by_label("Rim of the top").fill("30")
+    page.get_by_label("Rim of the top").press("Enter")
+    until(page, "levilab.look.options.rim_mm === 30")
+    assert page.inner_text("#command") == "levilab analyze top.mp4 --rim 30"
+    assert not page.inner_text("#problem")
+    page.get_by_role("button", name="Analyze").press("Enter")
+    until(page, "!document.getElementById('report').hidden")
+    assert "The spin is 31.47628" in page.inner_text("#verdict")  # its last digits depend on the processor
+    until(page, "document.querySelector('#figures img')?.naturalWidth > 100")
+    with pytest.raises(UsageError, match="a diameter in mm"):
+        hall.opened.look(key, {"rim_mm": "wide"})
 
 
 def test_the_words_of_a_file_are_options_of_the_command_line(tmp_path: Path) -> None:
