@@ -144,8 +144,8 @@ def _values(of: Class, quantity: Compared) -> Tabular:
             [*map(_distance, (*quantity.from_truth, distance))],
         ]
         heads += [_TRUTH, _FROM_TRUTH]
-    columns, numbers, heads = [*columns, marks], heads[1:], [*heads, "result"]
-    names = [*(group.source.name for group in of.groups), "mean"]
+    columns, numbers, heads = [marks, *columns], heads[1:], [heads[0], "result", *heads[1:]]  # what a phone shows first
+    names = [*(group.source.name for group in of.groups), "class mean"]
     kinds = [*(_ROWS[mark.word] for mark in of.marks), "together"]
     rows = [Row(cells, kind) for kind, cells in zip(kinds, zip(names, *columns, strict=True), strict=True)]
     rows = rows if len(of.groups) > 1 else rows[:1]
