@@ -17,10 +17,7 @@ def _named_path(path: Path | None) -> Path | None:
     return existing_path(path)
 
 
-_ONE = (
-    "one run, file or sweep is exported at a time, into one file; levilab analyze spindown … --table FILE.csv writes a "
-    "row for each of many"
-)
+_ONE = "one path is exported into one file: name the folder of several runs, which has a row for each of them"
 
 
 def _named_file(file: Path | None) -> Path | None:

@@ -141,26 +141,18 @@ def _explain_unknown(error: Any, name: str, command: Any) -> None:
     error.possibilities = [f"--{one}" for one in get_close_matches(word, known, cutoff=_ALIKE)]
     if not any(one.name == "settings" for one in command.params):
         return
-    if error.possibilities and not _is_quantity(word):
-        return
     if any(one.name == "list_settings" for one in command.params):  # an experiment
-        error.message += f"; --set changes its settings, which levilab acquire {name} --settings lists"
+        if not error.possibilities:
+            error.message += f"; --set changes its settings, which levilab acquire {name} --settings lists"
         return
     from levilab.simulator.keys import similar_keys
     from levilab.simulator.scene import preset
 
     keys = similar_keys(preset("driven").as_table(), word.replace("-", "_"))
+    if error.possibilities and not any(key.rpartition(".")[2].split("_")[0] == word for key in keys):
+        return  # but --mass is a quantity of a scene, and no mistyped --masses
     example = " or ".join(f"--set {key}=…" for key in keys) or "as --set top.mass_kg=25g"
     error.message += f"; --set changes the scene: {example}"
-
-
-def _is_quantity(word: str) -> bool:
-    """Return whether a word is a quantity's name, which a scene's key may have: mass, of --masses, too."""
-    from levilab.simulator.keys import similar_keys
-    from levilab.simulator.scene import preset
-
-    keys = similar_keys(preset("driven").as_table(), word)
-    return any(key.rpartition(".")[2].split("_")[0] == word for key in keys)
 
 
 def _rewrap(text: str | None) -> str | None:

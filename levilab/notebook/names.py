@@ -51,7 +51,9 @@ def meant(name: str, known: Iterable[str]) -> str:
         return f"take {other}, {how}"
     others = [one for one in _OTHERS.get(name, ()) if one in names]
     near = (
-        others or [one for one in names if name in one.split("_")] or get_close_matches(name, names, n=3, cutoff=_ALIKE)
+        others
+        or [one for one in names if {*name.split("_")} <= {*one.split("_")}]
+        or get_close_matches(name, names, n=3, cutoff=_ALIKE)
     )
     if near:
         return f"did you mean {' or '.join(near)}?"

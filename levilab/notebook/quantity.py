@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 import re
 from dataclasses import dataclass, field
 from functools import partial
@@ -17,7 +18,7 @@ from levilab.notebook.names import Helpful, NoSuchAttribute, bare, border, meant
 from levilab.present.numbers import in_one_line, without_unit
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence, ValuesView
+    from collections.abc import Callable, Mapping, Sequence, ValuesView
 
     from numpy.typing import ArrayLike
 
@@ -42,6 +43,17 @@ _INSTEAD = {
 }
 #: Functions of numpy that are taken of a quantity, as a number without a unit.
 _FUNCTIONS = frozenset({"sqrt", "exp", "log", "log10", "sin", "cos", "tan"})
+
+
+def _comparison(compare: Callable[[float, float], bool]) -> Any:
+    """Return the method of a quantity that compares its value with a number in the same unit."""
+
+    @bare
+    def method(self: Quantity, other: Any) -> bool:
+        self._check_unit(other, "comparison")
+        return compare(float(self), float(other.nominal_value if hasattr(other, "nominal_value") else other))
+
+    return method
 
 
 @dataclass(frozen=True, repr=False)
@@ -185,30 +197,7 @@ class Quantity(Estimate):
 
     __radd__, __rmul__ = __add__, __mul__
 
-    def _compared(self, other: Any) -> tuple[float, float]:
-        """Return the values of this and of a number in the same unit."""
-        self._check_unit(other, "comparison")
-        return float(self), float(other.nominal_value if hasattr(other, "nominal_value") else other)
-
-    @bare
-    def __lt__(self, other: object) -> bool:
-        one, two = self._compared(other)
-        return one < two
-
-    @bare
-    def __le__(self, other: object) -> bool:
-        one, two = self._compared(other)
-        return one <= two
-
-    @bare
-    def __gt__(self, other: object) -> bool:
-        one, two = self._compared(other)
-        return one > two
-
-    @bare
-    def __ge__(self, other: object) -> bool:
-        one, two = self._compared(other)
-        return one >= two
+    __lt__, __le__, __gt__, __ge__ = map(_comparison, (operator.lt, operator.le, operator.gt, operator.ge))
 
 
 def _latex_unit(unit: str) -> str:

@@ -357,7 +357,8 @@ def _recognise_keyed(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]]
         unit, factor = _unit((given[2] or given[0]).strip() if given[0] else title if worded else "")
         columns.append(SampleColumn(_signal(title if not worded else name or f"CH{k}"), unit, k, factor))
     kept, begin = _with_samples(columns, rows, first, dialect)
-    siglent = any("analog:" in cell.casefold() for cells in keys.values() for cell in cells) or "source" in keys
+    siglent = any("analog:" in cell.casefold() for cells in keys.values() for cell in cells)
+    siglent = siglent or ("source" in keys and "model" not in keys)
     return Header(
         "Siglent CSV" if siglent else "Tektronix CSV",
         dialect,

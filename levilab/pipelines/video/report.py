@@ -69,9 +69,6 @@ def _csv(columns: Mapping[str, np.ndarray]) -> str:
     return text.getvalue()
 
 
-_SCALE = "The scale is common to all places, and not in their u."
-
-
 def video_part(analysis: VideoAnalysis) -> ReportPart:
     """Return the values and the still."""
     (values,) = video_tables(analysis)

@@ -308,7 +308,7 @@ REFUSED = {
     "result.predict(['a'])": "a number or an array of numbers in SI",
     "result.predict(0.0, law='stokes')": "is no option of predict; known are x, model, input",
     "run[0]": "df.iloc[0] is the first reading",
-    "run['spin_hz']": "did you mean spin_frequency_hz?",
+    "run['spin_hz']": "did you mean spin_frequency_hz or",
     "run.spin": "did you mean spin_frequency_hz",
     "motion.hight": "did you mean height",
     "levilab.analyze((seconds, light))": "kind='spin', or light=",
