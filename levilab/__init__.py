@@ -226,6 +226,7 @@ def analyze(
     scan: str | PathLike[str] | None = None,
     side: str | PathLike[str] | None = None,
     spin_hz: float | None = None,
+    sensor_m: float | None = None,
     spindown: str | PathLike[str] | None = None,
     rim_m: float | None = None,
     base_m: float | None = None,
@@ -280,6 +281,7 @@ def analyze(
         scan: a Hall scan of the base, a run or a file (sway).
         side: track of a film from beside, of the same time, for the heights (sway).
         spin_hz: spin of the top where no column has it [Hz] (sway).
+        sensor_m: of a record of the field: distance of the top from the phone above it, or from two probes (sway).
         spindown: a spin-down of the same top, a run or a file, that is compared (hold).
         rim_m: scale of a film: diameter of the top's rim [m] (video).
         base_m: scale of a film: outer diameter of the base [m] (video).

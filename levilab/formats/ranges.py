@@ -49,6 +49,7 @@ RANGES: Mapping[str, tuple[tuple[Unit, ...], float, float]] = MappingProxyType({
     "height_m": (_LENGTH, -1.0, 2.0),
     "below_m": (_LENGTH, -1.0, 1.0),
     "distance_m": (_LENGTH, 1e-3, 5.0),
+    "sensor_m": (_LENGTH, 1e-3, 2.0),
     "rim_m": (_LENGTH, 1e-3, 0.2),
     "base_m": (_LENGTH, 5e-3, 0.8),
     "stem_m": (_LENGTH, 1e-4, 0.1),

@@ -131,7 +131,7 @@ def test_readings_stand_with_their_residuals(four: Any) -> None:
 
 @pytest.mark.parametrize("kind", ANALYSES)
 def test_every_analysis_has_readings_with_the_residuals_of_its_result(kind: str) -> None:
-    folder = {"spin": "trace-laser", "sway": "sway", "hold": "hold/45-hz", "video": "video"}
+    folder = {"spin": "trace-laser", "sway": "sway/track.csv", "hold": "hold/45-hz", "video": "video"}
     folder |= {name: case[0] for name, case in CASES.items()}
     of_film = {"rim_m": 0.03, "stop_s": 1.0} if kind == "video" and pytest.importorskip("av") else {}
     result = levilab.analyze(SAMPLE_DATA / folder[kind], kind if of_film else None, **of_film)
@@ -188,7 +188,7 @@ def test_a_notebook_shows_results_escaped_and_short(tmp_path: Path) -> None:
 def test_a_cell_is_short_and_folds(kind: str) -> None:
     if kind == "video":
         return  # its film takes seconds, and its cell is as all others
-    folder = {"spin": "trace-laser", "sway": "sway", "hold": "hold/45-hz"}
+    folder = {"spin": "trace-laser", "sway": "sway/track.csv", "hold": "hold/45-hz"}
     html = levilab.analyze(SAMPLE_DATA / (folder | {name: case[0] for name, case in CASES.items()})[kind])._repr_html_()
     assert len(html.encode()) < 30_000  # a tenth of a report
     assert html.count("<details") == html.count("</details>") > 1
