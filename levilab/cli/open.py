@@ -120,8 +120,10 @@ def _print_looks(looks: "Sequence[Look]", *, as_json: bool) -> None:
 def _print_look(look: "Look") -> None:
     """Print how a file is understood: its columns, and the questions that are left."""
     from levilab.pipelines.look import QUANTITIES
+    from levilab.present.document.blocks import in_language_of_reader
     from levilab.present.tables import table
     from levilab.present.terminal import draw, terminal
+    from levilab.texts.text import Text
 
     console = terminal()
     for run in look.runs:
@@ -138,7 +140,8 @@ def _print_look(look: "Look") -> None:
         ]
         heads = ("column", "title", "understood as", "unit", "first values")
         if rows:
-            console.print(draw(table(f"{name} ({look.holds})" if look.holds else name, heads, rows)))
+            title = Text("{name:s} ({holds})", name=name, holds=look.holds) if look.holds else name
+            console.print(draw(in_language_of_reader(table(title, heads, rows))))
         _print_doubts(look, run)
 
 
@@ -155,12 +158,13 @@ def _print_doubts(look: "Look", run: "UnderstoodRun") -> None:
     from rich.markup import escape
 
     from levilab.present.terminal import terminal
+    from levilab.texts.text import in_language
 
     console = terminal()
     for text in run.warnings:
-        console.print(f"[yellow]note:[/yellow] {escape(text)}")
+        console.print(f"[yellow]{in_language('note')}:[/yellow] {escape(in_language(text))}")
     for doubt in run.doubts:
-        console.print(f"[yellow]question:[/yellow] {escape(doubt.text)}")
+        console.print(f"[yellow]{in_language('question')}:[/yellow] {escape(in_language(doubt.text))}")
         answers = [
             (choice.text, ",".join(f"{key}={to}" for key, to in choice.columns.items())) for choice in doubt.choices
         ]

@@ -73,6 +73,7 @@ def runs(
     out: Annotated[Path | None, place("DIR", "The same, as acquire has it.", readable=False, callback=None)] = None,
     last: Annotated[int | None, option("N", "The latest N runs alone.", min=1)] = None,
     as_json: Json = False,
+    language: Language = "en",  # noqa: ARG001 - its callback speaks it
 ) -> None:
     """List the runs in a folder."""
     from levilab.runs.find import RUNS, must_be_searchable

@@ -214,7 +214,8 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
     rows = [_cells(run, above, room, groups=groups) for run in runs]
     heads += [*["group"] * groups, *["note"] * bool(room)]
     heads, rows = _that_fit(heads, rows, console.width)
-    print_rows(console, heads, rows, numbers=["readings", "length"])
+    numbers = [in_language("readings"), in_language("length")]
+    print_rows(console, [*map(in_language, heads)], rows, numbers=numbers)
     problems = [run.problem for run in runs if run.problem]
     for problem in problems[:MOST_PROBLEMS]:
         console.print(f"[yellow]note:[/yellow] {escape(problem)}")
@@ -253,8 +254,8 @@ def _cells(run: Listed, above: str, room: int, *, groups: bool) -> list[str]:
     """
     when = (run.started_utc or "—")[:16].replace("T", " ")
     scene = f" {run.scene}" if run.scene not in {"", run.experiment} else ""
-    what = run.experiment + scene + (", synthetic" if run.synthetic else "")
-    cells = [when, _below(run.path, above), what, run.status, run.size, _seconds(run.length_s)]
+    what = run.experiment + scene + (in_language(", synthetic") if run.synthetic else "")
+    cells = [when, _below(run.path, above), what, in_language(run.status), run.size, _seconds(run.length_s)]
     if groups:
         cells.append(run.group)
     if room:
