@@ -238,10 +238,14 @@ def replace_atomically(path: Path, content: str | bytes) -> None:
 
 
 @contextlib.contextmanager
-def replacing(path: Path) -> Iterator[BinaryIO]:
-    """Yield a file that replaces another one as a whole when the context ends without an error.  Raises OSError."""
+def replacing(path: Path, *, among_many: bool = False) -> Iterator[BinaryIO]:
+    """Yield a file that replaces another one as a whole when the context ends without an error.  Raises OSError.
+
+    among_many: whether the folder has so many files that parts of killed processes are not searched in it.
+    """
     part = path.with_name(f".{path.name}.{computer().process}.part")
-    _remove_parts_of_the_dead(path)
+    if not among_many:
+        _remove_parts_of_the_dead(path)
     try:
         computer().remove(part)  # of an earlier process of this number
         with computer().open(part, "xb") as file:  # never through a link that stands there

@@ -314,14 +314,18 @@ class RunWriter:
         The status stands by then, and the run is whole without its description.  Raises CannotWrite for the status.
         """
         self.update(status=status, ended_utc=utc_now(), **changes)
-        try:
+        with _explain_errors(f"write {PACKAGE}", self.folder):
             self._write_in_place(self._describe)
+
+    def _describe(self) -> None:
+        """Write the description.  Raises FileNotFoundError where the folder went at this moment."""
+        try:
+            replace_atomically(self.folder / PACKAGE, _datapackage(self.folder, self.record))
+        except FileNotFoundError:
+            raise
         except OSError as error:
             missing = "{file} is missing ({reason}): the run is whole without it; levilab export writes it into a .zip"
             self.tell(Text(missing, file=PACKAGE, reason=error.strerror or str(error)))
-
-    def _describe(self) -> None:
-        replace_atomically(self.folder / PACKAGE, _datapackage(self.folder, self.record))
 
     def _append(self, name: str, line: str, *, sync: bool = True) -> None:
         """Append a line; with sync it is on the disk and kept in memory, too."""
@@ -405,7 +409,7 @@ class RunWriter:
         readings = self._lines_kept(READINGS) - 1
         text = (
             f"{old} was removed, replaced or cut while it was being written: all {readings} readings "
-            f"are in {self.folder} now, and the run goes on there"
+            f"are in {self.folder} now{', and the run goes on there' if self.record.status == 'running' else ''}"
             + (f"; {how_many(lost, 'record')} of the oscilloscope are gone" if lost else "")
         )
         event = {"utc": utc_now(), "time_s": None, "kind": "rescued", "text": text}

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from zarr.storage import LocalStore
 
-from levilab.files import make_folder, replace_atomically
+from levilab.files import make_folder, replacing
 
 if TYPE_CHECKING:
     from zarr.core.buffer import Buffer
@@ -33,4 +33,5 @@ class DurableStore(LocalStore):
         self._check_writable()
         path = self.root / key
         make_folder(path.parent)
-        replace_atomically(path, value.to_bytes())
+        with replacing(path, among_many=True) as file:
+            file.write(value.to_bytes())

@@ -176,9 +176,9 @@ class Store:
         from levilab.sweeps.durable import DurableStore
 
         try:
-            return cls._of(
-                zarr.open_group(DurableStore(path, read_only=not writable), mode="r+" if writable else "r"), path
-            )
+            path.stat()  # where it is missing, a place that can be written to would make it
+            place = DurableStore(path, read_only=not writable)
+            return cls._of(zarr.open_group(place, mode="r+" if writable else "r"), path)
         except DataError:
             raise
         except KeyError as error:

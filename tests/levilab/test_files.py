@@ -1,5 +1,6 @@
 """What goes into files that programs read."""
 
+import errno
 import math
 import os
 import subprocess
@@ -8,6 +9,7 @@ import sys
 import numpy as np
 import pytest
 
+from levilab.computer import Computer
 from levilab.files import finite, parse_json, replace_atomically, stamp
 
 
@@ -43,3 +45,25 @@ def test_a_write_takes_the_part_away_that_a_killed_process_left(tmp_path):
     replace_atomically(tmp_path / "t.csv", "a")
     kept = {tmp_path / "t.csv", of_another_file} | ({of_a_live_process} if os.name == "posix" else set())
     assert {*tmp_path.iterdir()} == kept
+
+
+@pytest.mark.skipif(os.name == "nt", reason="fcntl is of POSIX")
+@pytest.mark.parametrize("takes_the_order", [True, False])
+def test_on_macos_a_file_is_on_the_disk_itself(tmp_path, monkeypatch, takes_the_order):
+    """There fsync leaves it in the disk's own memory; a disk of the network takes only that."""
+    import fcntl
+
+    asked = []
+
+    def order(number, what):
+        asked.append(what)
+        if not takes_the_order:
+            raise OSError(errno.ENOTSUP, os.strerror(errno.ENOTSUP))
+
+    monkeypatch.setattr(sys, "platform", "darwin")
+    monkeypatch.setattr(fcntl, "F_FULLFSYNC", 51, raising=False)
+    monkeypatch.setattr(fcntl, "fcntl", order)
+    monkeypatch.setattr(os, "fsync", lambda _: asked.append("fsync"))
+    with (tmp_path / "file").open("wb") as file:
+        Computer().sync(file)
+    assert asked == ([51] if takes_the_order else [51, "fsync"])

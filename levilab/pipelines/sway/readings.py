@@ -191,6 +191,8 @@ def read_motion_run(run: Run, options: InputOptions) -> SwayReadings:
 
 def _readings(table: Table) -> SwayReadings:
     time, x, y = (table.column(name) for name in NEEDED)
+    if not time.size:
+        raise TableError(table.path, Text("holds no place of a top: it was not seen, or had fallen"))
     refuse(table, np.hypot(x - np.median(x), y - np.median(y)) > _FARTHEST_M, lambda i: (
         f"the top is {np.hypot(x, y)[i]:.3g} m off, less than {_FARTHEST_M:g} m is expected: if the unit is another "
         "one, say so, as `columns` = x=NAME [mm],y=NAME [mm]"

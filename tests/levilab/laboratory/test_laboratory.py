@@ -64,6 +64,7 @@ FAILED_ONCE = {
     "a probe was zeroed outside of its chamber": a_scan(Event("mistypes", 0, 1)),
     "a finished run could not be described": draw(400442),
     "the folder went when the run was finished": draw(400597),
+    "a top was taken before it was filmed": draw(411516),
     "a held spin was resumed half a reading early": draw(400407),
 }
 

@@ -170,7 +170,8 @@ def test_a_resumed_run_is_rescued_with_its_earlier_readings(tmp_path):
 
 @posix_only
 def test_a_folder_that_goes_when_the_run_is_finished_is_written_again(tmp_path, monkeypatch):
-    with create(tmp_path, []) as writer:
+    messages = []
+    with create(tmp_path, messages) as writer:
         writer.reading(row(0))
         write = RunWriter._write_record
 
@@ -186,6 +187,8 @@ def test_a_folder_that_goes_when_the_run_is_finished_is_written_again(tmp_path, 
     assert times(writer.folder) == [0]
     assert Run.load(writer.folder).status == "finished"
     assert (writer.folder / "datapackage.json").exists()
+    (message,) = messages
+    assert message.endswith(f"all 1 readings are in {writer.folder} now")
 
 
 @posix_only

@@ -98,8 +98,10 @@ def test_a_store_that_is_damaged_is_an_error_that_names_it(tmp_path):
     (tmp_path / "map.zarr" / "zarr.json").write_text("{", encoding="utf-8")
     with pytest.raises(DataError, match="no store of a sweep"):
         Store.open(tmp_path / "map.zarr")
-    with pytest.raises(DataError, match="no store of a sweep"):
-        Store.open(tmp_path / "nothing")
+    for writable in (False, True):
+        with pytest.raises(DataError, match=r"no store of a sweep .*No such file"):
+            Store.open(tmp_path / "nothing", writable=writable)
+    assert not (tmp_path / "nothing").exists()
 
 
 def test_a_store_that_is_moved_while_it_is_written_is_an_error_that_names_it(tmp_path):
