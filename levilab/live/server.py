@@ -24,13 +24,14 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
 from levilab.animation.three import three_js
-from levilab.errors import LevilabError
+from levilab.errors import LevilabError, UsageError
 from levilab.errors import unquote as unquote_names
 from levilab.live.analyzed import Analyses, is_shown
 from levilab.live.choice import choices, newest, running_run
 from levilab.live.desk import parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
 from levilab.live.opened import Opened
+from levilab.live.tuning import advice_on
 from levilab.live.watch import Watch
 from levilab.live.words import page_in
 from levilab.pipelines.look import QUANTITIES, name_of
@@ -495,7 +496,15 @@ def _analyze_file(hall: Hall, wanted: dict[str, Any]) -> dict[str, Any]:
     return {}
 
 
+def _advise(_: Hall, wanted: dict[str, Any]) -> dict[str, Any]:
+    try:
+        return advice_on(wanted)
+    except UsageError as error:
+        return {"error": text_of(error)}  # the request was right, and a browser lists no failure of it
+
+
 _FILE_COMMANDS = {
+    "say which washers": _advise,
     "list files": _list_files,
     "look at a file": _look_at_file,
     "keep": _keep,

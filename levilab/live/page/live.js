@@ -5,6 +5,7 @@ import {takeDrops} from "./drop.js";
 import {drawHistory, openHistory} from "./history.js";
 import {drawReadings, drawRecords, saidOf, sheet, tableOf} from "./plot.js";
 import {openPractice, watchPractice} from "./practice.js";
+import {openTune} from "./tune.js";
 import {openSound} from "./sound.js";
 import {LANGUAGE, between, by, fixed, lapse, make, option, phrase, put, short, turnLanguage, typeset, write} from "./words.js";
 
@@ -649,6 +650,7 @@ async function begin() {
   if (bench) {
     document.body.classList.remove("no-top");
     practice = bench.guest ? watchPractice() : openPractice(bench, give, () => seen.run, isOwn, Boolean(token));
+    if (token) openTune(token);
   }
   for (const row of document.querySelectorAll(".practice-key")) row.hidden = !bench || bench.guest;
   wanted = bench ? "" : asked || first;

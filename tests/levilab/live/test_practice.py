@@ -15,6 +15,8 @@ from levilab.live.desk import Desk
 from levilab.live.practice.bench import PracticeBench
 from levilab.live.practice.what_if import WHAT_IF
 from levilab.live.watch import SILENT_AFTER_S
+from levilab.pipelines.tune.advice import advise
+from levilab.pipelines.tune.owner import Owner
 from levilab.simulator import preset
 from levilab.telemetry.address import Address, write_address
 from levilab.telemetry.messages import Count, Drive, Poses, State
@@ -155,12 +157,34 @@ def change_what_if(page: Page) -> None:
     until(page, "levilab.data.bench.what_if.washers_g === 0.22")
     page.evaluate("document.getElementById('usual').click()")
     until(page, f"levilab.data.bench.what_if.washers_g === 0.2 && {slider}.value === '0.2'")
+    ask_which_washers(page)
     page.get_by_role("tab", name="Measure").press("ArrowLeft")  # the last one
     page.get_by_role("button", name="Hold it for three minutes").click()
     until(page, "document.getElementById('guide').hidden && !levilab.data.bench.drive.output")  # each begins without it
     page.click("#leave-task")
     until(page, "!document.getElementById('guide').hidden && document.getElementById('task').hidden")
     page.get_by_role("tab", name="Measure").click()
+
+
+def ask_which_washers(page: Page) -> None:
+    """The questions of levilab tune, with its advice: the washers are put on at the bench."""
+    page.evaluate("document.getElementById('washers-open').click()")
+    page.fill("#tune-top", "24.1 stones")
+    page.click("#tune-ask")
+    until(page, "document.getElementById('tune-text').textContent.includes('a mass such as')")
+    page.fill("#tune-top", "24.1")
+    page.click("#tune-ask")
+    until(page, "document.getElementById('tune-text').textContent.startsWith('Put on ')")
+    page.click("#tune-did [value=sinks]")  # the next one is lighter, by the rules of the command
+    until(page, "document.querySelectorAll('#tune-trials li').length === 1")
+    assert "sank" in page.inner_text("#tune-why")
+    page.click("#tune-on")
+    owner = Owner(24.1e-3).with_washers((2e-5, 4e-5, 1e-4, 2e-4, 4e-4)).with_trial(page.inner_text("#tune-trials li"))
+    best = 1e3 * sum(advise(owner, 20.0).best.washers_kg)
+    until(page, f"Math.abs(levilab.data.bench.what_if.washers_g - {best}) < 1e-6")
+    page.get_by_role("button", name="Close").click()
+    page.evaluate("document.getElementById('usual').click()")
+    until(page, "levilab.data.bench.what_if.washers_g === 0.2")
 
 
 #: Another top is drawn while the motion stands still and its poses, a tenth of a millimetre apart, have begun anew.
