@@ -138,8 +138,8 @@ def list_in_words(names: Sequence[str]) -> str:
     >>> list_in_words(["a", "b", "c", "d", "e", "f"])
     'a, b, c, d and 2 more'
     """
-    more = len(names) - MOST_NAMES
-    return ", ".join(names[:MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
+    more, first = len(names) - MOST_NAMES, ", ".join(names[:MOST_NAMES])
+    return Text("{names:s} and {more} more" if more > 0 else "{names:s}", names=first, more=more)
 
 
 def with_decimals(value: float, decimals: int) -> str:

@@ -288,14 +288,14 @@ def banner_of(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner 
             "SYNTHETIC.", Sentences(Text("None of these {total} runs came from a real bench.", total=total), how)
         )
     said = Text(
-        "{some} of {total} runs did not come from a real bench ({names:s}).",
+        "{some} of {total} runs did not come from a real bench ({names}).",
         some=len(made_up),
         total=total,
         names=list_in_words(made_up),
     )
     if not mixed and files:
         said = Text(
-            "Of {inputs} {some} did not come from a real bench ({names:s}).",
+            "Of {inputs} {some} did not come from a real bench ({names}).",
             inputs=count_inputs(sources),
             some=len(made_up),
             names=list_in_words(made_up),

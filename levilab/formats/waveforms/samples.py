@@ -21,6 +21,7 @@ from levilab.formats.waveforms.waveform import (
     check_step,
 )
 from levilab.texts.note import of_file
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping
@@ -197,8 +198,10 @@ def _rising_edges(
     if edges.size < FEWEST_PULSES:
         raise NoWaveform(path, f"has {edges.size} rising edges, at least {FEWEST_PULSES} are needed")
     others = [column.name for k, column in enumerate(header.columns) if counts[k] and k != chosen]
-    more = f"; {quote_names(others)} change, too: cut the other columns off for them" if others else ""
-    note = f"{path.name}: each row is a change: the rising edges of {header.columns[chosen].name} are the pulses{more}"
+    cut = "; {names:s} change, too: cut the other columns off for them"
+    more = Text(cut, names=quote_names(others)) if others else ""
+    said = "{name:s}: each row is a change: the rising edges of {column:s} are the pulses{more}"
+    note = Text(said, name=path.name, column=header.columns[chosen].name, more=more)
     return PulseTimes(path, "changes of a logic signal", edges, (of_file("changes", note),))
 
 
@@ -287,8 +290,11 @@ def _fit_step(path: Path, clock: _Clock, unit: float, *, first: float, mean: flo
     u = resolution * alike**0.5 / clock.count**1.5  # of n rounded times, each ± resolution/√12
     if u < _FINE * step or clock.longest[0] - clock.shortest[0] < 1e-6 * clock.resolution:  # all differences alike
         return _Times(first, step)
-    lost = f"its printed times have lost digits (one unit of the last is {resolution:g} s, a step {step:.4g} s): the "
-    known = f"{path.name}: {lost}sampling rate, and so any frequency, is known to {digits(u / step, 1)} of it"
+    lost = (
+        "{name:s}: its printed times have lost digits (one unit of the last is {resolution:g} s, a step {step:.4g} s): "
+        "the sampling rate, and so any frequency, is known to {part:n} of it"
+    )
+    known = Text(lost, name=path.name, resolution=resolution, step=step, part=digits(u / step, 1))
     return _Times(first, step, (of_file("digits", known),), u)
 
 
@@ -311,10 +317,16 @@ def _uneven_times(head: Head, header: Header, survey: _Survey) -> _Times:
     times = np.concatenate([block.numbers[:, 0] for block in blocks])[: survey.count] * unit
     apart = np.diff(times)
     step, (longest, line) = float(np.median(apart)) or float(apart.mean()), survey.clock.longest
-    text = f"its times are {shortest * unit:.4g} to {longest * unit:.4g} s apart (line {line}), mostly {step:.4g} s"
-    return _Times(
-        float(times[0]), step, (of_file("uneven", f"{path.name}: {text}: they are used as printed"),), times=times
+    text = Text(
+        "{name:s}: its times are {shortest:.4g} to {longest:.4g} s apart (line {line}), mostly {step:.4g} s: they are "
+        "used as printed",
+        name=path.name,
+        shortest=shortest * unit,
+        longest=longest * unit,
+        line=line,
+        step=step,
     )
+    return _Times(float(times[0]), step, (of_file("uneven", text),), times=times)
 
 
 def _times_by_header(path: Path, header: Header, first: float, mean: float) -> _Times:
