@@ -15,6 +15,9 @@ import time
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any, BinaryIO, cast
 
+if sys.platform == "darwin":
+    import fcntl
+
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from pathlib import Path
@@ -32,8 +35,6 @@ class Computer:
     def sync(self, file: BinaryIO) -> None:
         """Wait until the content of a file is on the disk."""
         if sys.platform == "darwin":  # where fsync leaves it in the disk's own memory
-            import fcntl
-
             with contextlib.suppress(OSError):  # a disk of the network takes no such order
                 fcntl.fcntl(file.fileno(), fcntl.F_FULLFSYNC)
                 return
