@@ -289,7 +289,9 @@ def _advice(tried: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, A
             continue
         names = [one.name for one in found if one.name not in needs_more]
         if names and tried not in found:
-            return Text("; levilab analyze {names:s} {path:s} reads it", names=" or ".join(names), path=str(path))
+            *first, last = names
+            either = Text("{first:s} or {last:s}" if first else "{last:s}", first=(*first,), last=last)
+            return Text("; levilab analyze {names} {path:s} reads it", names=either, path=path)
     return ""
 
 

@@ -12,7 +12,7 @@ from levilab.report.worksheets.sheets import SHEETS
 from levilab.texts.text import Text
 
 
-def _named_sheets(names: list[str] | None) -> list[str]:
+def _read_sheets(names: list[str] | None) -> list[str]:
     """Return the experiments that are named; the keys of all four take minutes, and are not made by accident."""
     if not names:
         raise UsageError("EXPERIMENT", f"name some of {', '.join(SHEETS)}, as levilab worksheet spin, or all")
@@ -48,7 +48,7 @@ def of_class(
 def worksheet(
     experiments: Annotated[
         list[str] | None,
-        argument("EXPERIMENT…", f"Of {', '.join(SHEETS)}; or all.", callback=_named_sheets, show_default=False),
+        argument("EXPERIMENT…", f"Of {', '.join(SHEETS)}; or all.", callback=_read_sheets, show_default=False),
     ] = None,
     out: Annotated[Path, place("DIR", "Where the files are written.")] = Path("worksheets"),
     groups: Annotated[int, option("N", "How many, each with its seed.", min=1, max=500)] = 20,

@@ -188,7 +188,7 @@ class SimulatedMotion(Exportable, Trajectory):
 
         return for_notebooks(motion_figure(self._found))
 
-    def written(self, folder: Path) -> Path:
+    def write(self, folder: Path) -> Path:
         """Return its run folder, which is made in this one where there is none yet.  Raises CannotWrite."""
         assert self.request
         return self.folder or write_motion(self._found, self.request, folder)

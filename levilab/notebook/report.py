@@ -54,7 +54,7 @@ def _paths(item: Reported, made: Path) -> list[Path]:
     if isinstance(item, Run):
         return [item.folder]
     if isinstance(item, SimulatedMotion):
-        return [item.written(made)]
+        return [item.write(made)]
     if isinstance(item, SimulatedMap):
         if item.path is None:
             raise UsageError("data", "a report needs its store: sweep with out='map.zarr'", value=repr(item))

@@ -13,6 +13,7 @@ from analysis.rotation import spin_of_field
 from analysis.uncertainty import Estimate
 from levilab.crosscheck.own.model import Own
 from levilab.crosscheck.subject import Trial, TrialFailed, pull_of
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -37,16 +38,18 @@ def trials_of(found: SpinAnalysis) -> Own:
     spin = run.spin
     turns = spin.pulses + spin.missing
     if line := run.line:
-        about = (
-            f"a record of {line.samples} samples with a line of this spin and slope, of these amplitudes, in this noise"
+        about = Text(
+            "a record of {n} samples with a line of this spin and slope, of these amplitudes, in this noise",
+            n=line.samples,
         )
         return Own(about, lambda random: _of_field(random, line), _COST_OF_FIELD_S)
     if source.readings.pulses or spin.bound is None or spin.snr_db is None:
-        about = f"the times of {turns} pulses of this spin and slope, each off by as much as these"
+        about = Text("the times of {turns} pulses of this spin and slope, each off by as much as these", turns=turns)
         return Own(about, lambda random: _of_times(random, spin), _COST_S)
     rate = source.readings.waveforms[0].rate
     n = round((turns + 1) / (spin.frequency.value or 1.0) * rate)
-    about = f"a record of {n} samples with {turns} pulses of this spin and slope, with this noise and jitter"
+    record = "a record of {n} samples with {turns} pulses of this spin and slope, with this noise and jitter"
+    about = Text(record, n=n, turns=turns)
     code = run.code or 0.0
     return Own(
         about,

@@ -15,7 +15,7 @@ from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
-from levilab.present.numbers import enumeration, how_many
+from levilab.present.numbers import how_many
 from levilab.runs.traces import INDEX, undescribed_codes
 from levilab.runs.waveforms import run_waveforms
 from levilab.texts.note import Note, of_file
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 #: Channels whose frequency is no spin, as experiments call them, with what it is.
 NO_SPIN = {"laser": "how often the stem cuts the laser: its precession", "drive": "that of the drive"}
-_CHOSEN = "has records of {names}; {chosen} is analyzed, the option `channel` chooses another"
+_CHOSEN = "has records of {names:s}; {chosen:s} is analyzed, the option `channel` chooses another"
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +110,9 @@ def read_spin_file(path: Path, options: InputOptions) -> Records:
     chosen = record.signals[record.signal(options.channel)].name
     warnings = list(record.warnings)
     if options.channel is None and len(record.signals) > 1:
-        warnings.append(
-            of_file("channels", Text(_CHOSEN, names=tuple(one.name for one in record.signals), chosen=chosen))
-        )
+        names = tuple(one.name for one in record.signals)
+        text = Text(_CHOSEN, names=names, chosen=chosen)
+        warnings.append(of_file("channels", Text("{path:s}: {message}", path=path.name, message=text)))
     return Records(path, (record,), chosen, None, tuple(warnings))
 
 
@@ -134,7 +134,7 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
     if not of_channel:
         raise DataError(
             Text(
-                "{path:s}: has no record of {chosen:s}, but of {names}: name one with `channel`",
+                "{path:s}: has no record of {chosen:s}, but of {names:s}: name one with `channel`",
                 path=run.folder,
                 chosen=repr(chosen),
                 names=(*names,),
@@ -148,7 +148,7 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
     if chosen.casefold() in NO_SPIN:
         what = NO_SPIN[chosen.casefold()]
         warnings.append(
-            Note("no spin", Text("the frequency of {chosen} is no spin, but {what}", chosen=chosen, what=what))
+            Note("no spin", Text("the frequency of {chosen:s} is no spin, but {what}", chosen=chosen, what=what))
         )
     if options.channel is None and len(names) > 1:
         warnings.append(Note("channels", Text(_CHOSEN, names=(*names,), chosen=chosen)))
@@ -162,10 +162,10 @@ def _shows_a_spin(run: Run, names: Counter[str]) -> str:
         return spins[0]
     raise DoesNotSuit(
         Text(
-            "{path:s}: keeps records of {names}, none of which shows the spin: levilab analyze precession reads such a "
-            "run; `channel` = {first:s} takes the frequency of its pulses",
+            "{path:s}: keeps records of {names:s}, none of which shows the spin: levilab analyze precession reads such "
+            "a run; `channel` = {first:s} takes the frequency of its pulses",
             path=run.folder,
-            names=enumeration([*names]),
+            names=(*names,),
             first=next(iter(names)),
         )
     )

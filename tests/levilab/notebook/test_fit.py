@@ -108,7 +108,6 @@ def test_a_fit_pickles(result):
     assert again.best_fit == pytest.approx(result.best_fit)
 
 
-@pytest.mark.filterwarnings("ignore::levilab.errors.DoubtWarning")
 @pytest.mark.parametrize(
     ("stated", "tilt", "ratio"), [(0.02, "none", 1.2), (0.02, "auto", 1.5), (None, "none", 1.5), (None, "auto", 1.9)]
 )

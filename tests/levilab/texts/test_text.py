@@ -24,6 +24,7 @@ from levilab.live.server import PAGE
 from levilab.live.views import VIEWS
 from levilab.live.words import change_texts
 from levilab.pipelines.analyzed import EachAlone
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.look import QUANTITIES
 from levilab.pipelines.precession.words import miscount_as_text
 from levilab.pipelines.sources import OTHER_COLUMNS
@@ -102,7 +103,9 @@ def of_files() -> set[str]:
     """What is said of files and runs that are left out."""
     kinds = (*KINDS, OTHER, EMPTY, OTHER_COLUMNS)
     runs = {f"{name} run" for name in EXPERIMENTS}
-    return {text for kind in kinds for text in (kind.name, kind.several, kind.advice)} | runs | {f"{r}s" for r in runs}
+    needed = {one.runs for one in ANALYSES.values()}
+    texts = {text for kind in kinds for text in (kind.name, kind.several, kind.advice)}
+    return texts | needed | runs | {f"{r}s" for r in runs}
 
 
 def of_program() -> set[str]:
@@ -113,7 +116,7 @@ def of_program() -> set[str]:
             if not isinstance(call, ast.Call):
                 continue
             called = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
-            said = call.args if called in WITH_VALUES and call.keywords else call.args[: called == "Text"]
+            said = call.args if called in WITH_VALUES and call.keywords else call.args[: called in {"Text", "title_of"}]
             if said and name.startswith("levilab."):
                 found |= {text for one in said for text in strings(one)}
             elif called in SAYING and name.startswith(ROOMS) and len(call.args) > SAYING[called]:

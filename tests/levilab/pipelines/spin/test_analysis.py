@@ -27,6 +27,7 @@ from levilab.pipelines.suits import save as save_found
 from levilab.runs.run import Run, RunRecord
 from levilab.runs.waveforms import run_waveforms
 from levilab.runs.writer import RunWriter
+from levilab.texts.text import in_language
 from support.detector import C32, RELEASE_HZ, coasting_turns, coasting_wav, pulses, write_wav
 from support.figures import faults
 from support.paths import ROOT
@@ -60,7 +61,7 @@ def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data):
 
 def test_a_laser_and_a_drive_are_no_spin(sample_data):
     sweep = sample_data / "precession-sweep"
-    with pytest.raises(DoesNotSuit, match="records of laser and drive, none of which shows the spin: levilab analyze"):
+    with pytest.raises(DoesNotSuit, match="records of laser, drive, none of which shows the spin: levilab analyze"):
         SPIN.analyze([sweep], SpinOptions())
     named = SPIN.analyze([sweep], SpinOptions(channel="laser"))
     assert any("the frequency of laser is no spin, but how often" in text for text in named.all_warnings)
@@ -74,10 +75,19 @@ def test_options_reach_the_file_and_the_method(sample_data):
     two = sample_data / "scope-files" / "rigol-ds1000z.csv"
     other = SPIN.analyze([two], SpinOptions(channel="2")).runs[0].spin
     assert other.frequency.value == pytest.approx(50, abs=0.01)  # 40 samples high, 40 low, at 4000 a second
-    assert any(
-        "CH1 is analyzed, the option `channel` chooses another" in text
-        for text in SPIN.analyze([two], SpinOptions()).all_warnings
-    )
+
+
+def test_a_note_of_channels_names_its_file_and_them_as_they_are_in_german_too(tmp_path):
+    """German has a word for "mark", which `channel` would not take; two files have a note each."""
+    times = np.arange(2000) / 4000
+    table = np.column_stack([times, pulses(30 * times), times % 0.1])
+    for name in ("p1.csv", "p2.csv"):
+        shifted = table + (name == "p2.csv") * 1e-3  # not the same readings twice
+        np.savetxt(tmp_path / name, shifted, "%.7g", ",", header="time [s],mark,laser", comments="")
+    found = SPIN.analyze([tmp_path / "p1.csv", tmp_path / "p2.csv"], SpinOptions())
+    said = [in_language(text, "de") for text in found.all_warnings]
+    has = "hat Aufzeichnungen von mark; laser; ausgewertet wird mark, die Option `channel` wählt etwas anderes"
+    assert [text for text in said if "Aufzeichnungen" in text] == [f"p1.csv: {has}", f"p2.csv: {has}"]
 
 
 def test_a_long_record_is_followed_and_feeds_the_drag_laws(tmp_path):

@@ -23,6 +23,7 @@ from levilab.pipelines.spindown.report import spindown_part, spindown_tables
 from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Tabular
 from levilab.runs.run import Run
+from levilab.texts.text import in_language, text_of
 from support.spin_downs import spin_down_csv
 
 #: The thesis's constants, as printed: C₁ [1/s], |C₂| [1/rad].
@@ -265,8 +266,10 @@ def test_in_a_searched_folder_what_is_broken_is_passed_over_and_told(sample_data
 
 
 def test_a_run_of_another_experiment_is_refused_by_name(sample_data):
-    with pytest.raises(DataError, match="holds a limit run, spindown needs a spin run"):
+    with pytest.raises(DataError, match="holds a limit run, spindown needs a spin run") as refused:
         SPINDOWN.analyze([sample_data / "lower-limits"], SpinDownOptions())
+    german = in_language(text_of(refused.value), "de")
+    assert german.endswith("Art der Messung: Grenzmessung; spindown liest: Auslaufmessung")
 
 
 def test_a_folder_without_runs_says_what_it_found(sample_data, tmp_path):
