@@ -511,13 +511,13 @@ def write_track() -> None:
 
 #: The record of a phone above that top: its length, samples per second, distance and place beside the axis, and the
 #: moment across the axis; noise of a sample and field of the base there.
-FIELD_S, SAMPLES, ABOVE_M, ASIDE_M, ACROSS_A_M2 = 60.0, 100.0, 0.12, 0.003, 0.02
+FIELD_S, FIELD_HZ, ABOVE_M, ASIDE_M, ACROSS_A_M2 = 60.0, 100.0, 0.12, 0.003, 0.02
 FIELD_NOISE_UT, BASE_UT = 0.12, (36.0, -21.0, 2240.0)
 
 
 def write_field() -> None:
     """Make the record of a phone that lies above the swaying top; its last digits depend on the processor."""
-    motion = simulate(preset("undriven").changed(TRACK_SCENE), FIELD_S, rate=SAMPLES, tolerance=1e-6)
+    motion = simulate(preset("undriven").changed(TRACK_SCENE), FIELD_S, rate=FIELD_HZ, tolerance=1e-6)
     field = 1e6 * field_of_top(motion, ABOVE_M, ASIDE_M, ACROSS_A_M2) + BASE_UT
     field += np.random.default_rng(24).normal(0, FIELD_NOISE_UT, field.shape)
     head = '"Time (s)","Magnetic Field x (µT)","Magnetic Field y (µT)","Magnetic Field z (µT)"'
