@@ -48,6 +48,9 @@ HELD_WITHIN_HZ = 1.0
 #: a third of a turn in 10 s each, nor by this multiple of u; a lost top loses 1 Hz meanwhile.
 #: Fewest counts in a half.
 _DRIFTS_HZ, _DRIFTS_BY_U, _FEWEST_IN_HALF = 0.1, 3.0, 3
+#: A top that was taken along nearly half a turn off the drive may turn over against it, slowly and once, and is held
+#: then; with the swing that is less than this [turns].  A tape that slips is as far behind in a second hold.
+_TURNED_OVER = 1.5
 #: A top that the drive did not take hold of, or lost, loses 0.1 Hz/s to the air: the interval between looks on the way
 #: [s], and the number of tries.
 _LOOK_EVERY_S, _TRIES_TO_HOLD = 10.0, 4
@@ -393,17 +396,28 @@ def held_spin(session: Session[D], drive: float) -> float:
 
 def _hold(session: Session[D], drive: float) -> None:
     """Let the motion settle, and compare the counted spin with the drive's frequency meanwhile.  Raises NotHeld."""
+    for first in (True, False):
+        counts = _counts_of_hold(session, drive)
+        if len(counts) < 2:
+            return
+        if has_drifted(counts):  # a top that is lost is taken for held until it is HELD_WITHIN_HZ behind
+            raise NotHeld(counts[-1], drive)
+        slip = slip_of(counts, drive)
+        turns = abs(slip.difference) * len(counts) * session.settings.gate_s
+        if not (first and slip.significant and turns < _TURNED_OVER):
+            break
+    compare_with_drive(session, slip)
+
+
+def _counts_of_hold(session: Session[D], drive: float) -> list[float]:
+    """Return the counts while the drive holds the top [Hz].  Raises NotHeld."""
     n = round(session.settings.hold_s / session.settings.gate_s)
     counts = []
     for k in range(n):
         session.stop.check()
         counts.append(held_spin(session, drive))
         session.progress(Text("held at {drive:.2f} Hz", drive=drive), (k + 1) / n)
-    if n > 1:
-        slip = slip_of(counts, drive)
-        if has_drifted(counts):  # a top that is lost is taken for held until it is HELD_WITHIN_HZ behind
-            raise NotHeld(counts[-1], drive)
-        compare_with_drive(session, slip)
+    return counts
 
 
 def has_drifted(counts: Sequence[float]) -> bool:

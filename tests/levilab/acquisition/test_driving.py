@@ -170,6 +170,21 @@ def test_a_top_lost_while_it_is_held_is_not_compared_with_its_drive(monkeypatch)
     assert said == []
 
 
+@pytest.mark.parametrize(("second", "slips"), [(30.0, False), (29.95, True)])
+def test_a_top_that_turns_over_once_against_the_drive_has_no_loose_washers(monkeypatch, second, slips):
+    """One turn behind in 20 s is 0.05 Hz; a tape that slips is as far behind in the next 20 s."""
+    warned = []
+    counts = iter([spin + 0.03 * (-1) ** k for spin in (29.95, second) for k in range(20)])
+    monkeypatch.setattr("levilab.acquisition.driving.held_spin", lambda *_: next(counts))
+    settings = DriveSettings(hold_s=20.0, gate_s=1.0)
+    session = SimpleNamespace(
+        settings=settings, progress=lambda *_: None, event=lambda *_, **__: None, warn=warned.append, stop=Stop()
+    )
+    _hold(session, 30.0)
+    assert bool(warned) is slips
+    assert next(counts, None) is None
+
+
 def test_ctrl_c_ends_a_hold_after_the_count_under_way(monkeypatch):
     """Not after all of its counts, 20 s later, with the drive on."""
     stop, counts = Stop(), []
