@@ -14,6 +14,7 @@ from levilab.present.drawing import headline, panel
 from levilab.present.looks import GREEN, SKY, VERMILION, YELLOW
 from levilab.present.numbers import short_name, with_uncertainty
 from levilab.present.style import STYLE, WIDE
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,7 +33,10 @@ def video_figure(analysis: VideoAnalysis) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, sum(heights) + _ROOM * (len(shown) + 1)))
         spin = analysis.runs[0].spin
-        headline(figure, f"Its mark turns at {with_uncertainty(spin)}" if spin else "The top in the first picture")
+        turns = (
+            Text("Its mark turns at {spin}", spin=with_uncertainty(spin)) if spin else "The top in the first picture"
+        )
+        headline(figure, turns)
         top = _ROOM
         for height, (source, run) in zip(heights, shown, strict=True):
             _draw(panel(figure, 0.1, top, _WIDTH, height), source, run)

@@ -156,9 +156,9 @@ def _numbers(sheet: Sheet, language: Language, seeds: Mapping[str, int], found: 
         if part:
             if part is known:  # written by hand
                 columns.append([_BLANK] * len(seeds))
-                heads.append(words["mark"])
+                heads.append(words["grade"])
             rows = [tuple(row) for row in zip(*columns, strict=True)]
-            shown = table("", heads, rows, numbers=[head for head in heads[1:] if head != words["mark"]])
+            shown = table("", heads, rows, numbers=[head for head in heads[1:] if head != words["grade"]])
             said = [words[about], *[words["about_clicks"]] * (part is known and sheet.clicks == "with_clicks")]
             yield Tabular(about.replace("_", "-"), shown, " ".join(said), first_column_wraps=True)
 

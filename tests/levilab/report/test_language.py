@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text as Label
 
+from levilab.pipelines.catalogue import ANALYSES
 from levilab.present.style import as_png
 from levilab.report.page import write_report
 from levilab.texts.text import Text, speak
@@ -63,3 +65,22 @@ def test_a_figure_says_its_texts_and_numbers_in_german() -> None:
     as_png(figure)
     assert (axes.get_title(), axes.get_xlabel()) == ("Auslaufen: passt", "Zeit  [s]")
     assert axes.get_xticklabels()[1].get_text() == "0,2"
+
+
+@pytest.mark.usefixtures("german")
+@pytest.mark.parametrize(("name", "path"), [("video", "video/top.mp4"), ("hold", "hold")])
+def test_no_english_text_is_left_in_a_german_figure(name: str, path: str) -> None:
+    """Nor one that is longer than its axes: it would run into the next ones."""
+    if name == "video":
+        pytest.importorskip("av")
+    analysis = ANALYSES[name]
+    paths = sorted((SAMPLE_DATA / path).glob("*-hz")) or [SAMPLE_DATA / path]
+    figure = analysis.figure(analysis.analyze(paths, analysis.options_from({"rim_m": 0.03} if name == "video" else {})))
+    as_png(figure)
+    said = [text.get_text() for text in figure.findobj(Label)]
+    left = [text for text in said if re.search(r"\b(mark|rim|base|path|turns|drag|law|by|the|spin)\b", text)]
+    assert left == []
+    assert not any("Bewertung" in text for text in said)
+    for axes in figure.axes:
+        label, room = axes.yaxis.label.get_window_extent(), axes.get_window_extent()
+        assert label.height <= room.height
