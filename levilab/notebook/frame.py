@@ -151,7 +151,10 @@ def _split_columns(data: Any) -> Any:
 
 
 def _as_array(item: Any) -> np.ndarray:
-    """Return numbers, or numbers with u, as an array.  Raises UsageError."""
+    """Return numbers, or numbers with u, as an array, NaN where a mask of numpy leaves one out.  Raises UsageError."""
+    if isinstance(item, np.ma.MaskedArray) and item.dtype.kind in "iufmM":
+        dates = item.dtype.kind in "mM"
+        item = np.ma.filled(item, item.dtype.type("NaT")) if dates else np.ma.filled(item.astype(float), np.nan)
     array = np.asarray(item, dtype=object if _has_u(item) else None)
     if array.dtype.kind in "mM" and array.size:  # dates, or spans of time
         array = (array - array.flat[0] if array.dtype.kind == "M" else array) / np.timedelta64(1, "s")

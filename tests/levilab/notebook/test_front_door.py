@@ -255,6 +255,17 @@ def test_messages_about_a_dataframe_name_its_rows() -> None:
     assert any(text.endswith("row 5") for text in result.document["warnings"])
 
 
+def test_masked_readings_of_numpy_are_left_out_as_nan() -> None:
+    time, spin = spin_down().to_numpy(copy=True).T
+    masked = np.isin(time, [20.0, 50.0])
+    spin[masked] = 99.0
+    dates = np.datetime64("2026-01-01") + time.astype("timedelta64[s]")
+    for data in ((time, np.ma.array(spin, mask=masked)), (np.ma.array(dates, mask=masked), spin)):
+        result = levilab.analyze(data, reading_u=0.03)
+        assert result.ndata == 6
+        assert any(text.endswith("rows 2, 5") for text in result.document["warnings"])
+
+
 def test_several_dataframes_are_told_apart_by_their_place() -> None:
     frames = [spin_down(), spin_down() * 1.01]
     assert levilab.analyze(frames, reading_u=0.03).inputs == ("DataFrame 1", "DataFrame 2")
