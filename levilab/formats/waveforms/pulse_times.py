@@ -12,6 +12,7 @@ from levilab.formats.titles import is_unit, plain_unit, read_title, unit_factor
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.rows import read_blocks
 from levilab.formats.waveforms.waveform import FEWEST_PULSES, PulseTimes, Signal, Waveform, check_count, check_step
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 #: Slower turns are no turns [s]: times in µs or ms without a unit, of which a window of seconds holds none.
 _LONGEST_TURN_S = 10.0
+#: No top has pulses so near [s], ten a turn at 100 Hz: they are differences of the times between pulses.
+_SHORTEST_S = 1e-3
 #: Lines that may stand above the first number.
 _MOST_TITLES = 20
 
@@ -67,11 +70,24 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
         )
     if len(times) < FEWEST_PULSES:
         raise NoWaveform(path, f"holds {len(times)} numbers, at least {FEWEST_PULSES} pulse times are needed")
-    if (apart := float(np.median(np.diff(times)))) > _LONGEST_TURN_S:
-        what = f"its pulses are {apart:g} s apart, which no turn of a top lasts"
-        raise TableError(path, f"{what}: write the unit above the numbers, as t [us] or t [ms]", line=first + 1)
+    _must_be_of_turns(path, times, first + 1)
     warnings = [f"{path.name}, {block.torn}" for block in found if block.torn]
     return PulseTimes(path, "list of pulse times", times, tuple(warnings))
+
+
+def _must_be_of_turns(path: Path, times: NDArray[np.float64], line: int) -> None:
+    """Raise TableError for times too far apart for a top's pulses, NoRate for times too near."""
+    apart = float(np.median(np.diff(times)))
+    if apart > _LONGEST_TURN_S:
+        what = f"its pulses are {apart:g} s apart, which no turn of a top lasts"
+        raise TableError(path, f"{what}: write the unit above the numbers, as t [us] or t [ms]", line=line)
+    if apart < _SHORTEST_S:
+        said = Text(
+            "as times of pulses its numbers are {apart:.3g} s apart, and no top turns so fast: of times from pulse to "
+            "pulse write the sums (numpy.cumsum), of samples say the `rate` in Hz",
+            apart=apart,
+        )
+        raise NoRate(path, said)
 
 
 def _refuse_another_quantity(path: Path, titles: list[str]) -> None:

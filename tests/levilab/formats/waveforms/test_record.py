@@ -307,6 +307,12 @@ def test_pulse_times_in_microseconds_without_a_unit_are_asked_for_it(write):
     assert read_record(write(f"t [us]\n{times}")).times[1] == pytest.approx(0.025, rel=1e-12)
 
 
+def test_times_from_pulse_to_pulse_are_no_times_of_pulses(write):
+    """A micro-controller prints them, and those of a top that slows increase as well."""
+    with pytest.raises(TableError, match=r"2\.3e-06 s apart, and no top turns so fast: of times from"):
+        read_record(write("dt [ms]\n" + "".join(f"{25 + 0.0023 * k:.4f}\n" for k in range(300))))
+
+
 @pytest.mark.parametrize("title", ["f [Hz]", "rpm", "signal [V]", "height"])
 def test_a_column_of_another_quantity_is_no_list_of_pulses(title, write):
     """The numbers increase, as times do."""
