@@ -360,10 +360,13 @@ def _lines(rows: Sequence[Sequence[Any]]) -> bytes:
     texts = [cell for row in rows for cell in row if cell.__class__ is str and cell]
     comma = not any(map(_POINTED.fullmatch, texts))
     write = {**_CELLS, str: _with_points if comma else _plain}
+    clocks = {k for row in rows for k, cell in enumerate(row) if cell.__class__ is datetime}
 
     def line(row: Sequence[Any]) -> str:
-        plain = _NUMBERS.issuperset(map(type, row))
-        return "\t".join(map(repr, row) if plain else [write[type(cell)](cell) for cell in row])
+        if _NUMBERS.issuperset(map(type, row)):
+            return "\t".join(map(repr, row))
+        at = [" 00:00:00" if k in clocks and cell.__class__ is date else "" for k, cell in enumerate(row)]  # midnight
+        return "\t".join([write[type(cell)](cell) + end for cell, end in zip(row, at, strict=True)])
 
     return "".join([f"{line(row)}\n" for row in rows]).encode()
 

@@ -3,6 +3,7 @@
 import json
 import re
 import zipfile
+from datetime import date, datetime
 from pathlib import Path
 
 import numpy as np
@@ -411,6 +412,13 @@ def test_a_number_in_a_cell_keeps_its_last_bit(tmp_path):
         **{"xl/worksheets/sheet2.xml": f'<worksheet xmlns="{MAIN}"><sheetData/></worksheet>'},
     )
     assert read_table(path, quantities=SPIN).column("spin_frequency_hz").tolist() == [value] * 4
+
+
+def test_a_cell_of_midnight_is_a_time_among_times():
+    """The library returns a date for it, and a column of dates alone stays one of dates."""
+    clock = [datetime.fromisoformat("2026-03-01 23:59:50"), date(2026, 3, 2)]
+    lines = texts._lines([[at, date(2026, 3, 1), 40.0] for at in clock]).decode().splitlines()
+    assert lines[1] == "2026-03-02 00:00:00\t2026-03-01\t40.0"
 
 
 @pytest.mark.parametrize("value", ["", "<v/>", "<v></v>"])
