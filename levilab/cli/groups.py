@@ -15,7 +15,8 @@ from levilab.texts.text import Text
 def _read_sheets(names: list[str] | None) -> list[str]:
     """Return the experiments that are named; the keys of all four take minutes, and are not made by accident."""
     if not names:
-        raise UsageError("EXPERIMENT", f"name some of {', '.join(SHEETS)}, as levilab worksheet spin, or all")
+        text = Text("name some of {sheets:s}, as levilab worksheet spin, or all", sheets=(*SHEETS,))
+        raise UsageError("EXPERIMENT", text)
     named: list[str] = among([*SHEETS, "all"], "experiment")(names)
     return [*SHEETS] if "all" in named else named
 

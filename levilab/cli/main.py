@@ -16,6 +16,7 @@ from levilab.cli.later import Later
 from levilab.cli.options import speak_from
 from levilab.cli.output import message, silence
 from levilab.cli.quantities import APPLICATION, command_of, in_options
+from levilab.texts.text import Text, in_language
 
 
 class Commands(typer.core.TyperGroup):
@@ -45,8 +46,11 @@ class Commands(typer.core.TyperGroup):
         """Carry out what was called."""
         try:
             return super().invoke(ctx)
-        except typer.BadParameter as error:
-            error.message = explain_bad_value(error.message, _refused_value(error))
+        except _WRONG_WORDS as error:
+            if isinstance(error, typer.BadParameter):
+                error.message = explain_bad_value(error.message, _refused_value(error))
+            if error.ctx and isinstance(said := _as_text(error.format_message()), Text):
+                error.ctx.fail(in_language(said))
             raise
         except KeyboardInterrupt:  # what can be lost is said by the command itself
             message("levilab: interrupted")
@@ -61,6 +65,30 @@ _MEANT = {
     **dict.fromkeys(("measure", "record", "run", "messen"), "acquire"),
     **dict.fromkeys(("gui", "demo", "app", "start"), "live --mock"),
 }
+
+
+#: Wrong words on the command line; typer has no public name for them.
+_WRONG_WORDS: Any = typer.BadParameter.__base__
+#: What typer and this module say of them, the longer ones first.
+_TEMPLATES = (
+    "No such command '{name:s}'. Did you mean {near:s}?",
+    "No such command '{name:s}'.",
+    "No such command '{name:s}': take levilab {words:s}",
+    "{name:s} is a file or a folder, and no command: take levilab analyze {path:s}",
+    "No such option: {name:s} (Possible options: {near:s})",
+    "No such option: {name:s}",
+    "Invalid value for {name:s}: {value:s} is not one of {choices:s}.",
+    "Invalid value for {name:s}: {what:s}",
+)
+
+
+def _as_text(message: str) -> str:
+    """Return a message of typer's as a Text, which has other languages; as it is where no template is its."""
+    for template in _TEMPLATES:
+        pattern = re.sub(r"\\\{(\w+):s\\\}", r"(?P<\1>.+)", re.escape(template))
+        if found := re.fullmatch(pattern, message, re.DOTALL):
+            return Text(template, **found.groupdict())
+    return message
 
 
 def _of_another_command(name: str) -> str:

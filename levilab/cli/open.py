@@ -10,6 +10,7 @@ from levilab.cli.options import Json, Language, argument, existing_paths, flag, 
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.errors import NoneUsable, UsageError
 from levilab.pipelines.options import OF_FILES, read_options
+from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -68,7 +69,7 @@ def open_files(
 
 def _refusal(look: "Look") -> NoneUsable:
     if any(run.doubts for run in look.runs):
-        return NoneUsable(f"{look.path}: is not read before the question is answered, by `columns`")
+        return NoneUsable(Text("{path:s}: is not read before the question is answered, by `columns`", path=look.path))
     return NoneUsable(look.problem if str(look.path) in look.problem else f"{look.path}: {look.problem}")
 
 
@@ -158,7 +159,6 @@ def _print_doubts(look: "Look", run: "UnderstoodRun") -> None:
     from rich.markup import escape
 
     from levilab.present.terminal import terminal
-    from levilab.texts.text import in_language
 
     console = terminal()
     for text in run.warnings:
@@ -172,6 +172,6 @@ def _print_doubts(look: "Look", run: "UnderstoodRun") -> None:
             keys = dict.fromkeys(key for choice in doubt.choices for key in choice.columns)
             answers = [("by their numbers", ",".join(f"{key}=NUMBER" for key in keys))]
         for text, columns in answers:
-            console.print(escape(f'  {text}: levilab open {look.path} --columns "{columns}"'))
+            console.print(escape(f'  {in_language(text)}: levilab open {look.path} --columns "{columns}"'))
     if run.problem and not run.doubts and run.problem != look.problem:
         console.print(f"[red]not read:[/red] {escape(run.problem)}")

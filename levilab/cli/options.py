@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from levilab.errors import UsageError, list_known
-from levilab.texts.text import ENGLISH, languages, speak
+from levilab.texts.text import ENGLISH, Text, languages, speak
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Sequence
@@ -144,7 +144,8 @@ def _runs_or(paths: list[Path] | None) -> list[Path]:
 def named_scene(scene: str | None) -> str:
     """Return the name of a scene.  Raises UsageError where none is given."""
     if scene is None:
-        raise UsageError("SCENE", f"is missing: name one of {SCENES}, or a scene's file, as in levilab simulate driven")
+        text = "is missing: name one of {scenes:s}, or a scene's file, as in levilab simulate driven"
+        raise UsageError("SCENE", Text(text, scenes=SCENES))
     return scene
 
 

@@ -498,13 +498,18 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
         examples = [EXAMPLES[name] for name in quantities if name in EXAMPLES]
         known = ", ".join([*(name for name in quantities if name in LISTED and name not in COMPANIONS), *examples])
         wanted_names = needed or [name for name in SHORTHANDS.values() if name in quantities][:2]
-        words = "" if any(_numbers(layout, k) for k in range(layout.width)) else "there are no numbers in it, and "
-        if words and locate(path)[1]:
+        numbers = any(_numbers(layout, k) for k in range(layout.width))
+        if not numbers and locate(path)[1]:
             raise NoTable(path, "is a sheet without numbers")
+        unknown = Said(
+            "no title is known ({known:s} …) among {titles:s}: say `columns` = {columns:s}",
+            known=known,
+            titles=quote_names(header),
+            columns=_in_one_word(f"{_key(name)}=NAME" for name in wanted_names),
+        )
         raise NoSuchColumn(
             path,
-            f"{words}no title is known ({known} …) among {quote_names(header)}: say `columns` = "
-            + _in_one_word(f"{_key(name)}=NAME" for name in wanted_names),
+            unknown if numbers else Said("there are no numbers in it, and {text}", text=unknown),
             line=layout.header_line or layout.first_line,
             doubt=_which_columns(layout, wanted_names),
         )
@@ -541,7 +546,10 @@ def _which_columns(layout: Layout, names: Collection[str]) -> Doubt | None:
         for name in names
         for k in numeric
     )
-    return Doubt("titles", f"which column is {' and which '.join(map(_in_words, names))}?", None, choices)
+    asked, *others = map(_in_words, names)
+    for one in others:
+        asked = Said("{first} and which {second}", first=asked, second=one)
+    return Doubt("titles", Said("which column is {quantity}?", quantity=asked), None, choices)
 
 
 def _is_of_another(title: str, names: Collection[str]) -> bool:
@@ -557,7 +565,7 @@ def _is_field(title: str) -> bool:
 
 def _in_words(name: str) -> str:
     """Return a canonical name for people: the time, the spin frequency."""
-    return f"the {name.rpartition('_')[0].replace('_', ' ')}"
+    return Said("the {quantity}", quantity=name.rpartition("_")[0].replace("_", " "))
 
 
 def _in_one_word(columns: Iterable[str]) -> str:
@@ -583,7 +591,12 @@ def _total_of_turns(path: Path, name: str, layout: Layout, chosen: Sequence[Colu
 
 def no_column(path: Path, name: str, header: Sequence[str], doubt: Doubt | None = None) -> NoSuchColumn:
     """Return the error for a quantity that no column is known to hold."""
-    text = f"no column is known to be {name}; it has {quote_names(header)}: say `columns` = {_key(name)}=NAME"
+    text: str = Said(
+        "no column is known to be {name:s}; it has {titles:s}: say `columns` = {key:s}=NAME",
+        name=name,
+        titles=quote_names(header),
+        key=_key(name),
+    )
     nearly = next((title for title in header if nearly_a_frequency(title)), None) if "frequency" in name else None
     foreign = next((title for title in header if read_title(title).column == name), None)
     if foreign:

@@ -84,8 +84,11 @@ def existing(paths: list[Path] | None) -> list[Path]:
     """
     if not paths and not RUNS.exists():
         raise DataError(
-            f"there is no folder {RUNS} here, and no other path is given: name a run or a data file, or make a run "
-            "with levilab acquire spin `mock`"
+            Text(
+                "there is no folder {folder:s} here, and no other path is given: name a run or a data file, or make a "
+                "run with levilab acquire spin `mock`",
+                folder=RUNS,
+            )
         )
     for path in paths or []:
         if not locate(find_run(path))[0].exists():
@@ -129,6 +132,6 @@ def must_be_searchable(root: Path) -> None:
     if root.is_file():
         raise DataError(f"{root}: is a file; name the folder that holds the runs")
     if not root.is_dir():
-        raise DataError(f"{root}: there is no such folder; levilab acquire writes runs into runs/")
+        raise DataError(Text("{root:s}: there is no such folder; levilab acquire writes runs into runs/", root=root))
     if not os.access(root, os.R_OK | os.X_OK):
         raise DataError(f"{root}: may not be searched by you; change its permissions or name another folder")

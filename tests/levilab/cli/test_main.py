@@ -274,6 +274,36 @@ def test_what_other_programs_call_a_command_or_an_option_is_told_ours(typed, say
     assert says in " ".join(line.strip("│ ") for line in done.err.splitlines())
 
 
+@pytest.mark.parametrize(
+    ("typed", "says"),
+    [
+        ("anlyze", "Den Befehl 'anlyze' gibt es nicht. Meintest du 'analyze'?"),
+        ("analyze spindwn", "Den Befehl 'spindwn' gibt es nicht. Meintest du 'spindown', 'spin'?"),
+        ("fit my.csv", "Den Befehl 'fit' gibt es nicht: Nimm levilab analyze my.csv"),
+        ("my.csv", "my.csv ist eine Datei oder ein Ordner und kein Befehl: Nimm levilab analyze my.csv"),
+        ("runs --nonsense", "Die Option --nonsense gibt es nicht"),
+        ("analyze spin my.csv --method matchd", "Falscher Wert für '--method': 'matchd' ist keins von 'auto'"),
+        ("simulate", "SCENE: fehlt: eine von undriven"),
+        ("worksheet", "EXPERIMENT: einige von spin"),
+        ("report", "hier gibt es keinen Ordner runs, und kein anderer Pfad ist angegeben"),
+        ("runs", "runs: diesen Ordner gibt es nicht"),
+        ("analyze spindown my.csv", "rpm …), es gibt 'Foo', 'Bar': --columns \"t=NAME,f=NAME\" angeben"),
+        ("analyze spindown half.csv", "es gibt 't [s]', 'x': --columns f=NAME angeben"),
+        ("open my.csv --no-browser", "my.csv: wird erst gelesen, wenn die Frage mit --columns beantwortet ist"),
+    ],
+)
+def test_the_commonest_mistakes_are_answered_in_german(typed, says, tmp_path, monkeypatch):
+    monkeypatch.setenv("LEVILAB_LANGUAGE", "de")
+    for name, titles in (("my.csv", "Foo,Bar"), ("half.csv", "t [s],x")):
+        (tmp_path / name).write_text(f"{titles}\n0,38\n10,37\n20,36\n", encoding="utf-8")
+    done = command(*typed.split(), cwd=tmp_path)
+    assert done.status in {1, 2}
+    assert says in " ".join(line.strip("│ ") for line in done.err.splitlines())
+    if typed.startswith("open"):
+        assert "welche Spalte enthält Zeit und welche Drehfrequenz?" in done.out
+        assert "mit ihren Nummern: levilab open" in done.out
+
+
 @pytest.mark.parametrize("encoding", ["cp1252", "ascii"])
 def test_an_old_code_page_costs_no_number_its_exponent(tmp_path, encoding):
     """As PYTHONIOENCODING and an old Windows have it: such streams refuse what they cannot carry."""
