@@ -120,7 +120,7 @@ class Column:
     @property
     def is_total(self) -> bool:
         """Whether it counts turns since the start."""
-        return self.unit == TOTAL and not self.behind
+        return self.unit == TOTAL and self.name in QUANTITIES
 
 
 @dataclass(frozen=True)
@@ -196,7 +196,7 @@ def choose_columns(
     meant = header if meant is None else meant
     titles = _with_periods(meant)
     chosen, stated = _wanted_columns(path, header, wanted)
-    offered, warnings = _offered_columns(path, header, titles, chosen, quantities)
+    offered, warnings = _offered_columns(path, header, titles, chosen, stated, quantities=quantities)
     offered |= _by_units(titles, units, {*chosen, *offered}, set(chosen.values()), quantities)
     chosen |= {name: _only_one(path, header, name, indices) for name, indices in offered.items()}
     written = {
@@ -215,9 +215,10 @@ def choose_columns(
             continue
         # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
         unit = written[name] or written.get(quantity)
-        if unit == TOTAL and name == quantity:
-            columns.append(Column(name, index, header[index], 1.0, unit=TOTAL, written=True))
+        if written.get(quantity) == TOTAL:
+            columns.append(_of_count(path, name, index, header[index], unit))
             continue
+        unit = None if unit == TOTAL else unit
         if unit == "%" or (unit and dimension(name) == "frequency" and unit_factor(unit, "frequency") is None):
             factor = 0.01 if unit == "%" else unit_factor(unit, "time") or 1
             columns.append(Column(name, index, header[index], factor, inverse=unit != "%", unit=unit, written=True))
@@ -229,7 +230,43 @@ def choose_columns(
         says_unit = not implied_unit(meant[index]) or is_unit(meant[index])  # rpm does, omega does not
         sure = bool(unit) and (name in stated or says_unit)
         columns.append(Column(name, index, header[index], factor, unit=unit or _SI[dimension(name)], written=sure))
-    return tuple(sorted(columns, key=lambda c: CANONICAL.index(c.name))), tuple(warnings)
+    columns, notes = _without_counts(path, columns, {SHORTHANDS.get(key, key) for key in wanted})
+    return tuple(sorted(columns, key=lambda c: CANONICAL.index(c.name))), (*warnings, *notes)
+
+
+def _of_count(path: Path, name: str, index: int, label: str, unit: str | None) -> Column:
+    """Return the column of turns since the start, or of their u.  Raises TableError for a u in another unit."""
+    if unit != TOTAL:
+        said = "column '{title:s}' is in {unit:s} beside turns since the start: give u of the count, in turns"
+        raise TableError(path, Text(said, title=shorten(label), unit=unit))
+    return Column(name, index, label, 1.0, unit=TOTAL, written=True)
+
+
+def _without_counts(path: Path, columns: list[Column], wanted: Collection[str]) -> tuple[list[Column], list[str]]:
+    """Return the columns without turns since the start that stand beside others than times, and notes on them.
+
+    Raises TableError for those that are wanted.
+    """
+    notes: list[str] = []
+    for total in [column for column in columns if column.is_total]:
+        own = {total.name, companion(total.name)}
+        if {column.name for column in columns} - own == {"time_s"}:
+            continue
+        what = total_beside_others(total.label)
+        if total.name in wanted:
+            raise TableError(path, what)
+        notes.append(of_file("turns", Text("{name:s}: not used: {text}", name=shorten(str(path), 200), text=what)))
+        columns = [column for column in columns if column.name not in own]
+    return columns, notes
+
+
+def total_beside_others(label: str) -> Text:
+    """Return why turns since the start are taken with times alone, and what to do."""
+    said = (
+        "column '{title:s}' counts turns since the start, which give a spin between two rows, and none for what else "
+        "stands in a row: give the spin of each row, in Hz"
+    )
+    return Text(said, title=shorten(label))
 
 
 #: Units that a number has where nothing says another one.
@@ -277,22 +314,39 @@ def _factor(path: Path, name: str, label: str, unit: str | None) -> float:
 
 
 def _offered_columns(
-    path: Path, header: Sequence[str], titles: Sequence[Title], chosen: Mapping[str, int], quantities: Collection[str]
-) -> tuple[dict[str, list[int]], list[str]]:
-    """Return the indices of the columns that could be each quantity not chosen yet, and warnings."""
+    path: Path, header: Sequence[str], titles: Sequence[Title], chosen: Mapping[str, int], stated: Mapping[str, str],
+    *, quantities: Collection[str],
+) -> tuple[dict[str, list[int]], list[str]]:  # fmt: skip
+    """Return the indices of the columns that could be each quantity not chosen yet, and warnings.
+
+    Turns since the start are a spin where there is no other; an uncertainty may be in turns beside them.
+    """
     offered: dict[str, list[int]] = {}
     warnings = []
-    for index, title in enumerate(titles):
+    totals = {name for name, unit in stated.items() if unit == TOTAL}
+    totals |= {name for name, index in chosen.items() if _counts_turns(titles[index])}
+    for index, title in sorted(
+        enumerate(titles), key=lambda one: _counts_turns(one[1]) + (one[1].column in COMPANIONS)
+    ):
         if title.column is None or title.column not in quantities:
             continue
         if title.column in chosen or index in chosen.values():
             continue
         known = title.inverse or title.unit is None or _is_unit_of(title.unit, title.column)
+        if _counts_turns(title):
+            known = COMPANIONS.get(title.column, title.column) in totals or title.column not in {*offered, *COMPANIONS}
+            totals |= {title.column} if known else set()
         if not known and not _is_of_a_period(title, titles):
             warnings.append(_unknown_unit(path, header[index], title))
         else:
             offered.setdefault(title.column, []).append(index)
     return offered, warnings
+
+
+def _counts_turns(title: Title) -> bool:
+    """Return whether a title says turns since the start, or an uncertainty in them."""
+    frequency = title.column is not None and dimension(title.column) == "frequency"
+    return frequency and title.unit is not None and is_total(title.unit)
 
 
 def _is_unit_of(unit: str, name: str) -> bool:
@@ -416,6 +470,7 @@ def _written_unit(path: Path, name: str, titles: tuple[str, str], units: Sequenc
     title = read_title(meant)
     kind = dimension(name)
     in_title = title.unit if title.unit and _is_unit_of(title.unit, name) else None
+    in_title = TOTAL if kind == "frequency" and is_total(title.unit or "") else in_title
     beneath = next((unit for unit in units if _is_unit_of(unit, name)), None)
     implied = implied_unit(meant) is not None
     if in_title and beneath and not implied and unit_factor(in_title, kind) != unit_factor(beneath, kind):

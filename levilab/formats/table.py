@@ -23,6 +23,7 @@ from levilab.formats.texts import Text, must_be_file
 from levilab.formats.titles import CANONICAL, COMPANIONS, QUANTITIES, companion
 from levilab.formats.understanding import Plan, Request, no_column, plan_of
 from levilab.texts.note import of_file, reword
+from levilab.texts.text import Text as Said
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -262,8 +263,10 @@ def _table(
         lines, kept = lines[good], {column: values[good] for column, values in kept.items()}
     columns = _in_si(kept)
     for total in [c for c in kept if c.is_total]:
+        _must_not_fall(path, columns["time_s"], columns[total.name], lines)
+        u = Said("that of both counts") if companion(total.name) in columns else _WHOLE_TURNS
         columns, lines = _differences(columns, total.name), lines[1:]
-        notes.append(of_file("turns", f"{_seen(name, total)} counts turns since the start: {_OF_TOTALS}"))
+        notes.append(of_file("turns", Said(_OF_TOTALS, name=name, label=shorten(total.label), u=u)))
     return Table(path, columns, tuple(notes), header, lines, {c.name: c.factor for c in kept if not c.inverse})
 
 
@@ -282,7 +285,24 @@ def _in_si(kept: "Mapping[Column, NDArray[np.float64]]") -> "dict[str, NDArray[n
 
 #: u of a difference of two counts, each cut to whole turns: two rectangular distributions, GUM 4.3.7 [turns].
 _U_OF_TURNS = 6**-0.5
-_OF_TOTALS = "each reading is the mean between two rows, at the middle of their times, with u of 0.41 turns"
+_WHOLE_TURNS = Said("0.41 turns, of two counts cut to whole turns")
+#: Measured in tests/levilab/pipelines/spindown: of differences that share a count, which the fit takes as independent.
+_OF_TOTALS = (
+    "{name:s}: column '{label:s}' counts turns since the start: each reading is the mean between two rows, at the "
+    "middle of their times, with u from {u}; neighbours share a count, which the fit does not know, so that u of the "
+    "results is 3 to 4 times too large"
+)
+
+
+def _must_not_fall(
+    path: Path, time: "NDArray[np.float64]", turns: "NDArray[np.float64]", lines: "NDArray[np.int64]"
+) -> None:
+    """Raise TableError, which names the line, for a count of turns that falls while time goes on."""
+    falls = (np.diff(turns) < 0) & (np.diff(time) > 0)
+    if falls.any():
+        k = int(falls.argmax())
+        said = "the count falls from {before:g} to {after:g}, so the counter was reset: keep the rows on one side alone"
+        raise TableError(path, Said(said, before=turns[k], after=turns[k + 1]), line=int(lines[k + 1]))
 
 
 def _differences(columns: "Mapping[str, NDArray[np.float64]]", name: str) -> "dict[str, NDArray[np.float64]]":
@@ -290,7 +310,9 @@ def _differences(columns: "Mapping[str, NDArray[np.float64]]", name: str) -> "di
     time, turns = columns["time_s"], columns[name]
     wait = np.diff(time)
     with np.errstate(divide="ignore", invalid="ignore"):  # times that repeat are refused later
-        spin, u = np.diff(turns) / wait, _U_OF_TURNS / np.abs(wait)
+        u_turns = columns.get(companion(name))
+        u = _U_OF_TURNS if u_turns is None else np.hypot(u_turns[1:], u_turns[:-1])
+        spin, u = np.diff(turns) / wait, u / np.abs(wait)
     return {"time_s": (time[1:] + time[:-1]) / 2, name: spin, companion(name): u}
 
 

@@ -25,6 +25,7 @@ from levilab.formats.columns import (
     how_else,
     quote_names,
     shorten,
+    total_beside_others,
 )
 from levilab.formats.dialect import UNVALUED
 from levilab.formats.layout import Layout, sniff
@@ -44,6 +45,7 @@ from levilab.formats.titles import (
     as_a_period,
     companion,
     dimension,
+    is_total,
     motion_sensor,
     nearly_a_frequency,
     plain_name,
@@ -599,7 +601,9 @@ def no_column(path: Path, name: str, header: Sequence[str], doubt: Doubt | None 
     )
     nearly = next((title for title in header if nearly_a_frequency(title)), None) if "frequency" in name else None
     foreign = next((title for title in header if read_title(title).column == name), None)
-    if foreign:
+    if foreign and dimension(name) == "frequency" and is_total(read_title(foreign).unit or ""):
+        text = total_beside_others(foreign)
+    elif foreign:
         unit = shorten(read_title(foreign).unit or "")
         what = f"column '{shorten(foreign)}' is in {unit}, which is no unit of {dimension(name)}"
         text = f"{what}: {how_else(foreign, name)}"

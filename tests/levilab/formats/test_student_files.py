@@ -504,6 +504,45 @@ def test_turns_since_the_start_are_a_question_whose_first_answer_gives_the_mean_
     np.testing.assert_array_equal(table.column("spin_frequency_hz"), np.diff(n) / 10)
     assert table.column("spin_frequency_u_hz") == pytest.approx(np.full(19, 0.0408), abs=1e-4)  # √(1/6) turns in 10 s
     assert "counts turns since the start" in table.warnings[0]
+    assert "3 to 4 times too large" in table.warnings[0]  # see test_readings of spindown
+
+
+@pytest.mark.parametrize(
+    ("titles", "columns"),
+    [("N,u", {"t": "1", "f": "2 [turns]"}), ("n [turns],u", {}), ("n [turns],u [counts]", {"f": "2"})],
+)
+def test_a_count_of_turns_uses_its_own_u(titles, columns, tmp_path):
+    path = tmp_path / "u.csv"
+    path.write_text(f"t [s],{titles}\n0,0,3\n10,390,4\n20,770,0\n30,1140,0\n", encoding="utf-8")
+    table = read_table(path, quantities=SPIN, needed=SPIN[:2], columns=columns)
+    assert table.column("spin_frequency_hz").tolist() == [39, 38, 37]
+    assert table.column("spin_frequency_u_hz").tolist() == [0.5, 0.4, 0]  # √(u1² + u2²) turns in 10 s
+    if not columns:
+        assert not understand(path).problem
+
+
+@pytest.mark.parametrize(
+    ("table", "quantities", "said"),
+    [
+        ("t,n [turns]\n0,0\n10,390\n20,70\n", SPIN, "line 4: the count falls from 390 to 70, so the counter was reset"),
+        ("t,n [turns],x_m\n0,0,1\n10,390,1\n20,770,1\n", (*SPIN, "x_m"), "between two rows, and none for what else"),
+        ("t,n [turns],u [Hz]\n0,0,1\n10,390,1\n20,770,1\n", SPIN, "give u of the count, in turns"),
+    ],
+)
+def test_a_count_of_turns_that_gives_no_spins_says_what_to_do(table, quantities, said, tmp_path):
+    path = tmp_path / "u.csv"
+    path.write_text(table, encoding="utf-8")
+    with pytest.raises(TableError) as refused:
+        read_table(path, quantities=quantities, columns={"f": "2"})
+    assert said in str(refused.value)
+
+
+def test_a_count_of_turns_costs_no_row_of_another_analysis(tmp_path):
+    path = tmp_path / "u.csv"
+    path.write_text("t,n [turns],x_m\n0,0,1\n10,390,1\n20,770,1\n", encoding="utf-8")
+    table = read_table(path, quantities=(*SPIN, "x_m"), needed=["x_m"])
+    assert ([*table.columns], len(table)) == (["time_s", "x_m"], 3)
+    assert "not used: column 'n [turns]' counts turns since the start" in table.warnings[0]
 
 
 def test_of_two_columns_without_titles_the_other_one_is_the_time(tmp_path):
