@@ -25,13 +25,15 @@ def number(unit: str = "", *, low: float = -math.inf, high: float = math.inf) ->
     """
 
     def read(typed: Any) -> float:
-        from levilab.formats.typed import read_number  # not for every help
+        from levilab.formats.ranges import WithUnit  # not for every help
+        from levilab.formats.typed import read_number
 
         value = read_number(typed, unit) if isinstance(typed, str) else float(typed)
         if not low <= value <= high and not math.isnan(value):
             span = f"of {low:g} or more" if high == math.inf else f"from {low:g} to {high:g}"
             raise ValueError(f"{typed!r}: a number {span}{f' [{unit}]' * bool(unit)} is expected")
-        return value
+        has_unit = isinstance(typed, str) and typed.strip()[-1:].isalpha()
+        return WithUnit(value, typed.strip()) if has_unit else value
 
     return read
 

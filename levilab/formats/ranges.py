@@ -5,8 +5,9 @@ Wide enough for any top that floats and its bench.
 
 from __future__ import annotations
 
+import math
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, Self
 
 from levilab.texts.text import Text
 
@@ -21,6 +22,18 @@ class Unit(NamedTuple):
     name: str
     factor: float
     shift: float = 0.0
+
+
+class WithUnit(float):
+    """A number that was typed with its unit, in the one that was wanted.  `text` is what was typed."""
+
+    def __new__(cls, value: float, text: str) -> Self:
+        """Make it of both."""
+        self = super().__new__(cls, value)
+        self.text = text
+        return self
+
+    text: str
 
 
 _MASS = (Unit("kg", "kilograms", 1.0), Unit("g", "grams", 1e-3), Unit("mg", "milligrams", 1e-6))
@@ -84,7 +97,9 @@ def problem_of(key: str, value: float, factor: float = 1.0, *, asks: bool = True
         return ""
     units, low, high = row
     typed = value / factor
-    own = next(one for one in units if one.factor == factor)
+    own = next((one for one in units if math.isclose(one.factor, factor)), None)
+    if own is None:  # no row: in the quantity's own unit
+        own, factor, typed = units[0], 1.0, value
     said = Text(
         "a number from {low:g} to {high:g}{unit:s} is expected",
         low=low / factor,

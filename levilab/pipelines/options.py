@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from levilab.errors import UsageError
-from levilab.formats.ranges import problem_of
+from levilab.formats.ranges import WithUnit, problem_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -405,11 +405,14 @@ def read_options(given: Mapping[str, Any], *, typed: bool = False) -> dict[str, 
             continue
         if one.needs and given.get(typed_name(one.needs) if typed else one.needs) is None:
             raise UsageError(shown, f"goes with `{typed_name(one.needs) if typed else one.needs}` alone")
-        in_si = value * one.factor if typed and one.factor != 1 else value
+        has_unit = isinstance(value, WithUnit)
+        shown_value = value.text if has_unit else value
+        in_si = value * one.factor if typed and one.factor != 1 else float(value) if has_unit else value
         if not one.allows(in_si):
-            raise UsageError(shown, one.expected, value=value)
-        if one.kind is float and (problem := problem_of(names[shown], in_si, one.factor if typed else 1.0)):
-            raise UsageError(shown, problem, value=value)
+            raise UsageError(shown, one.expected, value=shown_value)
+        factor = one.factor if typed else 1.0
+        if one.kind is float and (problem := problem_of(names[shown], in_si, factor, asks=not has_unit)):
+            raise UsageError(shown, problem, value=shown_value)
         read = one.read(in_si) if one.read else str(in_si) if one.choices else in_si
         if read is not None:
             found[names[shown]] = read

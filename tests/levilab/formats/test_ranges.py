@@ -6,7 +6,7 @@ import levilab as door
 from levilab.acquisition.experiments.field import FieldSettings
 from levilab.errors import LevilabError
 from levilab.formats.device import read_device
-from levilab.formats.ranges import RANGES
+from levilab.formats.ranges import RANGES, problem_of
 from levilab.formats.typed import read_mass, read_temperature
 from levilab.pipelines.options import OPTIONS
 from support.paths import SAMPLE_DATA
@@ -52,6 +52,14 @@ def test_an_option_in_another_unit_is_asked_about(given, said):
     with pytest.raises(LevilabError) as refused:
         door.analyze(SAMPLE_DATA / "spin-down-1", **given)
     assert said in " ".join(str(refused.value).split())
+
+
+def test_what_was_typed_with_its_unit_is_shown_and_not_asked_about(levilab):
+    for option, typed in (("--near", "24000rpm"), ("--scale", "5cm")):
+        said = levilab("analyze", "video", SAMPLE_DATA / "README.md", option, typed, check=None).stderr
+        assert f"{option} {typed}" in said
+        assert "Were" not in said
+    assert problem_of("scale_m", 5.0, 1e-6).startswith("a number from 1e-07 to 0.01 m is expected")  # no row of µm
 
 
 def test_settings_and_what_is_typed_have_the_same_ranges():
