@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +14,7 @@ from levilab.acquisition.table import EXPERIMENTS
 from levilab.errors import DataError, UsageError
 from levilab.notebook.result import AnalysisResult
 from levilab.notebook.run import RecordedRun
+from levilab.pipelines.result import NoResult
 from levilab.pipelines.suits import recall_suiting
 from levilab.present.progress import Display
 from levilab.runs.find import RECORD, find_run, no_such_path
@@ -67,9 +69,12 @@ def load_any(path: str | PathLike[str]) -> RecordedRun | AnalysisResult:
     folder = find_run(Path(path))
     if not folder.exists():
         raise no_such_path(folder)
-    if folder.suffix == ".json" and folder.is_file():
-        return AnalysisResult(*recall_suiting([folder], {})[0])
+    if folder.name == RECORD and folder.is_file():
+        folder = folder.parent
     if folder.is_file():
+        with suppress(NoResult):
+            if folder.suffix == ".json":
+                return AnalysisResult(*recall_suiting([folder], {})[0])
         raise DataError(f"{folder}: is a file; a run folder is expected, a data file goes to levilab.analyze as it is")
     if folder.is_dir() and not (folder / RECORD).exists():
         advice = "name one of the runs in it, which levilab.runs lists"

@@ -75,7 +75,7 @@ def test_importing_levilab_loads_nothing_heavy() -> None:
 @pytest.mark.parametrize("kind", CASES)
 def test_run_file_and_dataframe_of_the_same_readings_agree(kind: str, tmp_path: Path) -> None:
     folder, options, name, truth = CASES[kind]
-    run = levilab.load(SAMPLE_DATA / folder)
+    run = levilab.load(SAMPLE_DATA / folder / "run.json")  # its folder is meant
     of_run = levilab.analyze(run)
     bare = tmp_path / "readings.csv"
     shutil.copy(run.folder / "readings.csv", bare)
@@ -377,6 +377,7 @@ def test_a_wrong_call_names_the_argument_or_the_kind_of_failure(case: str) -> No
     (lambda: levilab.analyze(levilab.analyze(spin_down())), "^data = a result: .* give what it was made of"),
     (lambda: levilab.analyze(([0, 1], [40, 39])), "^the data: holds 2 readings, at least 3"),
     (lambda: levilab.load("nowhere"), "^nowhere: there is no such file or folder in .*levilab runs lists"),
+    (lambda: levilab.load(SAMPLE_DATA / "student-files" / "columns.json"), "is a file; a run folder is expected"),
     (lambda: levilab.analyze(levilab), "^data = the module levilab: a run,"),
 ])  # fmt: skip
 def test_a_natural_but_wrong_call_is_told_how_to_call(call: Callable[[], Any], said: str) -> None:
