@@ -17,7 +17,7 @@ from levilab.errors import DataError, unquote
 from levilab.files import as_json
 from levilab.pipelines.result import Place
 from levilab.pipelines.row import plain
-from levilab.pipelines.suits import recall_suiting
+from levilab.pipelines.suits import recall_suiting, remarks, texts_of
 from levilab.present.units import UNITS, split
 from levilab.runs.find import RECORD, find_run
 from levilab.runs.run import EVENTS, READINGS, STATES, Run
@@ -25,6 +25,8 @@ from levilab.runs.waveforms import run_waveforms
 from levilab.sweeps.plan import unit_of
 from levilab.sweeps.quantities import columns_of, quantity_of
 from levilab.sweeps.store import Store
+from levilab.texts.note import kind_of
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
@@ -149,12 +151,24 @@ def contents_of(
     run = Run.load(path) if (path / RECORD).exists() else None
     try:
         results = recall_suiting([path], given or {}, tell)
+        for text in _left_out(results):
+            tell(text)
+        if not run and any(
+            source.run and run_waveforms(source.run) for _, found in results for source in found.sources
+        ):
+            tell(Text("of several runs the readings are exported, without their traces: export each run for these"))
     except (DataError, AnalysisError) as error:
         if run is None:
             raise
         tell(f"without a result: {error}")
         results = []
     return contents_of_results(path, run, results)
+
+
+def _left_out(results: Results) -> list[str]:
+    """Return what lies there and is not exported: broken runs, and what no analysis takes."""
+    skipped = (text for _, found in results for text in found.all_warnings if kind_of(text).startswith("skipped "))
+    return [*dict.fromkeys(skipped), *texts_of(remarks([found.remarks for _, found in results]))]
 
 
 def contents_of_results(path: Path, run: Run | None, results: Results) -> Contents:
@@ -223,6 +237,9 @@ def _of_several(name: str, results: Results) -> Contents:
         tables += [replace(readings, name=f"{own}readings"), replace(inputs, name=f"{own}inputs")]
         values += _values(written)
         files[f"{own}result.json"] = f"{as_json(written.as_dict())}\n".encode(errors="replace")
+    runs = {source.name: source.run for _, found in results for source in found.sources if source.run}
+    for k, run in enumerate(runs.values(), 1):
+        files[f"run-{k:03d}.json"] = (run.folder / RECORD).read_bytes()
     about = {
         "source": "; ".join(names),
         "synthetic": str(any(source.synthetic for _, found in results for source in found.sources)).lower(),

@@ -3,6 +3,7 @@
 import hashlib
 import io
 import json
+import shutil
 import zipfile
 
 import h5py
@@ -216,6 +217,20 @@ def test_several_inputs_have_a_row_each_and_their_readings_one_behind_the_other(
         alone = data.residual_hz[data.input == "spin-down-2"]
         assert np.array_equal(alone, door.analyze(SAMPLE_DATA / "spin-down-2").residuals)
         assert four.to_xarray().sizes == data.sizes
+
+
+def test_of_several_runs_a_package_has_each_record_and_says_what_is_not_in_it(tmp_path):
+    for run in (RUN, TRACES):
+        shutil.copytree(run, tmp_path / "in" / run.name)
+    shutil.copytree(RUN, tmp_path / "in" / "broken")
+    (tmp_path / "in" / "broken" / "run.json").write_text("{", encoding="utf-8")
+    said: list[str] = []
+    export(lambda: contents_of(tmp_path / "in", said.append), tmp_path / "out.zip")
+    assert sum("broken" in text for text in said) == 1
+    assert sum("without their traces" in text for text in said) == 1
+    with zipfile.ZipFile(tmp_path / "out.zip") as package:
+        kept = {package.read(name) for name in package.namelist() if "run-" in name}
+    assert kept == {(run / "run.json").read_bytes() for run in (RUN, TRACES)}
 
 
 def test_no_table_of_a_csv_replaces_a_file(tmp_path):
