@@ -51,6 +51,9 @@ export function openHistory() {
       return last && drives.at(-1)[0] - last[3] <= 2 * (last[3] - last[0]) + COUNTED_S ? last : null;
     },
 
+    /** The time since the last count, where that is shown no more; else NaN [s]. */
+    get age() { return this.latest ? NaN : drives.at(-1)?.[0] - counts.at(-1)?.[3]; },
+
     /** The slope of the counts of the last seconds, behind the last gap [Hz/s]; NaN where they are few. */
     get trend() {
       const whole = counts.slice(counts.findLastIndex(([, spin]) => !Number.isFinite(spin)) + 1), now = drives.at(-1)?.[0];
@@ -177,6 +180,11 @@ export function drawHistory(paper, {drives, counts, marks, latest}) {
 
   // what each line is stands at its end
   c.textAlign = "left";
+  const last = counts.at(-1);
+  if (!latest && last && !(marks.at(-1)?.[0] >= last[0])) {  // not counted now: it stands where its line ends
+    c.fillStyle = paint.reading;
+    c.fillText(`${phrase("top")} ${fixed(last[1], 2)}`, toX(last[0]) + 6, Math.min(toY(last[1]) + 14, split - 6));
+  }
   const ends = [[phrase("top"), latest?.[1], paint.reading], [phrase("drive"), drives.at(-1)[1], paint.newton]].filter((one) => Number.isFinite(one[1]));
   const [one, two] = ends.map(([, value]) => toY(value));
   const apart = two === undefined || Math.abs(one - two) >= 15 ? 0 : (15 - Math.abs(one - two)) / 2 * (one <= two ? -1 : 1);

@@ -325,10 +325,11 @@ function showCounter(bench, last) {
   const before = ofRun(bench, last);
   const spin = live.spin_frequency_hz ?? before.spin_frequency_hz ?? live.spin_seen_hz ?? before.spin_seen_hz;
   write("spin-value", Number.isFinite(spin) ? fixed(spin, 4) : NO_VALUE);
-  stale("spin-value", !bench || bench.silent);
+  const age = Number.isFinite(spin) && bench ? history.age : NaN;
+  stale("spin-value", !bench || bench.silent || Number.isFinite(age));
   const trend = practice && data.about?.status !== "running" ? history.trend : data.trend;  // that of the run, while it is recorded
   const much = Math.abs(trend) >= 0.0005;
-  write("trend", Number.isFinite(trend) ? `${much ? (trend < 0 ? "↓ " : "↑ ") : "→ "}${fixed(trend, 4)} Hz/s` : "–");
+  write("trend", Number.isFinite(trend) ? `${much ? (trend < 0 ? "↓ " : "↑ ") : "→ "}${fixed(trend, 4)} Hz/s` : Number.isFinite(age) ? phrase("counted {time} ago", {time: lapse(age)}) : "–");
   const counting = bench?.counting ?? data.about?.settings?.counter;
   write("gate", Number.isFinite(counting?.gate_s) ? `${short(counting.gate_s)} s` : "–");
   write("trigger", Number.isFinite(counting?.trigger_level_v) ? `${short(counting.trigger_level_v)} V${counting.input ? phrase(", input {number}", {number: counting.input}) : ""}` : "–");
@@ -343,7 +344,7 @@ function showGenerator(bench, last) {
   by("drive-on").classList.toggle("on", Boolean(drive?.output));
   write("signal", drive?.waveform ? `${drive.waveform}, ${short(drive.amplitude_vpp)} Vpp${drive.offset_v ? phrase(", offset {volts} V", {volts: short(drive.offset_v)}) : ""}` : "–");
   const [, spin, then] = drive?.output && history.latest || [], off = spin - then;  // of a count and its own time
-  write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? (practice && !bench.busy && !bench.took_hold ? phrase("takes hold") : phrase("follows")) : Math.abs(off) < SWINGS_HZ ? phrase("nearly") : phrase("does not follow")}, ${off >= 0 ? "+" : ""}${fixed(off, 3)} Hz` : "–");
+  write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? (practice && !bench.busy && !bench.took_hold ? phrase("takes hold") : phrase("follows")) : Math.abs(off) < SWINGS_HZ ? phrase("nearly") : phrase("does not follow")}, ${off >= 0 ? "+" : ""}${fixed(off, 3)} Hz` : drive?.output && history.age ? phrase("not counted now") : "–");
   write("generator-model", modelOf("generator"));
 }
 

@@ -291,6 +291,8 @@ export function openPractice(about, command, run, isOwn, allowed) {
       put(item, {className: k <= last ? "done" : k === last + 1 ? "now" : ""});
       put(item, {ariaCurrent: item.className === "now" ? "step" : null});
     });
+    put(by("to-record"), {hidden: now.busy});
+    put(by("recording"), {hidden: !now.busy});
     const needs = {drive: now.matched ? "drive" : "match", tune: "frequency", record: "record", analyze: "analyze", report: "analyze"};
     now.learned ||= last === items.length - 1;  // the next run brings the steps not back
     return now.learned ? "" : needs[items[last + 1].dataset.step];

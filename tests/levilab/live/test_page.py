@@ -330,6 +330,23 @@ def test_the_last_minutes_of_the_bench_are_drawn_before_the_first_reading(
         until(page, "document.getElementById('plot').getAttribute('aria-label').startsWith('the last ')")
 
 
+def test_a_count_that_is_old_is_marked_as_old(served: Hall, page: Page, tmp_path: Path) -> None:
+    """As on the ramp of a run, where nothing is counted: the drive goes on, and the top is not said to lag behind."""
+    run = GrowingRun(tmp_path)
+    with run.running():
+        page.goto(address(served, run.folder.name))
+        until(page, "levilab.frames > 0")
+        for time, old, said in ((3.0, 0, "–"), (43.0, 1, "counted 40 s ago")):
+            drive = Drive("SIN", 30.8 + time / 20, 10.0, output=True)
+            last = {"spin_frequency_hz": 30.8}
+            publish(served.watches[run.folder.name], State(time, last=last, count=Count(30.8, 3.0, 0.5), drive=drive))
+            until(
+                page, f"document.querySelectorAll('#counter .stale').length === {old} && levilab.history.drives.length"
+            )
+            until(page, f"document.getElementById('trend').textContent === '{said}'")
+        assert page.inner_text("#lock") == "not counted now"
+
+
 def test_a_fall_is_replayed_and_what_is_drawn_is_saved(
     served: Hall, watched: Callable[..., Page], tmp_path: Path
 ) -> None:

@@ -116,6 +116,7 @@ def record_some_readings(page: Page) -> None:
     page.unroute("**/runs")
     until(page, f"levilab.data.bench?.busy && levilab.seen.run !== '{OLDER}' && levilab.data.count >= 3")
     until(page, "levilab.data.fit")
+    until(page, "!document.getElementById('recording').hidden && document.getElementById('to-record').hidden")
     assert listings
     until(page, "[...levilab.data.records.values()].some((one) => one.drawn)")
     still = "this run does not use it; the signals are simulated"
