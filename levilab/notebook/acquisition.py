@@ -14,7 +14,7 @@ from levilab.acquisition.table import EXPERIMENTS
 from levilab.errors import DataError, UsageError
 from levilab.notebook.result import AnalysisResult
 from levilab.notebook.run import RecordedRun
-from levilab.pipelines.result import NoResult
+from levilab.pipelines.result import RESULT, NoResult
 from levilab.pipelines.suits import recall_suiting
 from levilab.present.progress import Display
 from levilab.runs.find import RECORD, find_run, no_such_path
@@ -65,9 +65,14 @@ def ask_with_input(task: Task) -> str:
 
 
 def load_any(path: str | PathLike[str]) -> RecordedRun | AnalysisResult:
-    """Load the run in a run folder, or of a name in runs/; or the result in a file.  Raises DataError."""
+    """Load the run in a run folder, or of a name in runs/; or the result in a file, or alone in a folder.
+
+    Raises DataError.
+    """
     folder = find_run(Path(path))
     if not folder.exists():
+        if folder.name == RESULT and (saved := _saved_in(folder.parent)):
+            raise DataError(f"{folder}: there is no such file; of results the folder has {', '.join(saved)}")
         raise no_such_path(folder)
     if folder.name == RECORD and folder.is_file():
         folder = folder.parent
@@ -77,6 +82,14 @@ def load_any(path: str | PathLike[str]) -> RecordedRun | AnalysisResult:
                 return AnalysisResult(*recall_suiting([folder], {})[0])
         raise DataError(f"{folder}: is a file; a run folder is expected, a data file goes to levilab.analyze as it is")
     if folder.is_dir() and not (folder / RECORD).exists():
-        advice = "name one of the runs in it, which levilab.runs lists"
+        saved = _saved_in(folder)
+        if len(saved) == 1:
+            return load_any(folder / saved[0])
+        advice = f"name one of {', '.join(saved)}" if saved else "name one of the runs in it, which levilab.runs lists"
         raise DataError(f"{folder}: holds no {RECORD}, so it is no run folder: {advice}")
     return RecordedRun.load(folder)
+
+
+def _saved_in(folder: Path) -> list[str]:
+    """Return the names of the results that `save` has written into a folder, those of arrays included."""
+    return sorted(path.name for path in folder.glob("*result*.json"))

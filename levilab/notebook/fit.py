@@ -88,6 +88,8 @@ FIT: Mapping[str, tuple[str, Callable[[FittedModel], Any]]] = MappingProxyType({
     "priors": ("names of parameters to which the readings add little", lambda of: getattr(of._entry, "priors", [])),
     "residual": ("reading less curve, in SI; NaN: not used.  lmfit's is divided by u, with the other sign", _residual),
 })  # fmt: skip
+#: Weaker correlations are not reported, as lmfit does not.
+LEAST_CORRELATION = 0.1
 #: Of the statistics in result.json, by their own names.
 _OWN = ("weight", "rms_residual", "difference", "durbin_watson", "runs_test_p", "p_fit")
 #: Methods of a fit.
@@ -209,9 +211,10 @@ class FittedModel(Named[Quantity]):
         x, y = axes_of(frame, residual)
         return frame[x].to_numpy(float), frame[y].to_numpy(float), frame[residual].notna().to_numpy()
 
-    def fit_report(self) -> str:
-        """Return this fit as text: statistics, parameters, correlations."""
-        text: str = self._of.fit_report(self.name, self)
+    @bare
+    def fit_report(self, *, min_correl: float = LEAST_CORRELATION) -> str:
+        """Return this fit as text: statistics, parameters, correlations of at least `min_correl`."""
+        text: str = self._of.fit_report(self.name, self, min_correl=min_correl)
         return text
 
     # --- intervals ---

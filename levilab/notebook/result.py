@@ -18,7 +18,7 @@ import levilab
 from analysis.numbers import how_many
 from levilab.errors import UsageError, unquote
 from levilab.files import CannotWrite, as_json, check_folder, replace_atomically
-from levilab.notebook.fit import FIT, INSTEAD, METHODS, FittedModel, axes_of
+from levilab.notebook.fit import FIT, INSTEAD, LEAST_CORRELATION, METHODS, FittedModel, axes_of
 from levilab.notebook.labels import dataset_of_contents, head_as_html
 from levilab.notebook.names import Exportable, bare, meant
 from levilab.notebook.quantity import Named, Quantity, correlate
@@ -52,8 +52,6 @@ MOST_VALUES = 4
 #: Rows that a cell of a notebook shows: of values, of inputs, of readings.
 _MOST_ROWS, _MOST_INPUTS, _MOST_READINGS = 20, 20, 5
 _ELSEWHERE = "choose another `folder`"
-#: Weaker correlations are not reported, as lmfit does not.
-_LEAST_CORRELATION = 0.1
 #: Statistics of a model in a fit report: key in result.json → as people write it.
 _STATISTICS = {
     "n": "n",
@@ -461,12 +459,15 @@ class AnalysisResult(Exportable):
         return self.models_by_input[self.inputs[number]][chosen].eval(x)
 
     @bare
-    def fit_report(self, model: str | None = None, of: FittedModel | None = None) -> str:
+    def fit_report(
+        self, model: str | None = None, of: FittedModel | None = None, *, min_correl: float = LEAST_CORRELATION
+    ) -> str:
         """Return the fits as text: each model's statistics, the parameters of one, and their correlations.
 
         Args:
             model: the law; None: the statistics of all, and the parameters of the best one.
             of: its fit, where that is not the one in `models`.
+            min_correl: the weakest correlation that is named.
 
         Raises:
             UsageError: there is no such law.
@@ -483,7 +484,8 @@ class AnalysisResult(Exportable):
         priors = getattr(fitted, "priors", ())
         marks = dict.fromkeys(priors, " (prior: known of tops beforehand)")
         lines += ["", *(f"  {name} = {one!r}{marks.get(name, '')}" for name, one in fitted.items()), ""]
-        lines += [f"  correlation of {one} and {other} = {r:+.3f}" for one, other, r in _correlations(fitted)]
+        pairs = [pair for pair in _correlations(fitted) if abs(pair[2]) >= min_correl]
+        lines += [f"  correlation of {one} and {other} = {r:+.3f}" for one, other, r in pairs]
         return "\n".join(lines).strip()
 
     @bare
@@ -582,9 +584,7 @@ def _correlations(fitted: Mapping[str, Quantity]) -> Iterator[tuple[str, str, fl
 
     for (one, first), (other, second) in combinations(fitted.items(), 2):
         if first.u and second.u:
-            r = float(correlation_matrix([first.to_ufloat(), second.to_ufloat()])[0, 1])
-            if abs(r) >= _LEAST_CORRELATION:
-                yield one, other, r
+            yield one, other, float(correlation_matrix([first.to_ufloat(), second.to_ufloat()])[0, 1])
 
 
 # --- the HTML of a cell -----------------------------------------------------------------------------------

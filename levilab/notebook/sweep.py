@@ -18,6 +18,7 @@ from levilab.present.html import facts_as_html, fold
 from levilab.report.export.contents import attributes_of, contents_of
 from levilab.sweeps.adaptive import is_adaptive, run_adaptive
 from levilab.sweeps.axes import axis_of, parse_axis
+from levilab.sweeps.keys import value_at
 from levilab.sweeps.plan import ROWS
 from levilab.sweeps.request import SweepRequest, store_for
 from levilab.sweeps.run import compile_for, run, workers_for
@@ -202,7 +203,7 @@ def sweep_scene(
         raise UsageError("sweep", "keys with their values are expected, as {'spin_hz': [20, 30]}", value=axes)
     named: Mapping[str, Any] = axes if isinstance(axes, Mapping) else {}
     spans = [] if named else [parse_axis(text) for text in ([axes] if isinstance(axes, str) else axes)]
-    spans += [_axis(whole_key(chosen, key), values) for key, values in {**named, **by_name}.items()]
+    spans += [_axis(chosen, whole_key(chosen, key), values) for key, values in {**named, **by_name}.items()]
     names = observe.split(",") if isinstance(observe, str) else observe
     lasts = in_seconds("duration", duration)
     request = SweepRequest(chosen, sweep=spans, settings=settings, observe=names, duration=lasts, **given)
@@ -214,6 +215,7 @@ def sweep_scene(
     return SimulatedMap(store)
 
 
-def _axis(key: str, values: Any) -> Axis:
+def _axis(scene: Scene, key: str, values: Any) -> Axis:
     """Return an axis of values, or of a text FROM:TO:N.  Raises UsageError."""
+    value_at(scene, key, 0.0)  # a key that is wrong is named before its values
     return parse_axis(f"{key}={values}") if isinstance(values, str) else axis_of(key, values)

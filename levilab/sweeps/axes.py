@@ -58,7 +58,7 @@ def parse_axis(text: str) -> Axis:
     return Axis(key, values, scale)
 
 
-def axis_of(key: str, values: Iterable[Any]) -> Axis:
+def axis_of(key: str, values: Iterable[Any] | float) -> Axis:
     """Return the axis of a key with any values that increase: numbers in its unit, or texts with their units.
 
     Raises:
@@ -70,7 +70,8 @@ def axis_of(key: str, values: Iterable[Any]) -> Axis:
     """
     try:
         unit = unit_of_key(key)
-        numbers = np.array([read_number(one, unit) if isinstance(one, str) else float(one) for one in values])
+        each = [values] if isinstance(values, int | float) else values
+        numbers = np.array([read_number(one, unit) if isinstance(one, str) else float(one) for one in each])
     except (TypeError, ValueError) as error:
         expected = f"numbers are expected, or texts with units; {error}"
         raise UsageError("sweep", expected, value=f"{key} = {short_text(values)}") from None
@@ -82,7 +83,9 @@ def axis_of(key: str, values: Iterable[Any]) -> Axis:
     if len(numbers) > MOST_VALUES:
         raise UsageError("sweep", f"at most {MOST_VALUES:.0e} values of a key are possible", value=given)
     if not (np.diff(numbers) > 0).all():
-        raise UsageError("sweep", "values that increase are expected: numpy.unique sorts them", value=given)
+        raise UsageError(
+            "sweep", "values that increase are expected: numpy.unique sorts them; or FROM:TO:N, a text", value=given
+        )
     return Axis(key, numbers, _spacing(numbers))
 
 

@@ -266,6 +266,14 @@ def test_masked_readings_of_numpy_are_left_out_as_nan() -> None:
         assert any(text.endswith("rows 2, 5") for text in result.document["warnings"])
 
 
+def test_the_folder_of_a_saved_result_of_arrays_is_loaded(tmp_path: Path) -> None:
+    result = levilab.analyze(spin_down(), reading_u=0.03)
+    result.save(tmp_path)
+    assert levilab.load(tmp_path).values == result.values
+    with pytest.raises(DataError, match=r"of results the folder has DataFrame\.csv\.result\.json"):
+        levilab.load(tmp_path / "result.json")
+
+
 def test_several_dataframes_are_told_apart_by_their_place() -> None:
     frames = [spin_down(), spin_down() * 1.01]
     assert levilab.analyze(frames, reading_u=0.03).inputs == ("DataFrame 1", "DataFrame 2")
