@@ -36,6 +36,7 @@ from levilab.formats.titles import (
     COMPANIONS,
     EXAMPLES,
     LISTED,
+    NAMES,
     NEED_UNITS,
     OTHER_SENSORS,
     OVER_TIME,
@@ -338,6 +339,11 @@ def _by_values(
     if kinds != [_SPIN] or time is None or any(column.name == _SPIN for column in chosen):
         return None, ""
     used = {column.index for column in chosen}
+    stated = [k for k in range(len(meant)) if k not in used and _is_spin_of_some_kind(layout, meant[k], k)]
+    if len(stated) == 1:  # beside f mean [Hz] a column without a unit is another quantity
+        unit = read_title(meant[stated[0]]).unit or ""
+        factor = unit_factor(unit, "frequency") or 1.0
+        return Column(_SPIN, stated[0], layout.header[stated[0]], factor, unit=unit, written=True), ""
     left = [k for k in range(len(meant)) if k not in used and _could_be_spin(layout, meant, k)]
     if len(left) != 1:
         return None, ""
@@ -357,6 +363,14 @@ def _by_values(
 def _needs_unit(title: str) -> bool:
     """Return whether a name goes with turns a second as with turns a minute."""
     return plain_name(title) in NEED_UNITS
+
+
+def _is_spin_of_some_kind(layout: Layout, text: str, index: int) -> bool:
+    """Return whether a title begins with a name of the spin and ends in a unit in which the numbers are a top's."""
+    title, numbers = read_title(text), _numbers(layout, index)
+    factor = unit_factor(title.unit or "", "frequency")
+    named = title.column is None and NAMES.get(plain_name(text).split("_")[0]) == _SPIN
+    return named and factor is not None and bool(numbers) and is_possible_spin(factor * median(numbers))
 
 
 def _could_be_spin(layout: Layout, meant: Sequence[str], index: int) -> bool:

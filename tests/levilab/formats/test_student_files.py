@@ -414,6 +414,15 @@ def test_a_number_in_a_cell_keeps_its_last_bit(tmp_path):
     assert read_table(path, quantities=SPIN).column("spin_frequency_hz").tolist() == [value] * 4
 
 
+def test_a_title_with_a_unit_goes_before_a_column_without_one(tmp_path):
+    """N is the number of repeats, and the scatter in Hz is no spin of a top."""
+    path = tmp_path / "repeats.csv"
+    path.write_text("t [s],f mean [rpm],f std [rpm],N\n0,2400,4,10\n10,2310,4,10\n20,2220,4,10\n", encoding="utf-8")
+    table = read_table(path, quantities=SPIN)
+    assert table.column("spin_frequency_hz").tolist() == [40.0, 38.5, 37.0]
+    assert "spin_frequency_u_hz" not in table.columns
+
+
 def test_a_cell_of_midnight_is_a_time_among_times():
     """The library returns a date for it, and a column of dates alone stays one of dates."""
     clock = [datetime.fromisoformat("2026-03-01 23:59:50"), date(2026, 3, 2)]
