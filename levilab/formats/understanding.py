@@ -62,6 +62,8 @@ TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: No such top floats far below or above these [Hz], linear theory says 21.65 to 80.6: the unit is in doubt there.
 #: 20 to 60 turns a second are 126 to 377 rad/s: taken for turns, they lie above.
 SLOWEST_SPIN_HZ, FASTEST_SPIN_HZ = 10.0, 100.0
+#: What a title of an uncertainty says that is no standard uncertainty.
+_EXPANDED = re.compile(r"2 ?(?:σ|sigma)|k ?= ?2|^max\w*\.? (?:fehler|error)", re.IGNORECASE)
 #: Units in which the numbers of a file may be meant.
 _UNITS = ("Hz", "rpm", "rad/s", "°/s")
 #: Columns of a spin-down.
@@ -534,9 +536,20 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
             raise _total_of_turns(path, name, layout, chosen) or no_column(
                 path, name, header, _which_columns(layout, [name])
             )
+    warnings += _not_standard(path, header, {companion(_SPIN)} & {*quantities} - {column.name for column in chosen})
     chosen = tuple(sorted(chosen, key=lambda column: CANONICAL.index(column.name)))
     behind = [replace(one, name=companion(one.name), behind=True) for one in chosen if one.name in QUANTITIES]
     return Plan(path, text, layout, header, (*chosen, *behind), part.own, (*warnings, *doubts))
+
+
+def _not_standard(path: Path, header: Sequence[str], missing: Collection[str]) -> list[str]:
+    """Return notes on columns of expanded uncertainties, where standard ones are missing."""
+    how = "u is half of 2σ or of U (k = 2), and a greatest error divided by √3: write it in a column u [Hz]"
+    found = [title for title in header if missing and _EXPANDED.search(title)]
+    return [
+        of_file("expanded u", f"{shorten(str(path), 200)}: column '{shorten(title)}' is not read: {how}")
+        for title in found
+    ]
 
 
 def _must_be_one_time(path: Path, layout: Layout, meant: Sequence[str]) -> None:

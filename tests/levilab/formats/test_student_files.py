@@ -423,6 +423,14 @@ def test_a_title_with_a_unit_goes_before_a_column_without_one(tmp_path):
     assert "spin_frequency_u_hz" not in table.columns
 
 
+@pytest.mark.parametrize("title", ["2σ [Hz]", "U (k=2) [Hz]", "max. Fehler [Hz]"])
+def test_an_expanded_uncertainty_is_named_and_not_read(tmp_path, title):
+    path = tmp_path / "wide.csv"
+    path.write_text(f"t [s],f [Hz],{title}\n0,40,0.04\n10,38.5,0.04\n20,37,0.04\n", encoding="utf-8")
+    (note,) = read_table(path, quantities=SPIN).warnings
+    assert f"'{title}' is not read: u is half of 2σ" in note
+
+
 def test_a_cell_of_midnight_is_a_time_among_times():
     """The library returns a date for it, and a column of dates alone stays one of dates."""
     clock = [datetime.fromisoformat("2026-03-01 23:59:50"), date(2026, 3, 2)]
