@@ -200,6 +200,13 @@ def writing(what: str, advice: str = "choose another place with `out`") -> Itera
         raise CannotWrite(f"{what} ({error.strerror or error})", advice) from error
 
 
+def must_be_folder(path: Path) -> None:
+    """Raise CannotWrite for a file in the place of a folder that is to be written into, or of one above it."""
+    there = next((place for place in (path, *path.parents) if place.exists()), path)
+    if there.is_file():
+        raise CannotWrite(f"{there}: is a file, a folder is expected; choose another place with `out`")
+
+
 def check_writable(path: Path) -> None:
     """Raise OSError where a file of this path cannot be written; nothing is left behind."""
     if path.is_dir():

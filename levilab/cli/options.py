@@ -89,8 +89,9 @@ def place(metavar: str, text: str, endings: Collection[str] = (), **more: Any) -
 def writable(path: Path | None) -> Path | None:
     """Return the name of a file, or of a folder, that can be written.  Raises CannotWrite before anything is done."""
     if path is not None:
-        from levilab.files import check_writable, writing
+        from levilab.files import check_writable, must_be_folder, writing
 
+        must_be_folder(path.parent if path.suffix else path)
         with writing(f"{path}: could not be written", "choose another place with `out`"):
             check_writable(path if path.suffix else path / "file")
     return path

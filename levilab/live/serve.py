@@ -14,12 +14,13 @@ import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from levilab.errors import LevilabError, UsageError
+from levilab.files import must_be_folder
 from levilab.live.desk import Desk
 from levilab.live.doors import Doors, doors_for_guests
 from levilab.live.practice.bench import PracticeBench
 from levilab.live.server import Hall, application
 from levilab.live.share import address_in_network
-from levilab.runs.find import RECORD, must_take_runs, run_or_folder
+from levilab.runs.find import RECORD, run_or_folder
 from levilab.texts.text import ENGLISH, Text, language_of
 
 if TYPE_CHECKING:
@@ -204,7 +205,7 @@ def _where(options: LiveOptions) -> tuple[Path, str]:
     """Return the folder with the runs, and the name of the run to show at first."""
     if options.run is None:
         if options.mock:
-            must_take_runs(options.out)
+            must_be_folder(options.out)
         return options.out.absolute(), ""
     if options.mock:
         raise UsageError("mock", "a run and a bench for practice exclude each other: it records runs of its own")

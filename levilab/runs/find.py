@@ -8,7 +8,6 @@ import re
 from pathlib import Path
 
 from levilab.errors import DataError
-from levilab.files import CannotWrite
 from levilab.formats.texts import SPREADSHEETS, TEXTS, locate, name_files
 from levilab.texts.text import Text
 
@@ -118,13 +117,6 @@ def run_or_folder(name: Path, root: Path = RUNS) -> Path:
     if not folder.is_dir():
         raise DataError(f"{name}: there is no such run or folder; levilab runs lists the runs")
     return folder
-
-
-def must_take_runs(root: Path) -> None:
-    """Raise CannotWrite for a file in the place of the folder that is to hold runs, or of one above it."""
-    there = next((path for path in (root, *root.parents) if path.exists()), root)
-    if there.is_file():
-        raise CannotWrite(f"{there}: is a file, a folder is expected; choose another place with `out`")
 
 
 def must_be_searchable(root: Path) -> None:

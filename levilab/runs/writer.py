@@ -20,10 +20,10 @@ from typing import TYPE_CHECKING, Any, Self
 from analysis.numbers import how_many
 from levilab.computer import computer, utc_now
 from levilab.errors import DataError
-from levilab.files import CannotWrite, make_folder, replace_atomically
+from levilab.files import CannotWrite, make_folder, must_be_folder, replace_atomically
 from levilab.runs import traces
 from levilab.runs.events import RunEvent
-from levilab.runs.find import RECORD, must_take_runs
+from levilab.runs.find import RECORD
 from levilab.runs.package import field, package, resource
 from levilab.runs.run import EVENTS, LOCK, PACKAGE, READINGS, STATES, WIRE, RunRecord, lock_of, read_record
 from levilab.texts.text import Text
@@ -83,7 +83,7 @@ class RunWriter:
         Raises:
             CannotWrite: it cannot be made.
         """
-        must_take_runs(out)
+        must_be_folder(out)
         with _explain_errors("create the run folder", out, safe=""):
             make_folder(out)
             writer = cls(_new_folder(out, record.experiment), record, tell)

@@ -5,6 +5,7 @@ import math
 import os
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -47,12 +48,9 @@ def test_a_write_takes_the_part_away_that_a_killed_process_left(tmp_path):
     assert {*tmp_path.iterdir()} == kept
 
 
-@pytest.mark.skipif(os.name == "nt", reason="fcntl is of POSIX")
 @pytest.mark.parametrize("takes_the_order", [True, False])
 def test_on_macos_a_file_is_on_the_disk_itself(tmp_path, monkeypatch, takes_the_order):
     """There fsync leaves it in the disk's own memory; a disk of the network takes only that."""
-    import fcntl
-
     asked = []
 
     def order(number, what):
@@ -61,8 +59,7 @@ def test_on_macos_a_file_is_on_the_disk_itself(tmp_path, monkeypatch, takes_the_
             raise OSError(errno.ENOTSUP, os.strerror(errno.ENOTSUP))
 
     monkeypatch.setattr(sys, "platform", "darwin")
-    monkeypatch.setattr(fcntl, "F_FULLFSYNC", 51, raising=False)
-    monkeypatch.setattr(fcntl, "fcntl", order)
+    monkeypatch.setattr("levilab.computer.fcntl", SimpleNamespace(F_FULLFSYNC=51, fcntl=order), raising=False)
     monkeypatch.setattr(os, "fsync", lambda _: asked.append("fsync"))
     with (tmp_path / "file").open("wb") as file:
         Computer().sync(file)

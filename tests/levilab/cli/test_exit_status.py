@@ -137,7 +137,7 @@ FAILURES = {
     "analyze spindown nowhere": "nowhere: there is no such file or folder in ",
     "analyze spindown --columns f=2 [rpm]": 'in quotation marks: --columns "f=2 [rpm]"',
     "analyze spindown bench.tml": "did you mean bench.toml?",
-    f"report {SAMPLE} -o file/page.html": "could not be written",
+    f"report {SAMPLE} -o file/page.html": "file: is a file, a folder is expected",
     "analyze spindown .": "an empty file (file: record again)",
     "analyze spindown file": "file: is empty",
     "report nowhere": "nowhere: there is no such file or folder",

@@ -97,7 +97,9 @@ def test_a_key_without_effect_at_some_points_alone_is_an_axis(tmp_path):
     table = read_points(points(tmp_path, "drive.waveform,drive.amplitude_t\nsine,4e-4\noff,0\n"))
     check_axes(preset("driven"), table)
     with pytest.raises(UsageError, match=r"it changes nothing, since drive\.waveform = off"):
-        check_axes(preset("driven"), read_points(points(tmp_path, "drive.waveform,drive.amplitude_t\noff,0\noff,1\n")))
+        check_axes(
+            preset("driven"), read_points(points(tmp_path, "drive.waveform,drive.amplitude_t\noff,0\noff,1e-3\n"))
+        )
     check_axes(
         preset("undriven"), [parse_axis("washers.inertia_kg_m2=0:1e-9:3"), parse_axis("washers.drag_share=0:1:3")]
     )
