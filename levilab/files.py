@@ -248,7 +248,7 @@ def replace_atomically(path: Path, content: str | bytes) -> None:
 def replacing(path: Path, *, among_many: bool = False) -> Iterator[BinaryIO]:
     """Yield a file that replaces another one as a whole when the context ends without an error.  Raises OSError.
 
-    among_many: whether the folder has so many files that parts of killed processes are not searched in it.
+    among_many: whether its folder may have thousands of files: parts of killed processes are not searched there.
     """
     part = path.with_name(f".{path.name}.{computer().process}.part")
     if not among_many:

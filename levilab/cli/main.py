@@ -37,9 +37,11 @@ class Commands(typer.core.TyperGroup):
         if args and args[0] not in self.commands:
             name, *rest = args
             if os.path.exists(name):  # noqa: PTH110 - without pathlib's import
-                ctx.fail(f"{name} is a file or a folder, and no command: take levilab analyze {name}")
+                text = "{name:s} is a file or a folder, and no command: take levilab analyze {path:s}"
+                ctx.fail(Text(text, name=name, path=name))
             if meant := _MEANT.get(name.casefold()) or _of_another_command(name.casefold()):
-                ctx.fail(f"No such command '{name}': take levilab {' '.join([meant, *rest])}")
+                text = "No such command '{name:s}': take levilab {words:s}"
+                ctx.fail(Text(text, name=name, words=" ".join([meant, *rest])))
         return super().resolve_command(ctx, args)
 
     def invoke(self, ctx: Any) -> Any:
@@ -69,12 +71,10 @@ _MEANT = {
 
 #: Wrong words on the command line; typer has no public name for them.
 _WRONG_WORDS: Any = typer.BadParameter.__base__
-#: What typer and this module say of them, the longer ones first.
+#: The sentences that typer has for them, the longer ones first: it keeps no values beside.
 _TEMPLATES = (
     "No such command '{name:s}'. Did you mean {near:s}?",
     "No such command '{name:s}'.",
-    "No such command '{name:s}': take levilab {words:s}",
-    "{name:s} is a file or a folder, and no command: take levilab analyze {path:s}",
     "No such option: {name:s} (Possible options: {near:s})",
     "No such option: {name:s}",
     "Invalid value for {name:s}: {value:s} is not one of {choices:s}.",
@@ -83,7 +83,9 @@ _TEMPLATES = (
 
 
 def _as_text(message: str) -> str:
-    """Return a message of typer's as a Text, which has other languages; as it is where no template is its."""
+    """Return a sentence of typer's as a Text, which has other languages; as it is where no template is its."""
+    if isinstance(message, Text):
+        return message
     for template in _TEMPLATES:
         pattern = re.sub(r"\\\{(\w+):s\\\}", r"(?P<\1>.+)", re.escape(template))
         if found := re.fullmatch(pattern, message, re.DOTALL):

@@ -39,7 +39,7 @@ def option_names(*, made: bool = False) -> dict[str, tuple[str, str]]:
     }
 
 
-#: The command of an application, which is not made anew: those below it that were called keep their options.
+#: The command of an application, made once: those below it that were called keep their options.
 command_of = cache(typer.main.get_command)
 
 

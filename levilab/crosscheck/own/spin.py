@@ -44,7 +44,7 @@ def trials_of(found: SpinAnalysis) -> Own:
         )
         return Own(about, lambda random: _of_field(random, line), _COST_OF_FIELD_S)
     if source.readings.pulses or spin.bound is None or spin.snr_db is None:
-        about = Text("the times of {turns} pulses of this spin and slope, each off by as much as these", turns=turns)
+        about = Text("the times of {turns} pulses of this spin and slope, each with an error as theirs", turns=turns)
         return Own(about, lambda random: _of_times(random, spin), _COST_S)
     rate = source.readings.waveforms[0].rate
     n = round((turns + 1) / (spin.frequency.value or 1.0) * rate)
