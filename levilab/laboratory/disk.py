@@ -62,9 +62,6 @@ class _File:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def __iter__(self) -> Any:
-        return iter(self.raw)
-
     def __getattr__(self, name: str) -> Any:
         if name in {"read", "readline", "seek", "tell"}:
             self.flush()
@@ -73,9 +70,6 @@ class _File:
     def write(self, data: Any) -> int:
         self._pending += bytes(data)
         return len(data)
-
-    def writelines(self, lines: Any) -> None:
-        self.write(b"".join(lines))
 
     def flush(self) -> None:
         data, self._pending = self._pending, b""

@@ -86,9 +86,12 @@ def _pull(place: Place, value: float, *, plug: bool) -> None:
     pull(bench.device(value), out_s(value))
 
 
-def _interrupt_twice(*_: object) -> None:
-    for _press in range(2):
-        signal.raise_signal(signal.SIGINT)
+def _press_ctrl_c(times: int) -> None:
+    """Press Ctrl-C, as the handler sees it: the signal itself is blocked in a worker."""
+    handler = signal.getsignal(signal.SIGINT)
+    assert callable(handler)
+    for _ in range(times):
+        handler(signal.SIGINT, None)
 
 
 def _take_top(place: Place, _: float) -> None:
@@ -121,8 +124,8 @@ def _fill_disk(place: Place, value: float) -> None:
 EVENTS: dict[str, What] = {
     "kill": What("the process is killed", lambda place, _: place.fate.die(), of_bench=False),
     "power": What("the computer loses its power", lambda place, _: place.fate.die(power=True), of_bench=False),
-    "ctrl-c": What("the person presses Ctrl-C", lambda *_: signal.raise_signal(signal.SIGINT), of_bench=False),
-    "ctrl-c twice": What("the person presses Ctrl-C twice", _interrupt_twice, of_bench=False),
+    "ctrl-c": What("the person presses Ctrl-C", lambda *_: _press_ctrl_c(1), of_bench=False),
+    "ctrl-c twice": What("the person presses Ctrl-C twice", lambda *_: _press_ctrl_c(2), of_bench=False),
     "disk full": What("the disk has room for {} bytes more", _fill_disk, lambda v: int(v * _ROOM), of_bench=False),
     "disk error": What(
         "the disk answers {}", _fail_disk, lambda v: errno.errorcode[_choose(_ERRORS, v)], of_bench=False

@@ -71,6 +71,7 @@ class Life:
         text: its last message.
         error: that ended it.
         folder: of its run.
+        gone: whether the person has removed it, and the process was killed before it wrote again.
         shown, events, messages: rows, texts of events, and all texts that were shown.
         zero: time on the bench of time_s = 0 [s].
         first: index of the first of the rows that this process has read.
@@ -87,6 +88,7 @@ class Life:
     text: str = ""
     error: BaseException | None = None
     folder: Path | None = None
+    gone: bool = False
     shown: list[Row] = field(default_factory=list)
     events: list[str] = field(default_factory=list)
     messages: list[str] = field(default_factory=list)
@@ -231,8 +233,9 @@ def _files_are_whole(plan: Plan, processes: Sequence[Life], folders: Sequence[Pa
     runs = [run for folder in folders if (run := _loaded(folder))]
     rows = [_rows_of(run) for run in runs]
     events = {event["text"] for run in runs for event in run.events()}
+    gone = [life.folder for life in processes if life.gone]
     for life in processes:
-        if "readings again that were removed" not in life.text:  # by the person, and the disk failed: it was said
+        if life.folder not in gone and "readings again that were removed" not in life.text:  # the disk failed
             yield from _nothing_lost(life, rows, events)
     for run, stored in zip(runs, rows, strict=True):
         times = [row.get("time_s", math.nan) for row in stored]

@@ -98,6 +98,7 @@ class Visit:
         computer, clock, person, bench, world: as they are at present.
         session: of the present process.
         lives: its processes.
+        removed: the folder that the person has removed last.
     """
 
     plan: Plan
@@ -111,6 +112,7 @@ class Visit:
     wiring: Wiring | None = None
     session: Session[Any] | None = None
     lives: list[Life] = field(default_factory=list)
+    removed: Path | None = None
 
     def __post_init__(self) -> None:
         self.fate = Fate(self._strike, lambda: self.computer.passed_s)
@@ -123,7 +125,8 @@ class Visit:
     def remove_folder(self) -> None:
         """Remove the folder of the present run, as a person does with a file manager."""
         if self.session is not None:
-            self.computer.forget(self.session.writer.folder)
+            self.removed = self.session.writer.folder
+            self.computer.forget(self.removed)
 
     # --- the processes ---
 
@@ -170,6 +173,7 @@ class Visit:
         """Note what a process has left behind, and let it be gone."""
         if self.session is not None:
             life.folder, life.zero = self.session.writer.folder, self.session.zero
+            life.gone = self.fate.dead and life.folder == self.removed
             life.truth += judge.compare_spins(self.session, self.world, self.plan, life.first)
         life.output_on = judge.drives(self.bench)
         self.bench.end_process()
@@ -314,7 +318,8 @@ class Told:
 def visit(plan: Plan, status_of: Callable[[Exception], int | None]) -> Told:
     """Carry a laboratory out, in a folder of its own, and judge it."""
     here = Path.cwd()
-    place = Path(tempfile.mkdtemp(prefix="levilab-laboratory-", dir=_memory()))
+    memory = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # noqa: S108 - mkdtemp makes a folder of its own
+    place = Path(tempfile.mkdtemp(prefix="levilab-laboratory-", dir=memory))
     os.chdir(place)
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # a worker ignores Ctrl-C, and so do its children
     try:
@@ -333,11 +338,6 @@ def visit(plan: Plan, status_of: Callable[[Exception], int | None]) -> Told:
         signal.signal(signal.SIGINT, before)
         os.chdir(here)
         shutil.rmtree(place, ignore_errors=True)
-
-
-def _memory() -> str | None:
-    """Return a folder in memory, where the system has one."""
-    return "/dev/shm" if os.access("/dev/shm", os.W_OK) else None  # noqa: S108 - mkdtemp makes a folder of its own
 
 
 def _bench_file(plan: Plan) -> str:

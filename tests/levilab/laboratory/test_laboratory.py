@@ -13,6 +13,7 @@ from levilab.acquisition.experiments import field
 from levilab.acquisition.session import Session
 from levilab.bench.bench import Bench
 from levilab.cli.exit_codes import exit_status
+from levilab.interruption import interruption_blocked
 from levilab.laboratory import explore
 from levilab.laboratory.disk import SimulatedComputer
 from levilab.laboratory.fate import Event
@@ -66,6 +67,11 @@ FAILED_ONCE = {
     "the folder went when the run was finished": draw(400597),
     "a top was taken before it was filmed": draw(411516),
     "a held spin was resumed half a reading early": draw(400407),
+    "a mock's multimeter counted over 0.1 s": draw(610728),
+    "a multimeter hid what the bursts do": draw(611873),
+    "a folder was removed before the power went": a_plan(
+        "spin", "hold_s=0", "drive_frequency_hz=35", events=[Event("folder", 0, 187), Event("power", 0, 478)]
+    ),
 }
 
 
@@ -188,10 +194,11 @@ def test_a_mistake_in_the_program_is_noticed(mistake, oracle, plan, monkeypatch)
     assert oracle in oracles(visit(plan, exit_status))
 
 
-def test_ctrl_c_is_pressed_in_a_worker_too_which_ignores_its_own():
+def test_ctrl_c_is_pressed_in_a_worker_too_which_blocks_its_own():
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
-        told = visit(spin_down(Event("ctrl-c", 0, 154)), exit_status)
+        with interruption_blocked():
+            told = visit(spin_down(Event("ctrl-c", 0, 154)), exit_status)
         assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGINT, before)
