@@ -67,7 +67,7 @@ class Model(Generic[I_co]):
         address: an address as one of it may have; one without a host, as ``sound://``, is complete for any of them.
         answers_as: the model field of ``*IDN?``, whole (regular expression), where it does not hold the name.
         inputs: of a counter, those for slow pulses.
-        gates: of a counter, their lengths, the shorter one is taken of a length between two [s]; empty: any length.
+        gates: of a counter, their lengths, of which the one nearest by ratio is taken [s]; empty: any length.
     """
 
     name: str

@@ -84,12 +84,14 @@ class CounterSettings(ExperimentSettings):
         return self
 
     def for_bench(self, config: BenchConfig, model_of: ModelOf) -> Self:
-        """See the base: the gate is one that the counter has; its driver refuses what is far from all of them."""
+        """See the base: the gate is the nearest of the counter's; its driver refuses what is far from all of them."""
         counter = model_of("counter") if config.count_with == "counter" else None
         gates = counter.gates if counter else ()
         if not gates or not gates[0] <= self.gate_s <= 2 * gates[-1]:
             return self
-        return self.model_copy(update={"gate_s": max(gate for gate in gates if gate <= self.gate_s)})
+        fitting = [gate for gate in gates if gate < self.interval_s]
+        nearest = min(fitting, key=lambda gate: max(gate / self.gate_s, self.gate_s / gate))
+        return self.model_copy(update={"gate_s": nearest})
 
     def with_jitter(self, jitter_s: float) -> Self:
         """Add the uncertainty of a reading from pulses that scatter by this much [s]: √2 jitter/gate turns."""

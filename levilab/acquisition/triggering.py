@@ -32,13 +32,15 @@ if TYPE_CHECKING:
 #: The frequency of the cycle over that of the top: a pulse comes up to 6 % of a turn early (2 % is its scatter), and
 #: the top gains 2 % until the next count is set.  The pull is 8 % less than that of a cycle as long as a turn.
 CYCLE = 1.1
-#: Start phases of the trials [°], and number of counts of GATE_S [s] at each: the slope of 6 counts of 0.06 Hz is known
-#: to 0.03 Hz/s beside a pull of 0.4 Hz/s, so the phase to 5°, which costs 0.4 % of the pull.
-_PHASES, _COUNTS, GATE_S = (0.0, 120.0, 240.0), 6, 0.5
+#: Start phases of the trials [°], number of counts at each, and their gates [s]: the slope of 6 counts of 0.06 Hz is
+#: known to 0.03 Hz/s beside a pull of 0.4 Hz/s, so the phase to 5°, which costs 0.4 % of the pull.  Where noise hides
+#: the pull the trials are repeated with the longer gate: u of a slope goes with its power −3/2.
+_PHASES, _COUNTS, GATES_S = (0.0, 120.0, 240.0), 6, (0.5, 1.0)
 #: A trial that brakes ends once the top has lost this [Hz]: it may float only little above its lowest spin.
 _MOST_LOST_HZ = 1.0
-#: A pull that is no larger than this multiple of its u is none.
-_CLEAR = 4.0
+#: A pull is seen where it is larger than this multiple of its u; where half of the usual one [Hz/s] would be seen and
+#: is not, there is none.
+_CLEAR, _PULL = 4.0, 0.18
 #: A count further than this from the last one [Hz] is none of this top; number of such counts, one after another, that
 #: end the drive.
 _WITHIN_HZ, _MOST_MISSED = 2.0, 3
@@ -195,26 +197,14 @@ class Motor:
     def find_phase(self) -> None:
         """Try start phases, and choose the one that speeds the top up.  Raises DidNotFollow, NotHeld."""
         session = self.session
-        prepare_counter_again(session, GATE_S)
-        lines, means = [], []
-        for k, phase in enumerate(_PHASES):
-            session.progress(Text("start phase {phase:g}°: how the spin answers", phase=phase), k / len(_PHASES))
-            self._turn_to(phase)
-            times: list[float] = []
-            spins: list[float] = []
-            while len(spins) < _COUNTS and (len(spins) < 3 or spins[0] - spins[-1] < _MOST_LOST_HZ):
-                spins.append(self.count(GATE_S))
-                times.append(session.now())
-            lines.append(slope_of(times, spins))
-            means.append(np.mean(spins))
+        for gate_s in GATES_S:
+            found, scatter = self._answer(gate_s)
+            if _CLEAR * found.u < max(found.pull, _PULL):  # it is seen, or excluded
+                break
         prepare_counter_again(session)
-        slopes, scatters, spreads = zip(*lines, strict=True)
-        scatter = math.sqrt(float(np.mean(np.square(scatters))))
-        found = response(slopes, scatter / min(spreads))
         self.phase, self.pull = found.phase, found.pull
-        self.drag = max(found.drag, 0.0) / float(np.mean(means)) ** 1.5
         if found.pull < _CLEAR * found.u:
-            raise _no_pull(session, found)
+            raise _no_pull(session, found, scatter)
         self._turn_to(self.phase)
         text = Text(
             "a start phase of {phase:.0f}° speeds the top up most, by {pull:.2f} Hz/s less drag",
@@ -222,6 +212,27 @@ class Motor:
             pull=found.pull,
         )
         session.event(RunEvent.PHASE_FOUND, text, phase_deg=found.phase, pull_hz_per_s=found.pull, u_hz_per_s=found.u)
+
+    def _answer(self, gate_s: float) -> tuple[Response, float]:
+        """Return the answer to trials with this gate, and the scatter of their counts [Hz].  Raises NotHeld."""
+        session = self.session
+        prepare_counter_again(session, gate_s)
+        lines, means = [], []
+        for k, phase in enumerate(_PHASES):
+            session.progress(Text("start phase {phase:g}°: how the spin answers", phase=phase), k / len(_PHASES))
+            self._turn_to(phase)
+            times: list[float] = []
+            spins: list[float] = []
+            while len(spins) < _COUNTS and (len(spins) < 3 or spins[0] - spins[-1] < _MOST_LOST_HZ):
+                spins.append(self.count(gate_s))
+                times.append(session.now())
+            lines.append(slope_of(times, spins))
+            means.append(np.mean(spins))
+        slopes, scatters, spreads = zip(*lines, strict=True)
+        scatter = math.sqrt(float(np.mean(np.square(scatters))))
+        found = response(slopes, scatter / min(spreads))
+        self.drag = max(found.drag, 0.0) / float(np.mean(means)) ** 1.5
+        return found, scatter
 
     # --- to a spin, and there ---
 
@@ -386,8 +397,17 @@ def _too_fast(session: Session[Any], highest: float) -> ExperimentFailed:
     )
 
 
-def _no_pull(session: Session[Any], found: Response) -> DidNotFollow:
+def _no_pull(session: Session[Any], found: Response, scatter: float) -> DidNotFollow:
     name = session.writer.record.experiment
+    if _CLEAR * found.u > _PULL:
+        return DidNotFollow(
+            "the counts scatter by {scatter:.2f} Hz, which hides a pull of the bursts below {least:.2f} Hz/s",
+            "set the trigger level half way up the tape's pulse, count with another counter, or state the start phase "
+            "({name}.drive_phase_deg)",
+            scatter=scatter,
+            least=_CLEAR * found.u,
+            name=name,
+        )
     return DidNotFollow(
         "the bursts do not turn the top: at each start phase its spin changes by {slower:.2f} Hz/s, as without a drive",
         "does the cable lead from the phototransistor to the generator's trigger input, does its "

@@ -30,7 +30,7 @@ class Keysight34461A(ReciprocalCounter):
 
     - The input is a.c. coupled: it counts where the signal crosses its own mean.  So there is no trigger level; the one
       that :meth:`prepare` gets, about half of the pulses' height, chooses the range of the input.
-    - There are three gates: of a length between them the shorter is taken, see :attr:`gate`.
+    - There are three gates: the one nearest by ratio is taken, see :attr:`gate`.
     - Signals from 3 Hz on need the slow filter: after a reset it is the one from 20 Hz on.
     - Without a signal it answers 0.
     - A 34401A has another header for the filter.  On its serial line it takes no command before ``SYSTem:REMote``, on
@@ -57,8 +57,7 @@ class Keysight34461A(ReciprocalCounter):
     def prepare(self, *, gate_s: float, trigger_level_v: float, channel: int = 1) -> None:
         """Set the multimeter up; see :class:`Counter`.  Raises OutOfRange for a level beyond its ranges."""
         address = self.transport.address
-        gate = max((gate for gate in GATES if gate <= gate_s), default=None)
-        if gate is None or gate_s > _LONGEST:
+        if not GATES[0] <= gate_s <= _LONGEST:
             raise OutOfRange(address, "gate", gate_s, f"{GATES[0]:g} to {_LONGEST:g} s: it has 0.01, 0.1 and 1 s")
         if channel not in self.channels:
             raise OutOfRange(address, "channel", channel, "1")
@@ -71,7 +70,7 @@ class Keysight34461A(ReciprocalCounter):
             self.identity()
         self._unsent_end = ()
         self.command("CONF:FREQ")  # trigger and range as after a reset, then what this signal needs
-        self.gate = gate
+        self.gate = gate = min(GATES, key=lambda gate: max(gate / gate_s, gate_s / gate))
         self.slowest = 3.0
         self.voltage_range = wide
         self._patience = gate + _SLOW + _SETTLING + 1.0

@@ -355,7 +355,7 @@ def _count_gates(session: Session[PrecessionSettings], drive: float, what: str, 
             session.reconnect("counter", error, prepare)
         else:
             session.saw(what, count)
-            found.append(_gate(session.now(), gate_s, count))
+            found.append(_gate(session.now(), float(counter.last_set.get("gate_s", gate_s)), count))  # as it was set
     begin, end, frequency = np.array(found).T
     return Gates(begin, end, frequency)
 

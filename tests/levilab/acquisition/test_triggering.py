@@ -89,8 +89,9 @@ def test_a_top_that_is_too_fast_is_braked_by_the_opposite_phase(tmp_path):
     assert run.readings().column("spin_frequency_hz")[0] == pytest.approx(34.0, abs=0.5)
 
 
-def test_a_slow_top_survives_the_search_for_the_phase(tmp_path):
-    request, _ = at(tmp_path, replace(SCENE, start_hz=25.5))
+@pytest.mark.parametrize("changed", [{"start_hz": 25.5}, {"jitter": 0.1}])  # 0.28 Hz a count of 0.5 s: 1 s is needed
+def test_a_slow_top_and_one_that_scatters_survive_the_search(tmp_path, changed):
+    request, _ = at(tmp_path, replace(SCENE, **changed))
     assert acquire(request, Silent()).status == "finished"
 
 
@@ -106,10 +107,11 @@ def test_pulses_that_are_lost_cost_pull_and_nothing_else(tmp_path):
     [
         (replace(SCENE, trigger=None), {}, "the bursts do not turn the top.*cable"),
         (replace(SCENE, trigger=TriggerWire(level_v=2.5)), {}, "the bursts do not turn the top.*TTL"),
+        (replace(SCENE, jitter=0.2), {}, r"scatter by \d\.\d\d Hz, which hides a pull.*another counter"),
         (SCENE, {"drive_frequency_hz": 60.0, "drive_amplitude_vpp": 5.0}, "gets no faster: pull and drag are equal"),
         (random_scene(3), {"drive_frequency_hz": 80.0}, r"spins at (69|70)\.\d\d Hz and gets no faster"),
     ],
-    ids=["cable off", "no edges", "too weak", "at its greatest spin"],
+    ids=["cable off", "no edges", "too noisy", "too weak", "at its greatest spin"],
 )
 def test_a_drive_that_cannot_says_why_with_the_output_off_and_the_run_kept(tmp_path, scene, settings, says):
     request, world = at(tmp_path, scene, TRIGGERED.model_copy(update=settings))
