@@ -10,7 +10,7 @@ import csv
 import io
 import json
 import os
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from importlib.util import find_spec
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Self
@@ -76,7 +76,8 @@ class TableFile:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._file.close()
+        with suppress(OSError):  # what could not be written was said
+            self._file.close()
         self._lock.close()
 
     def open(self, *, resume: bool) -> Self:
@@ -154,8 +155,8 @@ class TableFile:
             self._remove_part()
 
     def _remove_part(self) -> None:
+        self.part.unlink()  # first: rows without their description cannot be gone on with
         self._about_part.unlink()
-        self.part.unlink()
 
     def _rows(self, paths: Iterable[str]) -> Iterator[bytes]:
         for path in paths:

@@ -1,10 +1,13 @@
 """Many runs become one table, whatever becomes of some of them; the processes are really started once."""
 
 import csv
+import errno
+import io
 import json
 import os
 import shutil
 from functools import partial
+from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
@@ -13,6 +16,7 @@ from levilab.errors import DataError, UsageError, WorkersLost
 from levilab.files import CannotWrite, locked
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.many import table as many
+from levilab.pipelines.many.file import TableFile
 from levilab.pipelines.many.table import PassedOver, Row, Tally, Task, analyze_one, columns_of, write_table
 from levilab.workers import Done
 from many_runs import make_runs
@@ -88,6 +92,35 @@ def test_a_table_that_was_interrupted_goes_on(runs):
     assert tabulate(runs, resume=True, show=lambda tally: seen.append(tally.done)).read_bytes() == whole
     assert seen == [*range(2, COUNT + 1)]  # of the three, one had failed, and is tried again
     assert not part.exists()
+
+
+def test_a_table_whose_process_ended_while_it_cleared_up_goes_on(runs, monkeypatch):
+    removed = []
+
+    def end_at_the_second(path, before=Path.unlink, **more):
+        if path.name.startswith("all.csv.part") and removed:
+            raise KeyboardInterrupt
+        removed.extend([path] * path.name.startswith("all.csv.part"))
+        before(path, **more)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "unlink", end_at_the_second)
+        with pytest.raises(KeyboardInterrupt):
+            tabulate(runs)
+    assert tabulate(runs, resume=True).read_bytes() == tabulate(runs, "whole.csv").read_bytes()
+
+
+class FullDisk(io.FileIO):
+    def write(self, _):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_full_disk_says_what_to_do(tmp_path):
+    table = TableFile(tmp_path / "all.csv", columns_of(SPINDOWN), {}).open(resume=False)
+    table._file.close()
+    table._file = io.BufferedRandom(FullDisk(table.part, "r+b"))
+    with pytest.raises(CannotWrite, match=r"No space left.*make room, and go on with `resume`"), table:
+        table.add(["a run"])
 
 
 def test_rows_of_an_earlier_call_are_never_overwritten(runs):
