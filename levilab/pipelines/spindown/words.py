@@ -141,8 +141,9 @@ _DRAGS = {"stokes": "ω", "disc": "ω^(3/2)", "newton": "ω²"}
 _PERSONS = {"stokes": "Stokes", "newton": "Newton"}
 #: u of an exponent, or of an angle [rad], that no measurement has.
 TOO_SMALL = 5e-10
-#: A tilt of the moment is mentioned from this multiple of its u on.
-SEEN = 3.0
+#: A tilt δ of the moment is mentioned from this multiple of its u on. Readings give δ², whose relative u is twice that
+#: of its root: these are three u of δ².
+SEEN = 6.0
 #: Part of u that what was known beforehand makes, from which a number is marked as a prior.
 PRIOR = 0.9
 

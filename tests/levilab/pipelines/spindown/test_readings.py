@@ -4,13 +4,16 @@ import numpy as np
 import pytest
 
 import levilab
+from analysis.spindown.drag import LAWS
+from analysis.spindown.fit import fit_spin_down
+from analysis.spindown.tilt import count_of
 from levilab.errors import DataError, UsageError
 from levilab.formats.columns import TableError
 from levilab.formats.table import read_run_readings, read_table
 from levilab.pipelines.options import SpinDownOptions, read_options
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.readings import read_spin_file, spin_readings
-from levilab.pipelines.spindown.words import TILT_ALLOWED
+from levilab.pipelines.spindown.words import TILT_ALLOWED, is_seen
 from support.spin_downs import spin_down_csv
 
 HEADER = "time_s,spin_frequency_hz,spin_frequency_u_hz\n"
@@ -146,6 +149,20 @@ def test_a_result_says_that_a_tilt_was_allowed_for_and_what_leaves_it_out(tmp_pa
         for tilt in ("auto", "none")
     }
     assert said == {"auto": True, "none": False}
+
+
+def test_a_wobble_is_seen_where_there_is_one_and_not_in_noise():
+    """Noise brings the tilt of an upright top beyond three of its u in two of five such runs, since it is a root."""
+    time, rng = np.arange(30) * 10.0, np.random.default_rng(77)
+    seen = {}
+    for tilt2, drag, runs in ((0.0, 0.39, 8), (0.03**2, 0.5, 2)):
+        counts = 40 * count_of(LAWS["stokes"], time / time[-1], np.array([1.0, drag, tilt2, 0.55, 0.0]))
+        fits = [
+            fit_spin_down(time, counts + rng.normal(0, 1e-4, 30), 1e-4, laws=["stokes"]).fits[0] for _ in range(runs)
+        ]
+        seen[tilt2] = [is_seen(fit.parameters["moment_tilt"]) for fit in fits]
+    assert not any(seen[0.0])
+    assert all(seen[0.03**2])
 
 
 def test_u_from_turns_since_the_start_is_too_large_by_what_its_note_says(tmp_path):
