@@ -75,7 +75,7 @@ def parts_of(header: Sequence[str], above: Sequence[str], quantities: Collection
 def _name(run: str, own: Sequence[str]) -> str:
     """Return the name of a run: of a number with one column the title of that, without its unit."""
     plain = len(run) > 3 or run in own
-    text = run if plain else _UNIT.sub("", own[0]) if len(own) == 1 else f"run {run}"
+    text = run if plain else _UNIT.sub("", own[0]) if len(own) == 1 and run in own[0] else f"run {run}"
     return " ".join(text.replace("/", "-").split())
 
 

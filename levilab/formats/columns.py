@@ -170,7 +170,6 @@ def quote_names(names: Iterable[str]) -> str:
 def choose_columns(
     path: Path,
     header: Sequence[str],
-    units: Sequence[str],
     wanted: Mapping[str, str],
     quantities: Collection[str] = CANONICAL,
     *,
@@ -181,28 +180,24 @@ def choose_columns(
     Args:
         path: the file, for messages.
         header: the column titles, stripped.
-        units: the row of units beneath, or nothing.
         wanted: {canonical name, or t, f, u: title or 1-based number}; goes before what the titles say.  A unit may
             follow in brackets where the file gives none: ``Drehzahl [rpm]``.
         quantities: canonical names looked for.
-        meant: the titles without what names a run; empty for columns that do not count.
+        meant: the titles with their units, without what names a run; empty for columns that do not count.
 
     Returns:
         The columns, in the order of the canonical names, and the warnings.
 
     Raises:
-        TableError: a wanted column does not exist, a quantity has two columns, or units contradict each other.
+        TableError: a wanted column does not exist, or a quantity has two columns.
     """
     meant = header if meant is None else meant
     titles = _with_periods(meant)
     chosen, stated = _wanted_columns(path, header, wanted)
     offered, warnings = _offered_columns(path, header, titles, chosen, stated, quantities=quantities)
-    offered |= _by_units(titles, units, {*chosen, *offered}, set(chosen.values()), quantities)
+    offered |= _by_units(titles, {*chosen, *offered}, set(chosen.values()), quantities)
     chosen |= {name: _only_one(path, header, name, indices) for name, indices in offered.items()}
-    written = {
-        name: _written_unit(path, name, (header[index], meant[index]), units[index : index + 1])
-        for name, index in chosen.items()
-    } | stated
+    written = {name: _written_unit(name, meant[index]) for name, index in chosen.items()} | stated
     columns = []
     for name, index in chosen.items():
         quantity = COMPANIONS.get(name, name)
@@ -278,9 +273,8 @@ _SAY_THE_QUANTITY = ("time", "frequency", "length", "flux density")
 
 
 def _by_units(
-    titles: Sequence[Title], units: Sequence[str], known: Collection[str], taken: Collection[int],
-    quantities: Collection[str],
-) -> dict[str, list[int]]:  # fmt: skip
+    titles: Sequence[Title], known: Collection[str], taken: Collection[int], quantities: Collection[str]
+) -> dict[str, list[int]]:
     """Return the column that is a quantity by its unit: no other column has such a unit, and no other quantity."""
     kinds = Counter(dimension(name) for name in quantities if name in QUANTITIES)
     offered: dict[str, list[int]] = {}
@@ -289,9 +283,8 @@ def _by_units(
         found = [
             k
             for k, title in enumerate(titles)
-            if title.column is None and k not in taken
-            and any(unit_factor(unit, kind) is not None for unit in (title.unit or "", *units[k : k + 1]))
-        ]  # fmt: skip
+            if title.column is None and k not in taken and unit_factor(title.unit or "", kind) is not None
+        ]
         if len(found) == 1 and kinds[kind] == 1 and kind in _SAY_THE_QUANTITY:
             offered[name] = found
     return offered
@@ -305,11 +298,8 @@ def _factor(path: Path, name: str, label: str, unit: str | None) -> float:
     """
     other = None if unit else foreign_unit(label, dimension(name))
     if other:
-        raise TableError(
-            path,
-            f"column '{shorten(label)}' is to be {name} and has the unit {other}, which is none of "
-            f"{dimension(name)}: {how_else(label, name)}",
-        )
+        what = f"column '{shorten(label)}' is to be {name} and has the unit {other}, which is none of "
+        raise TableError(path, f"{what}{dimension(name)}: {how_else(label, name)}")
     return (unit_factor(unit, dimension(name)) if unit else None) or 1
 
 
@@ -400,10 +390,8 @@ def _wanted_columns(
     for key, title in wanted.items():
         name = SHORTHANDS.get(key, key)
         if name not in CANONICAL:
-            raise TableError(
-                path,
-                f"`columns` cannot set '{shorten(key)}'; it sets {', '.join(SHORTHANDS)} or {', '.join(LISTED)}",
-            )
+            what = f"`columns` cannot set '{shorten(key)}'; it sets {', '.join(SHORTHANDS)} or {', '.join(LISTED)}"
+            raise TableError(path, what)
         index = _find(header, title.strip())
         if index is None and (with_unit := re.fullmatch(r"(.+?)\s*\[([^\[\]]+)\]\s*", title)):
             index = _find(header, with_unit[1].strip())
@@ -461,24 +449,12 @@ def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) 
     raise Ambiguous(path, f"{text}; say which: `columns` = {numbers}{period}", doubt)
 
 
-def _written_unit(path: Path, name: str, titles: tuple[str, str], units: Sequence[str]) -> str | None:
-    """Return the unit that the title or the row of units gives a column, if it is one of the quantity's.
-
-    titles: as it stands in the file, and without what names a run.
-    """
-    label, meant = titles
-    title = read_title(meant)
-    kind = dimension(name)
-    in_title = title.unit if title.unit and _is_unit_of(title.unit, name) else None
-    in_title = TOTAL if kind == "frequency" and is_total(title.unit or "") else in_title
-    beneath = next((unit for unit in units if _is_unit_of(unit, name)), None)
-    implied = implied_unit(meant) is not None
-    if in_title and beneath and not implied and unit_factor(in_title, kind) != unit_factor(beneath, kind):
-        raise TableError(
-            path,
-            f"column '{shorten(label)}' has the unit '{shorten(beneath)}' in the row beneath; correct one of them",
-        )
-    return beneath or in_title
+def _written_unit(name: str, meant: str) -> str | None:
+    """Return the unit that a title gives a column, if it is one of the quantity's."""
+    unit = read_title(meant).unit or ""
+    if dimension(name) == "frequency" and is_total(unit):
+        return TOTAL
+    return unit if _is_unit_of(unit, name) else None
 
 
 def _angular(path: Path, label: str) -> str:

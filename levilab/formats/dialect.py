@@ -7,6 +7,7 @@ import contextlib
 import csv
 import hashlib
 import re
+import unicodedata
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -20,20 +21,22 @@ from levilab.formats.titles import UNITS, is_unit, known_titles
 COMMENTS = ("#", "%", "//")
 COMMENTS_UNLESS_SEMICOLON = (*COMMENTS, ";", "'")
 #: What stands for a missed reading beside an empty field, in small letters.
-MISSING_WORDS = (
-    "-", "--", "---", "n/a", "na", "n.a.", "nan", "#n/a", "#nv", "#num!", "#wert!", "#value!", "null", "none"
-)  # fmt: skip
-MISSING = frozenset(("", *MISSING_WORDS))
+MISSING = frozenset((
+    "", "-", "--", "---", "n/a", "na", "n.a.", "nan", "#n/a", "#nv", "#num!", "#wert!", "#value!", "null", "none"
+))  # fmt: skip
 #: Mark of a formula without its value, in the place of a number.
 UNVALUED = "=?"
-#: Decimal mark → (mark of thousands, numbers that have both, as 2.394,0 and 2,394.0); 2.394 alone could be either.
-_THOUSANDS = {
-    ",": (".", re.compile(r"[+-]?\d{1,3}(\.\d{3})+,\d+")),
-    ".": (",", re.compile(r"[+-]?\d{1,3}(,\d{3})+\.\d+")),
-}
+#: A number with marks between its thousands: 2.394,0 and 2,394.0, of which 2.394 alone could be either; 2 394, 2'394.
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}(?P<mark>[.,'’ ])\d{3}(?:(?P=mark)\d{3})*(?P<decimals>[.,]\d+)?")
+#: A power of ten as people write it.
+_POWER = re.compile(r"\s?[×*·x]\s?10\s?\^?(?=[+-]?\d)")
 _HALF = r"(?:\s?([AaPp])\.?\s?[Mm]\.?)?"
 #: What a stopwatch or a clock shows: minutes and seconds, hours before them; of half a day hours and minutes, too.
 CLOCK = re.compile(rf"(?:(\d{{1,3}}):)?(\d{{1,3}}):(\d\d(?:[.,]\d+)?){_HALF}")
+#: A time that was passed with its units: 14h05m12s, 1 min 2,5 s, 1'02".
+_SPELT = re.compile(
+    r"(?:(\d+)\s?h(?:rs?)?\s?)?(?:(\d+)\s?(?:min|m|['′])\s?)?(?:(\d+(?:[.,]\d+)?)\s?(?:se[ck]|s|[\"″]|''))?"
+)
 #: Date and time: ISO 8601, or day, month and year with points or slashes.
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
 _DATE = re.compile(r"(\d\d?)([./])(\d\d?)\2(\d{4}|\d\d),?[T ]+(\d\d?:\d\d)(:\d\d(?:[.,]\d+)?)?" + _HALF)
@@ -48,7 +51,9 @@ _WITH_U = re.compile(
     rf"\(?(?P<value>{_NUMBER})\s?(?P<first>[^\d\s.,+/±-][^±]{{,30}}?)?{_MARK}"
     rf"(?P<u>{_NUMBER}(?:\s?%)?)\)?\s*(?P<unit>[^\d\s.,+/%-].*)?"
 )
-_CONCISE = re.compile(r"(?P<value>[+-]?\d+(?:[.,](?P<decimals>\d+))?)\((?P<digits>\d+)\)\s*(?P<unit>[^\d\s.,+/-].*)?")
+_CONCISE = re.compile(
+    r"(?P<value>[+-]?\d+(?:[.,](?P<decimals>\d+))?)\((?P<digits>\d+(?:[.,]\d+)?)\)\s*(?P<unit>[^\d\s.,+/-].*)?"
+)
 #: Blanks around ±, and those between a number and its unit.
 _AROUND_MARK = re.compile(_MARK)
 _BEFORE_PERCENT = re.compile(rf"(±{_NUMBER})\s+(?=%)")
@@ -101,9 +106,16 @@ class Dialect:
         Raises:
             ValueError: the field is no number, or has the other decimal mark.
         """
-        thousands, with_both = _THOUSANDS[self.decimal]
-        if thousands in text and with_both.fullmatch(text):
-            text = text.replace(thousands, "")
+        with contextlib.suppress(ValueError):
+            return self._plain_number(text)
+        text = _POWER.sub("e", unicodedata.normalize("NFKC", text).replace("\N{MINUS SIGN}", "-"))
+        if found := _THOUSANDS.fullmatch(text):
+            mark, decimals = found["mark"], found["decimals"] or ""
+            if decimals[:1] == self.decimal != mark or (not decimals and mark not in ".,"):
+                text = text.replace(mark, "")
+        return self._plain_number(text)
+
+    def _plain_number(self, text: str) -> float:
         if "_" in text or (self.decimal == "," and "." in text):
             raise ValueError(text)
         return float(text.replace(",", ".") if self.decimal == "," else text)
@@ -115,7 +127,7 @@ class Dialect:
         try:
             self.value(text)
         except ValueError:
-            return "clock" if CLOCK.fullmatch(text) or is_dated(text) else "text"
+            return "clock" if CLOCK.fullmatch(text) or _SPELT.fullmatch(text) or is_dated(text) else "text"
         return "number"
 
     def value(self, text: str) -> float:
@@ -138,6 +150,7 @@ def value_and_u(text: str) -> tuple[str, str] | None:
     if found := _CONCISE.fullmatch(text):
         unit, decimals = found["unit"] or "", len(found["decimals"] or "")
         padded = found["digits"].zfill(decimals + 1)
+        decimals = decimals if padded.isdigit() else 0  # 40.00(0.03)
         u = f"{padded[:-decimals]}{found['value'][-decimals - 1]}{padded[-decimals:]}" if decimals else padded
         return f"{found['value']}{unit}", f"{u}{unit}"
     return None
@@ -179,10 +192,12 @@ def slashed_date(text: str) -> tuple[int, int, int] | None:
 
 
 def clock_time(text: str, *, month_first: bool = False) -> float:
-    """Return the seconds that a clock, a stopwatch or a date stands for; a date's count from 1970.
+    r"""Return the seconds that a clock, a stopwatch or a date stands for; a date's count from 1970.
 
     >>> clock_time("0:10"), clock_time("14:05:12.5"), clock_time("2:05 PM")
     (10.0, 50712.5, 50700.0)
+    >>> clock_time("1 min 2,5 s"), clock_time("1'02\"")
+    (62.5, 62.0)
     >>> clock_time("24.11.2026 9:05:12,5") - clock_time("2026-11-23 09:05:12")
     86400.5
 
@@ -196,6 +211,9 @@ def clock_time(text: str, *, month_first: bool = False) -> float:
         if seconds < 60 and (minutes < 60 or not (found[1] or half)) and (not half or hours <= 12):
             hours = hours % 12 + 12 * (half in {"P", "p"}) if half else hours
             return 3600 * hours + 60 * minutes + seconds
+    if text and (found := _SPELT.fullmatch(text)):
+        hours, minutes, seconds = (float((part or "0").replace(",", ".")) for part in found.groups())
+        return 3600 * hours + 60 * minutes + seconds
     if found := _DATE.fullmatch(text):
         first, _, second, year, minute, rest, half = found.groups()
         month, day = (first, second) if month_first and found[2] == "/" else (second, first)

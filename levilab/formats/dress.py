@@ -1,4 +1,4 @@
-"""Tables in the dress of the program that wrote them: Markdown, Arduino's monitor and plotter, CASSY, LabVIEW.
+"""Tables in the dress of the program that wrote them: Markdown, Arduino's monitor and plotter, CASSY.
 
 Each is rewritten line by line, so that the n-th line stays the n-th, with tabs between the fields.
 """
@@ -7,6 +7,9 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+
+from levilab.formats.dialect import Dialect, find_dialect
+from levilab.formats.titles import read_title
 
 #: Lines that are looked at, and the part of them that has to be in a dress: a log may begin in the middle of a line.
 _LINES, _MOST = 100, 0.8
@@ -62,11 +65,13 @@ def _mostly(form: re.Pattern[str]) -> Callable[[Sequence[str]], bool]:
 # --- Markdown ------------------------------------------------------------------------------------------
 
 _RULE = re.compile(r"\s*\|?(\s*:?-+:?\s*\|)+(\s*:?-+:?\s*)?")
+#: Marks of code, mathematics and emphasis around a title.
+_MARKS = re.compile(r"[`$]|\*\*")
 
 
 def _markdown(lines: Sequence[str]) -> Dressed:
     """| t | f |, with a line of dashes below."""
-    rows = ["" if _RULE.fullmatch(line) else line.strip() for line in lines]
+    rows = ["" if _RULE.fullmatch(line) else _MARKS.sub("", line).strip() for line in lines]
     cells = [[cell.strip() for cell in row.removeprefix("|").removesuffix("|").split("|")] for row in rows]
     return Dressed(_content(["\t".join(row) if "|" in text else "" for row, text in zip(cells, rows, strict=True)]))
 
@@ -101,13 +106,19 @@ def _plotter(lines: Sequence[str], label: str, more: str) -> Dressed:
 def _monitor(lines: Sequence[str]) -> Dressed:
     """10:00:10.123 -> 38.2: the clock is the first column."""
     found = [_STAMP.fullmatch(line) for line in lines]
-    rows = [[one[1], *re.split(r"[;\s]+|,(?=\s)|,(?=.*,)", one[2].strip())] if one else [] for one in found]
-    width = max(map(len, rows), default=0)
+    dialect = find_dialect([one[2] for one in found if one]) or Dialect(None, ".")
+    rows = [[one[1], *dialect.split(one[2])] if one else [] for one in found]
+    first = next(row for row in rows if row)
+    if not re.search(r"\d", " ".join(first[1:])):  # titles that the sketch wrote
+        own_time = any(read_title(title).column == "time_s" for title in first)
+        first[0] = "clock"
+        return Dressed(_content(["\t".join(row[own_time:]) for row in rows]))
+    width = max(map(len, rows))
     titles = () if width < 3 else ("clock", *(f"value {k}" for k in range(1, width)))
     return Dressed(_content(["\t".join(row) for row in rows]), titles)
 
 
-# --- CASSY, LabVIEW ------------------------------------------------------------------------------------
+# --- CASSY --------------------------------------------------------------------------------------------
 
 _DEFINITION = re.compile(r"(?:.*\t)?\s*DEF\s*=\s*")
 _OTHER_KEYS = re.compile(r"\s*(MIN|MAX|SCALE|DEC)\s*=")
@@ -121,35 +132,10 @@ def _cassy(lines: Sequence[str]) -> Dressed:
     return Dressed(_content([titles.get(k, line) for k, line in enumerate(plain)]))
 
 
-_END = "***End_of_Header***"
-
-
-def _labview(lines: Sequence[str]) -> Dressed:
-    """Blocks of a header, the titles below the last, and a column of comments, most often empty."""
-    last = max(k for k, line in enumerate(lines) if line.startswith(_END))
-    comma = any(re.match(r"Separator\W+Comma", line) for line in lines[: last + 1])
-    separator = "," if comma else "\t"
-    header = [line.split(separator) for line in lines[: last + 1]]
-    units = next((line[1:] for line in header if line[0] == "Y_Unit_Label"), [])
-    names = next((line.split(separator) for line in lines[last + 1 :] if line.strip()), [])
-    names = [name.strip() for name in names]
-    if names and names[-1] == "Comment":
-        names.pop()
-    titles = [
-        f"{name} [{units[k - 1].strip()}]" if 1 <= k <= len(units) and units[k - 1].strip() else name
-        for k, name in enumerate(names)
-    ]
-    rows = ["\t".join(line.split(separator)[: len(names)]) for line in lines[last + 1 :]]
-    first = next((k for k, row in enumerate(rows) if row.strip()), 0)
-    rows[first : first + 1] = ["\t".join(titles)]
-    return Dressed(_content([*([""] * (last + 1)), *rows]))
-
-
 #: How a dress is taken off, and who wears it.
 _DRESSES: Sequence[tuple[Callable[[Sequence[str]], Dressed], Callable[[Sequence[str]], bool]]] = (
-    (_labview, lambda lines: any(line.startswith(_END) for line in lines)),
     (_cassy, lambda lines: any(_DEFINITION.match(line) for line in lines)),
-    (_markdown, _mostly(re.compile(r"\s*\|.*\|\s*$"))),
+    (_markdown, lambda lines: any(map(_RULE.fullmatch, lines))),
     *((partial(_plotter, label=label, more=more), _mostly(_pairs(label, more))) for label, more in (_COLON, _WORD)),
     (_monitor, _mostly(_STAMP)),
 )

@@ -5,9 +5,10 @@ import io
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
-from levilab.formats.columns import NoTable, shorten
+from levilab.formats.columns import NoTable, TableError, shorten
 from levilab.formats.dialect import (
     SEPARATORS,
     Dialect,
@@ -20,7 +21,7 @@ from levilab.formats.dialect import (
 )
 from levilab.formats.kinds import OTHER, kind_of_bytes
 from levilab.formats.texts import Text
-from levilab.formats.titles import is_unit, known_titles, read_title
+from levilab.formats.titles import UNITS, implied_unit, is_unit, known_titles, read_title, unit_factor
 
 HEAD = 65536  # bytes that the guess rests upon
 SAMPLE = 100  # lines, the last of the head: those are rows even below a long preamble
@@ -59,6 +60,25 @@ class Layout:
     above: tuple[str, ...] = ()
     aligned: bool = False
     sample: tuple[tuple[str, ...], ...] = ()
+
+    def titles(self, path: Path) -> tuple[str, ...]:
+        """Return the titles, or numbers in their place, each with the unit below it.
+
+        Raises:
+            TableError: a title has another unit.
+        """
+        given, units = [], [*self.units, *[""] * self.width]
+        for title, unit in zip(self.header or map(str, range(1, self.width + 1)), units, strict=False):
+            own = "" if implied_unit(title) else read_title(title).unit or ""
+            if any(
+                unit_factor(unit, kind) not in {None, unit_factor(own, kind) or 0} for kind in UNITS if is_unit(own)
+            ):
+                what = (
+                    f"column '{shorten(title)}' has the unit '{shorten(unit)}' in the row beneath; correct one of them"
+                )
+                raise TableError(path, what)
+            given.append(f"{title} [{unit}]" if not own and (is_unit(unit) or unit == "%") else title)
+        return tuple(given)
 
 
 def sniff(source: Text) -> Layout:
@@ -104,8 +124,9 @@ def _with_units_of_numbers(layout: Layout, sample: Sequence[tuple[str, ...]]) ->
     units = [*layout.units, *[""] * (layout.width - len(layout.units))]
     for k in range(layout.width):
         first = next((row[k] for row in sample if k < len(row) and layout.dialect.kind(row[k]) != "missing"), "")
-        if not units[k] and (k >= len(layout.header) or read_title(layout.header[k]).unit is None):
-            clock = layout.dialect.kind(first) == "clock"
+        title = read_title("".join(layout.header[k : k + 1]))
+        if not units[k] and title.unit is None:
+            clock = layout.dialect.kind(first) == "clock" and title.column is None
             units[k] = "s" if clock else unit_behind(first)
     return tuple(units) if any(units) else ()
 
@@ -125,7 +146,7 @@ def lines_of(path: Path, head: bytes, encoding: str, *, whole: bool, padding: st
     """
     text = codecs.getincrementaldecoder(encoding)(errors="replace").decode(head, final=whole)
     text = text.replace(padding, "") if padding else text
-    lines = list(io.StringIO(text, newline=None))
+    lines = _joined(list(io.StringIO(text, newline=None)))
     if CONTROL.search(text):
         clean = ["\n" if CONTROL.search(line) else line for line in lines]
         if sum(one != line for one, line in zip(clean, lines, strict=True)) > _MOST_NOISE * len(lines):
@@ -135,6 +156,22 @@ def lines_of(path: Path, head: bytes, encoding: str, *, whole: bool, padding: st
         lines.pop()
     if not any(line.strip() for line in lines):
         raise NoTable(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
+    return lines
+
+
+#: A quoted field that goes on in the next line, and the lines that it has at most.
+_OPEN, _MOST_LINES = re.compile(r'(?:^|[;,\t])\s*"[^"]*$'), 6
+
+
+def _joined(lines: list[str]) -> list[str]:
+    """Return lines with each quoted title that has line ends in the last line of it, behind blank ones."""
+    for k in (k for k, line in enumerate(lines[:SAMPLE]) if line.count('"') % 2):
+        if _OPEN.search(re.sub(r'"[^"]*"', "", lines[k].rstrip("\n"))):
+            for end in range(k + 1, min(k + _MOST_LINES, len(lines))):
+                title = "".join(lines[k : end + 1])
+                if title.count('"') % 2 == 0:
+                    lines[k : end + 1] = [*["\n"] * (end - k), title.replace("\n", " ").rstrip() + "\n"]
+                    break
     return lines
 
 
@@ -190,18 +227,23 @@ def lay_out(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> L
     width = most_common(row.filled_count for row in rows)
     numeric = [i for i in range(width) if 2 * sum(r.kinds[i : i + 1] == ("text",) for r in rows) < len(rows)]
     above, first_line = _above_rows(content_lines(lines, dialect), width, numeric)
+    above = [_without_results(line, width) for line in above]
     place = _header(above, width)
     units: tuple[str, ...] = ()
+    named = runs = units
     if place is None:
         header, header_line = _header_in_comment(lines[: first_line - 1], dialect, width)
         header_line = header_line or (above[-1].number if above else 0)
     else:
         header, header_line = above[place].fields, above[place].number
-        units = _units(above[place + 1 : place + 2])
-        first_line = above[place + bool(units)].number + 1
-    header = header[: filled_count(header)]
+        below = [*above[place + 1 :], *(line for line in content_lines(lines, dialect) if line.number == first_line)]
+        units = next(filter(None, map(_units, below)), ()) or _units_above(above[:place])
+        header, runs = _spread(_with_all_titles(header, lines[header_line - 1], dialect, rows, width), below)
+        first_line = (below[0] if runs or (units and _units(below[0])) else above[place]).number + 1
+        named = runs or (above[place - 1].fields if place and above[place - 1].is_text else ())
+    fields = most_common(len(row.fields) for row in rows) or len(header)
+    header = header[: min(filled_count(header), fields)]  # LabVIEW titles a column of comments that no row has
     start = _offset(head, first_line)
-    named = above[place - 1].fields if place and above[place - 1].is_text else ()
     return Layout(encoding, dialect, header, header_line, units, first_line, start, len(header) or width, named)
 
 
@@ -227,10 +269,46 @@ def _header(above: list[Line], width: int) -> int | None:
     return max(likely, key=lambda i: (known[i] > 1, above[i].filled_count >= width, known[i], i), default=None)
 
 
-def _units(below: Sequence[Line]) -> tuple[str, ...]:
-    """Return the fields of the line below the header, if it is a row of units."""
-    if below and below[0].is_text:
-        bare = (re.sub(r"^[\[(](.*)[\])]$", r"\1", field) for field in below[0].fields)
+def _without_results(line: Line, width: int) -> Line:
+    """Return a line of titles without the numbers that stand beside the table, as a mean does in a spreadsheet."""
+    own = Line(line.number, line.fields[:width], line.kinds[:width])
+    return own if own.is_text and not line.is_text else line
+
+
+def _with_all_titles(
+    header: tuple[str, ...], text: str, dialect: Dialect, rows: Sequence[Line], width: int
+) -> tuple[str, ...]:
+    """Return titles with many blanks between them, and those of R, which writes none above the rows' numbers."""
+    apart = tuple(re.split(r"\s{2,}", text.strip()))
+    if dialect.separator is not None or len(header) == width:
+        return header
+    counts = [(before.fields[0], after.fields[0]) for before, after in pairwise(rows)]
+    of_r = len(header) == width - 1 and all(a.isdigit() and b == str(int(a) + 1) for a, b in counts)
+    return apart if len(apart) == width else ("", *header) if of_r else header
+
+
+def _spread(header: tuple[str, ...], below: Sequence[Line]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return titles of which one stands over several columns, once over each, and the names of runs below it."""
+    names = below[0].fields if below else ()
+    within = [k for k in range(1, len(names)) if names[k] and not any(header[k : k + 1])]
+    if not within or names[0] or not header[0]:
+        return header, ()
+    wide = [*header, *[""] * (len(names) - len(header))]
+    for k in within:
+        wide[k] = wide[k - 1]
+    return tuple(wide), names
+
+
+def _units_above(above: Sequence[Line]) -> tuple[str, ...]:
+    """Return the fields of a line above the header that says to hold units, as LabVIEW's Y_Unit_Label."""
+    said = (line.fields for line in reversed(above) if "unit" in line.fields[0].casefold())
+    return next((("", *fields[1:]) for fields in said if any(map(is_unit, fields[1:]))), ())
+
+
+def _units(line: Line) -> tuple[str, ...]:
+    """Return the fields of a line below the header, if it is a row of units."""
+    if line.is_text:
+        bare = (re.sub(r"^[\[(](.*)[\])]$", r"\1", field) for field in line.fields)
         fields = tuple(re.sub(r"^(in|en|i)\s+", "", field) for field in bare)
         if any(is_unit(field) for field in fields):
             return fields
@@ -241,7 +319,7 @@ def _header_in_comment(above: list[str], dialect: Dialect, width: int) -> tuple[
     """Return the last comment above the rows and its line if it names the columns, as numpy.savetxt writes it."""
     for number in range(len(above), 0, -1):
         if above[number - 1].lstrip().startswith(dialect.comments):
-            fields = tuple(dialect.split(above[number - 1].lstrip(" \t#%/;'")))
+            fields = tuple(dialect.split(above[number - 1].lstrip(" \t#%/;'".replace(dialect.separator or ";", ""))))
             return (fields, number) if known_titles(fields) and filled_count(fields) >= width else ((), 0)
     return (), 0
 

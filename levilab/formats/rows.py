@@ -33,7 +33,7 @@ from levilab.formats.dialect import (
 )
 from levilab.formats.layout import CONTROL, Layout
 from levilab.formats.texts import Text
-from levilab.formats.titles import dimension, unit_factor
+from levilab.formats.titles import dimension, is_unit, read_title, unit_factor
 from levilab.formats.transposed import LIES
 from levilab.texts.note import Note
 from levilab.texts.text import Text as Said
@@ -41,15 +41,21 @@ from levilab.texts.text import Text as Said
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+#: Decimal mark → what is expected, for messages.
+EXPECTED = {",": Said("a number with decimal comma"), ".": Said("a number with decimal point")}
 FEW = 1 << 16  # bytes that are read line by line before pandas is imported
 BLOCK = 1 << 17  # bytes counted at once: small enough for the cache
 ONE_BYTE_ENCODINGS = ("utf-8", "utf-8-sig", "latin-1")  # those in which a line end is one byte, whatever precedes it
-#: In a field behind the last column a digit is a number too many; a word is a person's remark.
+#: A field without a digit is a person's remark, the name of a mean, ####; so is #DIV/0!.
 _NUMBER_IN = re.compile(r"\d")
 #: Lines that are no rows, before the rest is not looked at, and those that a note names.
 _MOST_REFUSED, _MOST_NAMED = 1000, 5
 TRUTHS = (b"rue", b"RUE", b"alse", b"ALSE")  # of True and False, which pandas takes for 1 and 0
 SPELLINGS = sorted({form for text in MISSING for form in (text, text.upper(), text.title(), "NaN")})
+
+
+class _Words(TableError):
+    """A row with words in the place of a number."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +197,7 @@ def _read_lines(
     lines, values = array("q"), [array("d") for _ in chosen]
     time, path, notes = "", text.path, list[str]()
     layout = _with_order_of_dates(text, layout, chosen, notes)
-    refused: list[tuple[TableError, str]] = []
+    refused, words = list[tuple[TableError, str]](), list[tuple[TableError, str]]()
     for number, line in _lines(text, layout, notes):
         if not line.endswith("\n"):
             row = None if drop_unended else _row_or_none(path, layout, chosen, number, line)
@@ -201,7 +207,7 @@ def _read_lines(
         try:
             row = _row(path, layout, chosen, number, line)
         except TableError as error:
-            refused.append((error, line))
+            (words if isinstance(error, _Words) else refused).append((error, line))
             if len(refused) > _MOST_REFUSED and not skip_doubtful:
                 break
             continue
@@ -211,46 +217,43 @@ def _read_lines(
         for column, value in zip(values, row, strict=True):
             column.append(value)
     numbers = tuple(
-        _clocks(np.array(found, np.float64), column, time) if column.name == "time_s" else np.array(found, np.float64)
+        _clocks(np.array(found, np.float64), column, time, notes, cells=layout.aligned)
+        if column.name == "time_s"
+        else np.array(found, np.float64)
         for column, found in zip(chosen, values, strict=True)
     )
-    notes += _notes_on_refused(layout, refused, lines, skip=skip_doubtful, may_skip=not drop_unended)
+    refused = refused if lines else [*words[:1], *refused]
+    notes += _notes_on_refused(refused, len(lines), skip=skip_doubtful, may_skip=not drop_unended)
+    notes += [_left_out(error.line or 0, line, "is no reading") for error, line in words[:_MOST_NAMED]]
+    if len(words) > _MOST_NAMED:
+        notes.append(Note("words", f"{len(words)} rows without a number are left out, these and others"))
     return Rows(numbers, np.array(lines, np.int64), (*notes, *_doubts_about(time)))
 
 
 def _notes_on_refused(
-    layout: Layout, refused: Sequence[tuple[TableError, str]], lines: Sequence[int], *, skip: bool, may_skip: bool
+    doubtful: Sequence[tuple[TableError, str]], read: int, *, skip: bool, may_skip: bool
 ) -> Iterator[str]:
-    """Yield notes on the lines that are no rows: means and remarks below the readings, and with `skip` all others.
+    """Yield the note on doubtful lines that are left out.
 
     Args:
-        layout: of the text.
-        refused: what is wrong with each line, and the line.
-        lines: numbers of the rows.
+        doubtful: what is wrong with each line, and the line.
+        read: number of the rows.
         skip: whether they are to be left out.
         may_skip: whether they could be.
 
     Raises:
-        TableError: of the first line that is not left out.
+        TableError: of the first line, where they are not.
     """
-    last = lines[-1] if lines else 0
-    below: list[tuple[TableError, str]] = []
-    doubtful: list[tuple[TableError, str]] = []
-    for error, line in refused:
-        number = error.line or 0
-        is_below = lines and number > last and _begins_with_words(layout, line)
-        (below if is_below else doubtful).append((error, _left_out(number, line, "is no reading")))
     numbers = [str(error.line) for error, _ in doubtful]
     places = ", ".join([*numbers[:_MOST_NAMED], *["…"] * (len(numbers) > _MOST_NAMED)])
     if doubtful and not skip:
         error, _ = doubtful[0]
         also = f" (also in {how_many(len(numbers) - 1, 'other line')})" if len(numbers) > 1 else ""
-        do = "; `skip_doubtful` leaves such rows out" if may_skip and len(doubtful) < len(lines) else ""
+        do = "; `skip_doubtful` leaves such rows out" if may_skip and len(doubtful) < read else ""
         raise TableError(error.path, f"{error.message}{also}{do}", line=error.line)
     if doubtful:
         rows = f"{how_many(len(numbers), 'doubtful row')} {'is' if len(numbers) == 1 else 'are'} left out, as asked"
         yield Note("doubtful", f"{rows}: line{'s' * (len(numbers) > 1)} {places}")
-    yield from (note for _, note in below)
 
 
 def _lines(text: Text, layout: Layout, notes: list[str] | None = None) -> Iterator[tuple[int, str]]:
@@ -270,11 +273,6 @@ def _remark_behind(layout: Layout, number: int, line: str) -> Iterator[str]:
     remark = "" if layout.aligned else " ".join(filter(None, layout.dialect.split(line)[layout.width :]))
     if remark:
         yield Note("remark", f"line {number}: '{shorten(remark)}' behind the last column is left out")
-
-
-def _begins_with_words(layout: Layout, line: str) -> bool:
-    """Return whether a line is a text, or a text beside numbers, as Mittelwert; 30.1."""
-    return re.match(r"[^\W\d][^\d]*$", next(filter(None, layout.dialect.split(line)), "")) is not None
 
 
 def _with_order_of_dates(text: Text, layout: Layout, chosen: Sequence[Column], notes: list[str]) -> Layout:
@@ -308,21 +306,31 @@ def _time_in(layout: Layout, chosen: Sequence[Column], line: str) -> str:
     return "" if found.casefold() in MISSING else found
 
 
-_DAY_S = 86400
+_DAY_S, _HOUR_S = 86400, 3600
 
 
-def _clocks(times: "NDArray[np.float64]", column: Column, first: str) -> "NDArray[np.float64]":
+def _clocks(
+    times: "NDArray[np.float64]", column: Column, first: str, notes: list[str], *, cells: bool
+) -> "NDArray[np.float64]":
     """Count dates from the first one on, not from 1970, and the time of a day beyond midnight.
 
     Args:
         times: shape (n,), NaN where one is missed [units of the column].
         column: that of the times.
         first: text of the first one.
+        notes: get the one on a stopwatch's times.
+        cells: whether they are of a spreadsheet, which takes a stopwatch's 0:10 for hours and minutes.
     """
     there = np.isfinite(times)
     if is_dated(first):
         return np.asarray(times - times[there][0])
     day = _DAY_S / column.factor
+    read = times[there]
+    if cells and first.count(":") == 2 and read[0] == 0 and read[-1] >= _HOUR_S and (read % 60 == 0).all():
+        notes.append(
+            Note("stopwatch", "the times, as 0:10:00, are taken for minutes and seconds, as a stopwatch shows 0:10")
+        )
+        return times / 60
     if CLOCK.fullmatch(first) and float(times[there].max()) < day:
         times[there] += day * np.cumsum(np.diff(times[there], prepend=times[there][0]) < -day / 2)
     return times
@@ -341,14 +349,22 @@ def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: 
     fields = layout.dialect.split(text)
     if not layout.aligned and (len(fields) < layout.width or any(map(_NUMBER_IN.search, fields[layout.width :]))):
         hint = "; if the comma is a decimal mark, separate by ; or tab" if layout.dialect.separator == "," else ""
-        raise TableError(
+        begins_with_words = not _NUMBER_IN.search(next(filter(None, fields), ""))
+        raise (_Words if begins_with_words else TableError)(
             path,
             f"'{shorten(text.strip())}' has {how_many(len(fields), 'field')}, {layout.width} are "
             f"expected: complete or remove the line{hint}",
             line=line,
         )
     fields += [""] * (layout.width - len(fields))
-    return [_number(path, layout, column, line, fields[column.index]) for column in chosen]
+    try:
+        return [_number(path, layout, column, line, fields[column.index]) for column in chosen]
+    except _Words:
+        for column, cell in ((column, fields[column.index]) for column in chosen if column.unit and not column.inverse):
+            unit = unit_factor(cell if is_unit(cell) else read_title(cell).unit or "", dimension(column.name))
+            if unit not in {None, column.factor}:
+                raise TableError(path, _other_unit(column, cell), line=line) from None
+        raise
 
 
 def _row_or_none(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: str) -> list[float] | None:
@@ -383,15 +399,20 @@ def _number(path: Path, layout: Layout, column: Column, line: int, cell: str) ->
     if text == UNVALUED:
         what = f"column '{shorten(column.label)}' holds a formula without its value"
         raise TableError(path, f"{what}: open the file in Excel or LibreOffice, save it", line=line)
-    no_number = (
-        "'{cell:s}' stands in column '{column:s}', a number with decimal comma is expected: {do}"
-        if layout.dialect.decimal == ","
-        else "'{cell:s}' stands in column '{column:s}', a number with decimal point is expected: {do}"
-    )
+    no_number = "'{cell:s}' stands in column '{column:s}', {expected} is expected: {do}"
     do = "correct it, or leave it empty if the reading was missed"
+    if column.name == "time_s":
+        do = "write times as 62.5, 1:02.5, 14:05:12 or 2026-11-23 14:05:12"
     if "±" in cell:
         do = "write what stands behind the ± into a column of its own, with the title u"
-    raise TableError(path, Said(no_number, cell=shorten(cell), column=shorten(column.label), do=do), line=line)
+    expected = EXPECTED[layout.dialect.decimal]
+    said = Said(no_number, cell=shorten(cell), column=shorten(column.label), expected=expected, do=do)
+    raise (TableError if _NUMBER_IN.search(cell) and cell[0] != "#" else _Words)(path, said, line=line)
+
+
+def _other_unit(column: Column, cell: str) -> Said:
+    other = "'{cell:s}' stands in column '{column:s}', which is in {unit:s}: write one unit in all rows"
+    return Said(other, cell=shorten(cell), column=shorten(column.label), unit=column.unit)
 
 
 def _number_with_unit(path: Path, layout: Layout, column: Column, line: int, cell: str) -> float:
@@ -402,19 +423,14 @@ def _number_with_unit(path: Path, layout: Layout, column: Column, line: int, cel
     factors = unit_factor(unit, kind), unit_factor(column.unit, kind)
     scale = factors[0] / factors[1] if column.behind and factors[0] and factors[1] else 1.0  # 40 Hz ± 30 mHz
     if factors[0] != factors[1] and scale == 1:
-        other = "'{cell:s}' stands in column '{column:s}', which is in {unit:s}: write one unit in all rows"
-        values = {"cell": shorten(cell), "column": shorten(column.label), "unit": column.unit}
-        raise TableError(path, Said(other, **values), line=line)
+        raise TableError(path, _other_unit(column, cell), line=line)
     try:
         return scale * layout.dialect.number(text[: -len(unit)].strip())
     except ValueError:
-        other = (
-            "'{cell:s}' has the other decimal mark, a number with decimal comma is expected: correct it"
-            if layout.dialect.decimal == ","
-            else "'{cell:s}' has the other decimal mark, a number with decimal point is expected: correct it"
-        )
-        raise TableError(path, Said(other, cell=shorten(cell)), line=line) from None
+        other = "'{cell:s}' has the other decimal mark, {expected} is expected: correct it"
+        said = Said(other, cell=shorten(cell), expected=EXPECTED[layout.dialect.decimal])
+        raise TableError(path, said, line=line) from None
 
 
 def _left_out(line: int, text: str, why: str) -> str:
-    return Note(why, f"line {line}: '{shorten(text.strip())}' {why} and is left out")
+    return Note(why, f"line {line}: '{shorten(' '.join(text.split()))}' {why} and is left out")

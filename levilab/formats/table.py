@@ -16,7 +16,7 @@ import numpy as np
 from analysis.numbers import how_many
 from levilab.errors import UsageError
 from levilab.formats.columns import SHORTHANDS, Column, TableError, key_of, shorten
-from levilab.formats.dialect import MISSING_WORDS, Dialect
+from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout
 from levilab.formats.rows import Rows, read_rows
 from levilab.formats.texts import Text, must_be_file
@@ -110,11 +110,9 @@ def read_table(
         return table
     what = how_many(len(table), "reading") if rows.lines.size else "only a header"
     missed = f" and {rows.lines.size - len(table)} missed ones" if rows.lines.size > len(table) else ""
-    raise TableError(
-        path,
-        f"holds {what}{missed}, at least {FEWEST} readings are needed: record longer",
-        line=layout.header_line or layout.first_line,
-    )
+    left_out = "".join(f"; {note}" for note in rows.notes)
+    what = f"holds {what}{missed}, at least {FEWEST} readings are needed: record longer{left_out}"
+    raise TableError(path, what, line=layout.header_line or layout.first_line)
 
 
 def refuse(table: Table, wrong: "NDArray[np.bool_]", say: Callable[[int], str]) -> None:
@@ -195,9 +193,8 @@ def parse_columns(given: object) -> dict[str, str]:
         raise ColumnsError("columns", expected, value=f"'{shorten(str(given))}'")
     if None in keys:
         unknown = shorten(parts[keys.index(None)][0])
-        raise ColumnsError(
-            "columns", f"'{unknown}' is no quantity known here; {', '.join(SHORTHANDS)} are, as t=Zeit,f=3"
-        )
+        what = f"'{unknown}' is no quantity known here; {', '.join(SHORTHANDS)} are, as t=Zeit,f=3"
+        raise ColumnsError("columns", what)
     return {key: title for key, (_, title) in zip(keys, parts, strict=True) if key}
 
 
@@ -212,9 +209,8 @@ def file_errors(path: Path) -> Iterator[None]:
     except PermissionError as error:
         raise TableError(path, "may not be read by you; change its permissions or copy it") from error
     except OSError as error:
-        raise TableError(
-            path, f"cannot be read ({error.strerror or type(error).__name__}); check the name and the disk"
-        ) from error
+        what = f"cannot be read ({error.strerror or type(error).__name__}); check the name and the disk"
+        raise TableError(path, what) from error
 
 
 def _of_run(rows: Rows, plan: Plan) -> Rows:
@@ -344,11 +340,11 @@ def _notes_on_u(seen: str, column: Column, missing: "NDArray[np.bool_]", read: "
 
 
 def _missed_warning(name: str, lines: "NDArray[np.int64]", rows: int, *, periods: bool) -> str:
-    """Return the warning about rows left out, with all that counts as missed, a period of 0 with `periods`."""
-    kinds = ("empty", *MISSING_WORDS, "inf", *(["a period of 0"] if periods else []))
+    """Return the warning about rows left out, with what counts as missed, a period of 0 with `periods`."""
+    zero = ", a period of 0" * periods
     places = ", ".join(str(line) for line in lines[:5]) + (", …" if lines.size > 5 else "")
     return of_file(
         "missed",
         f"{name}: {lines.size} of {rows} rows {'is' if lines.size == 1 else 'are'} left out as missed "
-        f"({', '.join(kinds)} or 9.91E37): line{'s' * (lines.size > 1)} {places}",
+        f"(empty, -, n/a, nan, inf{zero} or 9.91E37): line{'s' * (lines.size > 1)} {places}",
     )

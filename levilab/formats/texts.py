@@ -327,11 +327,15 @@ class _OdsCells:
                     self.columns = max(self.columns, self._column)
 
 
+_VISIBLE = python_calamine.SheetVisibleEnum.Visible
+
+
 def _sheets(file: Path, source: Path | BinaryIO) -> tuple[Text, ...]:
-    """Return the sheets of a spreadsheet that hold cells, in their order, from the file or from its bytes."""
+    """Return the sheets of a spreadsheet that are shown and hold cells, from the file or from its bytes."""
     try:
         with python_calamine.load_workbook(source) as book:
-            sheets = [book.get_sheet_by_index(k) for k in range(len(book.sheet_names))]
+            shown = [k for k, one in enumerate(book.sheets_metadata) if one.visible is _VISIBLE]
+            sheets = [book.get_sheet_by_index(k) for k in shown]
             _must_be_of_a_size(file, sheets)
             found = [(sheet.name, sheet.to_python(skip_empty_area=False)) for sheet in sheets if sheet.height]
     except python_calamine.PasswordError as error:
@@ -429,8 +433,7 @@ def _of_json(file: Path, size: int) -> Text:
     if rows is None:
         expected = '{"t": [0, 1, …], "f": [38, 37.9, …]} or [{"t": 0, "f": 38}, …] is expected'
         raise NoTable(file, f"is a JSON file without a table: {expected}")
-    lines = ["\t".join("" if cell is None else _plain(str(cell)) for cell in row) for row in rows]
-    return Text(file, "".join(f"{line}\n" for line in lines).encode(), aligned=True)
+    return Text(file, _lines([["" if cell is None else cell for cell in row] for row in rows]), aligned=True)
 
 
 def _rows_of(data: Any) -> list[Sequence[Any]] | None:

@@ -62,7 +62,8 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "time_s": ("time", (
         "time", "t", "zeit", "elapsed", "elapsed_time", "timestamp", "seconds", "sekunden", "milliseconds", "minutes",
         "ms", "millis", "micros", "x_value", "clock", "uhrzeit", "temps", "tiempo", "tempo", "tid", "laufzeit",
-        "messzeit", "zeitpunkt", "heure", "hora", "tidpunkt", "secondes", "segundos", "sekunder")),
+        "messzeit", "gesamtzeit", "zeitpunkt", "zeitstempel", "ts", "datetime", "heure",
+        "hora", "tidpunkt", "secondes", "segundos", "sekunder")),
     "spin_frequency_hz": ("frequency", (
         "spin_frequency", "f", "freq", "frequency", "frequenz", "nu", "ν", "nu3", "ν3", "f3", "ν_3", "nu_3", "f_3",
         "spin", "spin_freq", "f_spin", "rotation_frequency", "rotation", "drehfrequenz", "hz", "hertz", "rpm", "rad/s",
@@ -105,7 +106,7 @@ TURNS = (
 #: The time of N turns: 10 Umdrehungen, 10 T, time for 10 turns.
 _TIME_OF_TURNS = re.compile(
     r"(?:(?:\w+_)?(?:for|of|für|von|pour|de|för|av|para)_)?(?P<number>[1-9]\d{0,3})_?(?:"
-    + "|".join(map(re.escape, (*TURNS, "t")))
+    + "|".join(map(re.escape, (*TURNS, "perioden", "periods", "périodes", "períodos", "perioder", "t")))
     + ")"
 )
 #: A symbol after its name says nothing more, as in Zeit t, Drehzahl n.
@@ -118,21 +119,18 @@ _INVERSE, OVER_TIME = (
 NEARLY_FREQUENCIES = dict.fromkeys(("period", "periode", "période", "umlauf"), _INVERSE) | dict.fromkeys(
     ("turns", "umdreh", "umdr", "rotations", "revolutions", "tours"), OVER_TIME
 )
-# A bare "u" belongs to the spin frequency; the others need their quantity's name in it (u_z, z_err …).
-BARE_UNCERTAINTIES = (
-    "u", "sigma", "σ", "uncertainty", "unsicherheit", "error", "err", "fehler", "df", "δf", "sd", "std", "stddev", "se",
-    "stderr", "standard_error", "standard_uncertainty",
+# Alone they belong to the spin frequency, else to the quantity whose name stands before or behind (u_z, z_err …).
+UNCERTAINTIES = (
+    "u", "sigma", "σ", "±", "+/_", "uncertainty", "unsicherheit", "messunsicherheit", "incertitude", "incertidumbre",
+    "osäkerhet", "error", "err", "fehler", "messfehler", "stderr", "standard_error", "standard_uncertainty",
 )  # fmt: skip
+# These stand alone: beside a mean they are of one reading.
+_SCATTERS = ("sd", "std", "stddev", "std_dev", "standardabweichung", "se", "df")
 COMPANION_FORMS = (
-    "u_{}",
     "u({})",
-    "{}_u",
-    "{}_err",
-    "{}_error",
-    "{}_uncertainty",
-    "{}_sigma",
-    "sigma_{}",
-    "σ_{}",
+    "δ{}",
+    "δ_{}",
+    *(form for word in UNCERTAINTIES for form in (f"{word}_{{}}", f"{{}}_{word}")),
 )
 
 
@@ -194,7 +192,7 @@ def _all_names() -> dict[str, str]:
     for name, column in list(names.items()):
         for form in COMPANION_FORMS:
             names.setdefault(form.format(name), companion(column))
-    return names | dict.fromkeys(BARE_UNCERTAINTIES, "spin_frequency_u_hz")
+    return names | dict.fromkeys((*UNCERTAINTIES, *_SCATTERS), "spin_frequency_u_hz")
 
 
 NAMES: Mapping[str, str] = _all_names()
@@ -289,6 +287,8 @@ _UNIT_FORMS = tuple(
 )
 
 
+_UNIT_WITHIN = re.compile(r"(?P<name>[^\[(]+?)\s*[\[(](?P<unit>[^\[\]()]+)[\])]\s.+")  # f [Hz] mean
+
 #: A title that is longer names nothing that is known here: the forms above look at each pair of its places.
 LONGEST_TITLE = 200
 
@@ -296,6 +296,13 @@ LONGEST_TITLE = 200
 def without_runs_of_blanks(text: str) -> str:
     """Return a title with a blank where there are many: a program that lays out columns writes thousands."""
     return " ".join(text.split())
+
+
+def _name_and_unit(text: str) -> list[tuple[str, str]]:
+    forms = [match for form in _UNIT_FORMS if (match := form.fullmatch(text))]
+    found = [(m["name"], m["unit"]) for m in forms if m["unit"].count("(") == m["unit"].count(")")]  # ln(f/Hz) is none
+    within = _UNIT_WITHIN.fullmatch(text)
+    return [*found, (within["name"], within["unit"])] if within and is_unit(within["unit"]) else found
 
 
 def read_title(text: str) -> Title:
@@ -316,8 +323,7 @@ def read_title(text: str) -> Title:
     name = plain_name(text)
     if name in NAMES and name not in NEED_UNITS:
         return Title(NAMES[name], IMPLIED_UNITS.get(name), angular=name in _ANGULAR_NAMES)
-    forms = (form.fullmatch(text) for form in _UNIT_FORMS)
-    found = [(m["name"], m["unit"]) for m in forms if m]
+    found = _name_and_unit(text)
     for label, unit in found:
         if title := _title_of_name(label, unit):
             return title
@@ -340,6 +346,7 @@ _BARE_UNIT = re.compile(r"(?P<name>.+)\s(?P<unit>s|sec|sek|ms|min|[kmμ]?Hz|rpm|
 def _title_of_name(label: str, unit: str) -> Title | None:
     """Return the title that a name gives together with a possible unit; None for an unknown name."""
     name = plain_name(label)
+    name = name if name in NAMES else plain_name(label.partition(",")[0])  # angular velocity, channel A
     of_turns = _TIME_OF_TURNS.fullmatch(name)
     if of_turns and unit_factor(unit, "time"):
         return Title("spin_frequency_hz", unit, inverse=True, turns=int(of_turns["number"]))

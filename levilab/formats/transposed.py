@@ -1,4 +1,4 @@
-"""Tables that lie on their side: a row for each quantity, a column for each reading."""
+"""Tables that lie on their side, a row for each quantity, a column for each reading; and tables below one another."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from levilab.formats.columns import TableError
 from levilab.formats.dialect import DIALECTS, Dialect, Line, content_lines
-from levilab.formats.layout import ALIGNED, HEAD, encoding_of, lines_of
+from levilab.formats.layout import ALIGNED, HEAD, Layout, encoding_of, lines_of
 from levilab.formats.texts import Text
 from levilab.formats.titles import is_unit, read_title
 
@@ -41,6 +41,30 @@ def set_upright(text: Text) -> Text:
             upright = "".join("\t".join(column) + "\n" for column in columns)
             return replace(text, content=upright.encode(), lies=True)
     return text
+
+
+def tables_of(text: Text, layout: Layout) -> list[Text]:
+    """Return the tables of a text in which the titles stand again, below a blank line or a name; of others the text.
+
+    Raises OSError.
+    """
+    if text.size >= HEAD or not layout.header_line:
+        return [text]
+    with text.open() as stream:
+        lines = lines_of(text.path, stream.read(), layout.encoding, whole=True)
+    names = ["", *(" ".join(filter(None, layout.dialect.split(line))) for line in lines)]
+    filled = [0, *(sum(map(bool, layout.dialect.split(line))) for line in lines)]
+    titles = [
+        k for k, line in enumerate(lines) if line.strip() == lines[layout.header_line - 1].strip() and filled[k] < 2
+    ]
+    starts = [k - filled[k] for k in titles] if titles[:1] == [layout.header_line - 1] else []
+    if len(starts) < 2:
+        return [text]
+    parts = [["\n"] * a + lines[a:b] for a, b in pairwise([*starts, len(lines)])]
+    return [
+        replace(text, path=text.path / (names[k].replace("/", "-") or f"table {n}"), content="".join(part).encode())
+        for n, (k, part) in enumerate(zip(titles, parts, strict=True), 1)
+    ]
 
 
 def _lies(rows: Sequence[Line], dialect: Dialect) -> bool:

@@ -54,7 +54,7 @@ from levilab.formats.titles import (
     read_title,
     unit_factor,
 )
-from levilab.formats.transposed import LIES, set_upright
+from levilab.formats.transposed import LIES, set_upright, tables_of
 from levilab.texts.note import of_file
 from levilab.texts.text import Text as Said
 
@@ -63,9 +63,11 @@ TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: 20 to 60 turns a second are 126 to 377 rad/s: taken for turns, they lie above.
 SLOWEST_SPIN_HZ, FASTEST_SPIN_HZ = 10.0, 100.0
 #: What a title of an uncertainty says that is no standard uncertainty.
-_EXPANDED = re.compile(r"2 ?(?:σ|sigma)|k ?= ?2|^max\w*\.? (?:fehler|error)", re.IGNORECASE)
+_EXPANDED = re.compile(r"2 ?(?:σ|sigma)|k ?= ?2|fehler|error|unsicherheit|uncertaint", re.IGNORECASE)
 #: Units in which the numbers of a file may be meant.
 _UNITS = ("Hz", "rpm", "rad/s", "°/s")
+#: Relative uncertainties [%] below which those of a spreadsheet are probably parts of one, shown in %.
+_LEAST_PERCENT = 0.02
 #: Columns of a spin-down.
 SPIN = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 _SPIN = "spin_frequency_hz"
@@ -380,7 +382,7 @@ def _could_be_spin(layout: Layout, meant: Sequence[str], index: int) -> bool:
     text = meant[index]
     title = read_title(text)
     nearly = nearly_a_frequency(text) is not None and not _needs_unit(text)
-    if not text or title.column is not None or title.unit is not None or nearly or any(layout.units[index : index + 1]):
+    if not text or title.column is not None or title.unit is not None or nearly:
         return False
     numbers = _numbers(layout, index)
     counts = len(numbers) > 1 and all(b - a == 1 for a, b in pairwise(numbers))
@@ -439,7 +441,7 @@ class SeveralRuns(TableError):
 
     def __init__(self, path: Path, paths: tuple[Path, ...], names: Iterable[str]) -> None:
         self.paths = paths
-        super().__init__(path, f"holds several runs ({quote_names(names)}): name one, as {paths[0]}")
+        super().__init__(path, f"holds several runs ({quote_names(names)}): name one, as {shorten(str(paths[0]), 200)}")
 
 
 def plan_of(path: Path, request: Request) -> Plan:
@@ -483,11 +485,15 @@ def _looks_at(file: Path, text: Text, request: Request) -> Iterator[_Look]:
     text = set_upright(text)
     try:
         layout = sniff(text)
+        tables, titles = tables_of(text, layout), layout.titles(text.path)
     except TableError as error:
         yield _Look(text.path, name, error=error)
         return
+    if len(tables) > 1:
+        yield from (look for table in tables for look in _looks_at(file, table, request))
+        return
     one_alone = set(request.columns) - {"t", "time_s"} or not layout.header
-    parts = [Part("", layout.header)] if one_alone else parts_of(layout.header, layout.above, request.quantities)
+    parts = [Part("", titles)] if one_alone else parts_of(titles, layout.above, request.quantities)
     for part in parts:
         path = text.path / part.name if part.name else text.path
         here = "/".join(filter(None, (name, part.name)))
@@ -505,10 +511,10 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
     header, wanted, warnings = _titles(path, layout, request.columns, guess=request.guess)
     if text.lies:
         warnings.append(of_file("lies", f"{shorten(str(path), 200)}: {LIES}"))
-    meant = part.titles if layout.header else header
+    meant = part.titles
     if not {"t", "time_s"} & {*wanted}:
         _must_be_one_time(path, layout, meant)
-    chosen, doubts = choose_columns(path, header, layout.units, wanted, quantities, meant=meant)
+    chosen, doubts = choose_columns(path, header, wanted, quantities, meant=meant)
     if request.guess and _SPIN in quantities:
         spin, note = _by_values(path, layout, meant, chosen, quantities)
         chosen, warnings = (*chosen, *([spin] if spin else [])), [*warnings, *([note] if note else [])]
@@ -534,22 +540,30 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
     for name in needed:
         if name not in {column.name for column in chosen}:
             raise _total_of_turns(path, name, layout, chosen) or no_column(
-                path, name, header, _which_columns(layout, [name])
+                path, name, meant, _which_columns(layout, [name])
             )
-    warnings += _not_standard(path, header, {companion(_SPIN)} & {*quantities} - {column.name for column in chosen})
+    warnings += _notes_on_u(path, layout, chosen, wanted=companion(_SPIN) in quantities)
     chosen = tuple(sorted(chosen, key=lambda column: CANONICAL.index(column.name)))
     behind = [replace(one, name=companion(one.name), behind=True) for one in chosen if one.name in QUANTITIES]
     return Plan(path, text, layout, header, (*chosen, *behind), part.own, (*warnings, *doubts))
 
 
-def _not_standard(path: Path, header: Sequence[str], missing: Collection[str]) -> list[str]:
-    """Return notes on columns of expanded uncertainties, where standard ones are missing."""
+def _notes_on_u(path: Path, layout: Layout, chosen: Sequence[Column], *, wanted: bool) -> list[str]:
+    """Return notes on columns of expanded uncertainties, where standard ones are missing, and on cells in %."""
+    name = shorten(str(path), 200)
     how = "u is half of 2σ or of U (k = 2), and a greatest error divided by √3: write it in a column u [Hz]"
-    found = [title for title in header if missing and _EXPANDED.search(title)]
-    return [
-        of_file("expanded u", f"{shorten(str(path), 200)}: column '{shorten(title)}' is not read: {how}")
-        for title in found
+    missing = wanted and companion(_SPIN) not in {one.name for one in chosen}
+    expanded = [title for title in layout.header if missing and _EXPANDED.search(title)]
+    notes: list[str] = [
+        of_file("expanded u", f"{name}: column '{shorten(title)}' is not read: {how}") for title in expanded
     ]
+    said = "{path:s}: column '{title:s}' holds {number:g}, taken in %; if it shows {shown:g} %, write u in Hz"
+    for column in (one for one in chosen if layout.aligned and one.unit == "%"):
+        number = max(_numbers(layout, column.index), default=1.0)
+        if number < _LEAST_PERCENT:
+            text = Said(said, path=name, title=shorten(column.label), number=number, shown=100 * number)
+            notes.append(of_file("percent", text))
+    return notes
 
 
 def _must_be_one_time(path: Path, layout: Layout, meant: Sequence[str]) -> None:
@@ -667,17 +681,11 @@ def _titles(
     if wanted:
         return numbers, _with_time(wanted, filled), []
     if layout.header_line:
-        raise NoSuchColumn(
-            path,
-            f'is no header for the {layout.width} columns below: correct it, or say `columns` = "t=1,f=2"',
-            line=layout.header_line,
-        )
+        what = f'is no header for the {layout.width} columns below: correct it, or say `columns` = "t=1,f=2"'
+        raise NoSuchColumn(path, what, line=layout.header_line)
     if len(filled) > len(TITLES_WITHOUT_HEADER) or not guess:
-        raise NoSuchColumn(
-            path,
-            f'{layout.width} columns and no header; add one, or say `columns` = "t=1,f=2"',
-            line=layout.first_line,
-        )
+        what = f'{layout.width} columns and no header; add one, or say `columns` = "t=1,f=2"'
+        raise NoSuchColumn(path, what, line=layout.first_line)
     taken = dict(zip(TITLES_WITHOUT_HEADER, filled, strict=False))
     return (
         numbers,

@@ -70,9 +70,8 @@ def _load(path: Path) -> NDArray[Any]:
     try:
         data: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
     except _BROKEN as error:
-        raise TableError(
-            path, f"is no NumPy array that can be read ({shorten(str(error), 80)}): save it again"
-        ) from error
+        what = f"is no NumPy array that can be read ({shorten(str(error), 80)}): save it again"
+        raise TableError(path, what) from error
     if data.dtype.kind not in "iuf" or data.dtype.itemsize > 8:
         raise TableError(path, f"holds {data.dtype}, plain numbers are expected: save them with numpy.save")
     if data.ndim not in {1, 2} or 0 in data.shape or (data.ndim == 2 and min(data.shape) > MOST_CHANNELS):

@@ -56,8 +56,7 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
         return _samples(head, rate, blocks)
     if not guess and not any(read_title(text).column == "time_s" or "pulse" in text.casefold() for text in titles):
         raise NoWaveform(path, "holds one column of numbers, which nothing calls times")
-    _refuse_another_quantity(path, titles)
-    factor = _factor(titles)
+    factor = _factor(path, titles)
     found = list(blocks())
     times = np.concatenate([block.numbers[:, 0] for block in found]) * factor
     late = np.flatnonzero(np.diff(times) <= 0)
@@ -65,9 +64,8 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
         raise NoRate(path, "holds one column of numbers that do not increase: of samples say the `rate` in Hz")
     if late.size:
         k = int(late[0])
-        raise TableError(
-            path, f"pulse {k + 2}, at {times[k + 1]:.9g} s, does not come after the one at {times[k]:.9g} s: correct it"
-        )
+        what = f"pulse {k + 2}, at {times[k + 1]:.9g} s, does not come after the one at {times[k]:.9g} s: correct it"
+        raise TableError(path, what)
     if len(times) < FEWEST_PULSES:
         raise NoWaveform(path, f"holds {len(times)} numbers, at least {FEWEST_PULSES} pulse times are needed")
     _must_be_of_turns(path, times, first + 1)
@@ -90,26 +88,21 @@ def _must_be_of_turns(path: Path, times: NDArray[np.float64], line: int) -> None
         raise NoRate(path, said)
 
 
-def _refuse_another_quantity(path: Path, titles: list[str]) -> None:
-    """Raise NoWaveform where the title of the column, or its unit, is that of another quantity than a time."""
-    for text in reversed(titles):
+def _factor(path: Path, titles: list[str]) -> float:
+    """Return the unit of the times [s], by the title or a row of units; seconds without one.
+
+    Raises NoWaveform where the title of the column, or its unit, is that of another quantity than a time.
+    """
+    factors = [1.0]
+    for text in titles:
         title = read_title(text)
         unit = plain_unit(text) if is_unit(text) else title.unit or ""
-        other_unit = bool(unit) and is_unit(unit) and unit_factor(unit, "time") is None
-        if other_unit or title.column not in {None, "time_s"}:
-            raise NoWaveform(
-                path, f"holds one column, '{shorten(text)}', which is no time: times of pulses are expected, as t [s]"
-            )
-
-
-def _factor(titles: list[str]) -> float:
-    """Return the unit of the times [s], by the title or a row of units; seconds without one."""
-    for text in reversed(titles):
-        unit = plain_unit(text) if is_unit(text) else read_title(text).unit or ""
         factor = unit_factor(unit, "time") if unit else None
-        if factor is not None:
-            return factor
-    return 1.0
+        if (is_unit(unit) and factor is None) or title.column not in {None, "time_s"}:
+            what = f"holds one column, '{shorten(text)}', which is no time"
+            raise NoWaveform(path, f"{what}: times of pulses are expected, as t [s]")
+        factors += [factor] if factor else []
+    return factors[-1]
 
 
 def _samples(head: Head, rate: float, blocks: Callable[[], Iterator[Block]]) -> Waveform:

@@ -9,7 +9,7 @@ from levilab.formats.kinds import AUDIO, kind_of_bytes
 from levilab.formats.table import file_errors
 from levilab.formats.texts import SPREADSHEETS, TEXTS, locate, texts_of
 from levilab.formats.waveforms.audio import read_audio
-from levilab.formats.waveforms.header import NoWaveform, dialect_of
+from levilab.formats.waveforms.header import NoWaveform, dialect_of, says_its_step
 from levilab.formats.waveforms.npy import read_npy
 from levilab.formats.waveforms.pulse_times import read_column
 from levilab.formats.waveforms.rows import read_head
@@ -52,15 +52,14 @@ def read_record(
         if record is not None:
             return record
         if inside or any(text.rewritten for text in texts_of(file)):
-            raise NoWaveform(
-                path,
-                "is read for readings alone, as spreadsheets, ZIP, JSON and serial logs are: save samples as CSV",
-            )
+            what = "is read for readings alone, as spreadsheets, ZIP, JSON and serial logs are: save samples as CSV"
+            raise NoWaveform(path, what)
         head = read_head(path)
         if set(columns or ()) - {"t", "time_s"}:
             raise NoWaveform(path, "holds readings: its columns are named")
         dialect = dialect_of(head)
-        if dialect.separator is None and all(len(dialect.split(line)) < 2 for line in head.lines[-20:]):
+        alone = dialect.separator is None and all(len(dialect.split(line)) < 2 for line in head.lines[-20:])
+        if alone and not says_its_step(head, dialect):
             return read_column(head, dialect, rate, guess=guess)
         return read_samples(head, dialect, columns=columns or {}, rate=rate)
 

@@ -178,12 +178,8 @@ def _line_by_line(path: Path, text: str, first: int, dialect: Dialect, used: Seq
 def _row(path: Path, text: str, line: int, dialect: Dialect, used: Sequence[int]) -> list[float]:
     fields = dialect.split(text)
     if max(used) >= len(fields):
-        raise TableError(
-            path,
-            f"'{shorten(text.strip())}' has {how_many(len(fields), 'field')}, {max(used) + 1} are "
-            "expected: complete or remove the line",
-            line=line,
-        )
+        what = f"'{shorten(text.strip())}' has {how_many(len(fields), 'field')}, {max(used) + 1} are "
+        raise TableError(path, f"{what}expected: complete or remove the line", line=line)
     return [_number(path, fields[index], line, dialect) for index in used]
 
 
@@ -193,14 +189,9 @@ def _number(path: Path, text: str, line: int, dialect: Dialect) -> float:
         value = float("nan") if missing else dialect.number(text)
     except ValueError:
         mark = "comma" if dialect.decimal == "," else "point"
-        raise TableError(
-            path, f"'{shorten(text)}' is no number with decimal {mark}: correct it, or remove the line", line=line
-        ) from None
+        what = f"'{shorten(text)}' is no number with decimal {mark}: correct it, or remove the line"
+        raise TableError(path, what, line=line) from None
     if not abs(value) < HIGHEST:
-        raise TableError(
-            path,
-            f"'{shorten(text)}' is a missing sample, but samples are evenly spaced: export the record again, or cut "
-            "the file there",
-            line=line,
-        )
+        what = f"'{shorten(text)}' is a missing sample, but samples are evenly spaced: export the record again, or cut "
+        raise TableError(path, f"{what}the file there", line=line)
     return value

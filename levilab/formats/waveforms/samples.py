@@ -243,12 +243,8 @@ def _times(head: Head, header: Header, survey: _Survey, rate: float | None) -> _
 def _check_numbers(path: Path, clock: _Clock) -> None:
     for difference, line in (clock.shortest, clock.longest):
         if np.isfinite(difference) and difference != 1:
-            raise TableError(
-                path,
-                f"its samples are numbered, and {difference:g} lies from one to the next, 1 is expected: "
-                "export the record again",
-                line=line,
-            )
+            what = f"its samples are numbered, and {difference:g} lies from one to the next, 1 is expected: "
+            raise TableError(path, f"{what}export the record again", line=line)
 
 
 def _printed_times(head: Head, header: Header, survey: _Survey, rate: float | None) -> _Times:
@@ -261,9 +257,8 @@ def _printed_times(head: Head, header: Header, survey: _Survey, rate: float | No
     if rate is not None:
         return _Times(first, 1 / rate, tuple(about_rate(path, header.step.value if header.step else mean, rate)))
     if not mean > 0:
-        raise TableError(
-            path, f"its times do not increase, from {first:g} s to {last:g} s: sort the rows, or say `rate`"
-        )
+        what = f"its times do not increase, from {first:g} s to {last:g} s: sort the rows, or say `rate`"
+        raise TableError(path, what)
     largest = max(abs(first), abs(last))
     allowed = max(1.01 * clock.resolution * unit, min(SINGLE * largest, mean / 4)) + 1e-9 * mean
     if max(clock.longest[0] * unit - mean, mean - clock.shortest[0] * unit) > allowed:
@@ -334,11 +329,8 @@ def _times_by_header(path: Path, header: Header, first: float, mean: float) -> _
     step = header.step.value if header.step else mean
     factor = next((unit for unit in _UNITS if abs(mean / step / unit - 1) < 1e-3), None)
     if factor is None:
-        raise TableError(
-            path,
-            f"its header says a sampling interval of {step:.6g} s, its printed times {mean:.6g} s: say which holds, "
-            f"`rate` = {1 / step:.6g} or {1 / mean:.6g}",
-        )
+        what = f"its header says a sampling interval of {step:.6g} s, its printed times {mean:.6g} s: say which holds, "
+        raise TableError(path, f"{what}`rate` = {1 / step:.6g} or {1 / mean:.6g}")
     apart = f"its printed times are {mean:.6g} s apart where its header says {step:.6g} s"
     text = f"{shorten(path.name, 200)}: {apart}: the times are taken to be in units of {1 / factor:g} s"
     return _Times(first / factor, step, (text,))

@@ -39,11 +39,8 @@ def read_scope_binary(path: Path) -> Waveform:
     try:
         from RigolWFM.wfm import Wfm  # with matplotlib and requests
     except ImportError as error:
-        raise TableError(
-            path,
-            "is a scope's binary file, which needs the extra scope (RigolWFM, which is not installed): "
-            f"{how_to_install('scope')}, or export CSV",
-        ) from error
+        what = "is a scope's binary file, which needs the extra scope (RigolWFM, which is not installed): "
+        raise TableError(path, f"{what}{how_to_install('scope')}, or export CSV") from error
     try:
         with warnings.catch_warnings(action="ignore"), contextlib.redirect_stdout(io.StringIO()) as _, \
                 contextlib.redirect_stderr(io.StringIO()):  # fmt: skip

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 import warnings
-import wave
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -34,7 +33,7 @@ def read_wav(path: Path) -> Waveform:
         TableError: it is damaged, or of a kind that is not read.
         OSError: it cannot be read.
     """
-    if _bits(path) == 24:  # three bytes are no type of numpy's; the standard library reads such files
+    if _bits(path) == 24:  # three bytes are no type of numpy's
         return _read_three_bytes(path)
     from scipy.io import wavfile
 
@@ -50,9 +49,8 @@ def read_wav(path: Path) -> Waveform:
         ZeroDivisionError,
         UnboundLocalError,
     ) as error:
-        raise TableError(
-            path, f"is no WAV recording that can be read ({shorten(str(error), 80)}): {_ADVICE}"
-        ) from error
+        what = f"is no WAV recording that can be read ({shorten(str(error), 80)}): {_ADVICE}"
+        raise TableError(path, what) from error
     return _waveform(path, rate, data)
 
 
@@ -70,9 +68,8 @@ def _waveform(path: Path, rate: int, data: NDArray[Any]) -> Waveform:
         for k in range(0, len(columns), BLOCK):
             block = (columns[k : k + BLOCK, signal].astype(np.float64) - zero) / full
             if not bool(np.isfinite(block).all()):
-                raise TableError(
-                    path, f"has samples that are no numbers from sample {k} on: cut them off, or {_ADVICE}"
-                )
+                what = f"has samples that are no numbers from sample {k} on: cut them off, or {_ADVICE}"
+                raise TableError(path, what)
             yield block
 
     return Waveform(path, "WAV", 0.0, 1 / rate, len(data), signals_of(columns.shape[1]), read)
@@ -95,25 +92,27 @@ def _bits(path: Path) -> int:
 
 
 def _read_three_bytes(path: Path) -> Waveform:
-    try:
-        with wave.open(str(path), "rb") as stream:
-            channels, rate, count = stream.getnchannels(), stream.getframerate(), stream.getnframes()
-    except (wave.Error, EOFError, struct.error) as error:
-        raise TableError(
-            path, f"is no WAV recording that can be read ({shorten(str(error), 80)}): {_ADVICE}"
-        ) from error
-    size = 3 * channels
-    count = min(count, path.stat().st_size // size)
-    if rate <= 0:
-        raise TableError(path, f"says a rate of {rate} Hz: {_ADVICE}")
+    channels = rate = start = 0
+    with path.open("rb") as stream:
+        stream.seek(12)
+        while not start and len(chunk := stream.read(8)) == 8:
+            name, size = struct.unpack("<4sI", chunk)
+            if name == b"data":
+                start = stream.tell()
+            elif name == b"fmt ":
+                _, channels, rate = struct.unpack("<HHI", stream.read(8))
+                size -= 8
+            stream.seek(size + size % 2, 1)
+    if not (start and channels and rate):
+        raise TableError(path, f"is no WAV recording that can be read (without samples or a rate): {_ADVICE}")
+    count = min(size, path.stat().st_size - start) // (3 * channels)
     check_count(path, count)
+    data = np.memmap(path, np.uint8, "r", start, (count, channels, 3))
 
     def read(signal: int) -> Iterator[Array]:
-        with wave.open(str(path), "rb") as stream:
-            while frames := stream.readframes(BLOCK):
-                whole = np.frombuffer(frames[: len(frames) // size * size], np.uint8).reshape(-1, channels, 3)
-                three = whole[:, signal].astype(np.int32)
-                value = three[:, 0] | three[:, 1] << 8 | three[:, 2] << 16
-                yield (value - ((value & 0x800000) << 1)) / 8388608.0
+        for k in range(0, count, BLOCK):
+            three = data[k : k + BLOCK, signal].astype(np.int32)
+            value = three[:, 0] | three[:, 1] << 8 | three[:, 2] << 16
+            yield (value - ((value & 0x800000) << 1)) / 8388608.0
 
     return Waveform(path, "WAV", 0.0, 1 / rate, count, signals_of(channels), read)

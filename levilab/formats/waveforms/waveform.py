@@ -133,9 +133,8 @@ class Waveform:
         if wanted.strip().isdecimal() and 1 <= int(wanted) <= len(names):
             return int(wanted) - 1
         has = quote_names(signal.name for signal in self.signals)
-        raise NoSuchSignal(
-            "channel", f"{shorten(str(self.path), 200)} has {has}: name one of them", value=f"'{shorten(wanted)}'"
-        )
+        what = f"{shorten(str(self.path), 200)} has {has}: name one of them"
+        raise NoSuchSignal("channel", what, value=f"'{shorten(wanted)}'")
 
     def blocks(self, wanted: str | None = None) -> Iterator[Array]:
         """Return the samples of a channel in order, in blocks that fit into memory."""

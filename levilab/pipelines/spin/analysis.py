@@ -33,7 +33,7 @@ from levilab.pipelines.spin.magnetometer import findings_of, spin_of_line, track
 from levilab.pipelines.spin.readings import Records, track_of_record
 from levilab.pipelines.spin.words import finding_text
 from levilab.present.numbers import with_decimals, with_uncertainty
-from levilab.texts.note import Note
+from levilab.texts.note import Note, kind_of
 from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
@@ -292,7 +292,8 @@ def _spin_of(source: Source[Records], options: SpinOptions) -> SpinRun:
             return _of_waveform(records.waveforms[0], records.channel, options)
         return _of_several(records, options)
     except AnalysisError as error:
-        raise DataError(f"{source.path}: {error}") from error
+        channels = [note for note in records.warnings if kind_of(note) == "channels"]
+        raise DataError("; ".join([f"{source.path}: {error}", *channels])) from error
 
 
 def _of_times(times: Array) -> SpinRun:

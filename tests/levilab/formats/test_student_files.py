@@ -3,11 +3,12 @@
 import json
 import re
 import zipfile
-from datetime import date, datetime
+from datetime import date, datetime, time
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xlsxwriter
 
 from levilab.errors import DataError
 from levilab.formats import texts
@@ -104,6 +105,18 @@ def rows(form):
         ("Zeit;s;" + ";".join(map(str, INSTANTS)) + "\nFrequenz;Hz;" + ";".join(map(str, SPINS)) + "\n", None),
         ("\t".join(map(str, INSTANTS)) + "\n" + "\t".join(map(str, SPINS)) + "\n", None),
         ("\0\x01boot rst:0x1\nt,f\n" + rows("{t},{f}"), None),
+        (
+            "#;t [s];f [Hz]\n"
+            + "".join(f"{k};{t};{f}\n" for k, (t, f) in enumerate(zip(INSTANTS, SPINS, strict=True))),
+            None,
+        ),
+        ('"t" "f"\n' + "".join(f'"{k}" {t} {f}\n' for k, (t, f) in enumerate(zip(INSTANTS, SPINS, strict=True))), None),
+        ('"t\n[s]";"f\n[Hz]";"Fehler\n[mHz]"\n' + rows("{t};{f};30"), 0.03),
+        ("Zeit t [s]   Frequenz f [Hz]   ± [Hz]\n" + rows("{t}   {f}   0.03"), 0.03),
+        ("t [s];Δn (U/min);n (U/min)\n" + rows("{t};0,03;{f}").replace(".", ","), 0.03 / 60),
+        ("Zeit;Frequenz\nlinks;rechts\nms;Hz\n" + rows("{t}e3;{f} ×10^0") + "Mittel;k.A.\n", None),
+        ("".join(f"0:00:{t:02.0f} -> {f} Hz\n" for t, f in zip(INSTANTS, SPINS, strict=True)), None),
+        ("Y unit;Hz\nt;f [Hz] links;Comment\n" + rows("{t:.0f}s;{f}"), None),
     ],
 )
 def test_readings_are_read_however_they_are_written(text, u, tmp_path):
@@ -116,7 +129,27 @@ def test_readings_are_read_however_they_are_written(text, u, tmp_path):
     assert ("spin_frequency_u_hz" in table.columns) == (u is not None)
     if u:
         assert table.column("spin_frequency_u_hz") == pytest.approx(u, rel=1e-14)
+    if u and re.search(r"\d.*±|\(3\)", text):
         assert "behind the ± is taken as the standard uncertainty" in " ".join(table.warnings)
+
+
+@pytest.mark.parametrize("name", ["Messung {}", "{}"])
+def test_tables_below_and_beside_one_another_are_runs(name, tmp_path):
+    names = [name.format(k) for k in (1, 2)]
+    (tmp_path / "below.csv").write_text("".join(f"{one}\nt [s],f [Hz]\n{rows('{t},{f}')}\n" for one in names))
+    with xlsxwriter.Workbook(tmp_path / "my.xlsx") as book:
+        sheet, clock = book.add_worksheet(), book.add_format({"num_format": "h:mm"})
+        book.add_worksheet().hide()
+        sheet.write_row(0, 0, ["Zeit [min:s]", "f / Hz", "", "", "mean:", 36.5])
+        sheet.write_row(1, 0, ["", *names])
+        for k, f in enumerate(SPINS):
+            sheet.write_datetime(k + 2, 0, time(k * 2, 0), clock)
+            sheet.write_row(k + 2, 1, [f, f])
+    for path, times in ((tmp_path / "below.csv", [*INSTANTS]), (tmp_path / "my.xlsx", [120 * k for k in range(6)])):
+        tables = [read_table(run.path, quantities=SPIN) for run in understand(path).runs]
+        assert [table.path.name[-1] for table in tables] == ["1", "2"]
+        assert [table.column("spin_frequency_hz").tolist() for table in tables] == [[*SPINS]] * 2
+        assert [table.column("time_s").tolist() for table in tables] == [times] * 2
 
 
 @pytest.mark.parametrize(("count", "without"), [(12, [3]), (600, range(300)), (20000, range(19000))])
@@ -174,10 +207,7 @@ def test_a_phones_sensor_of_its_own_motion_is_no_record_of_the_top(unit, sensor,
 # --- several runs in a file ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("inside", "first"),
-    [("Messung 2", 37.9), ("Tabelle1/Messung 2", 37.9)],
-)
+@pytest.mark.parametrize(("inside", "first"), [("Messung 2", 37.9), ("Tabelle1/Messung 2", 37.9)])
 def test_a_run_in_a_file_is_named_as_if_the_file_were_a_folder(inside, first):
     table = read_table(FILES / "libreoffice.ods" / inside, quantities=SPIN)
     assert table.column("spin_frequency_hz")[0] == pytest.approx(first, abs=0.15)  # 38 ± noise
@@ -406,11 +436,8 @@ def test_a_number_in_a_cell_keeps_its_last_bit(tmp_path):
     value = 37.224252878824654
     cells = f'<c r="A{{0}}"><v>{{0}}</v></c><c r="B{{0}}"><v>{value!r}</v></c>'
     rows = "".join(f'<row r="{k}">{cells.format(k)}</row>' for k in range(1, 5))
-    path = workbook(
-        tmp_path / "bits.xlsx",
-        f'<worksheet xmlns="{MAIN}"><sheetData>{rows}</sheetData></worksheet>',
-        **{"xl/worksheets/sheet2.xml": f'<worksheet xmlns="{MAIN}"><sheetData/></worksheet>'},
-    )
+    first, second = (f'<worksheet xmlns="{MAIN}"><sheetData>{one}</sheetData></worksheet>' for one in (rows, ""))
+    path = workbook(tmp_path / "bits.xlsx", first, **{"xl/worksheets/sheet2.xml": second})
     assert read_table(path, quantities=SPIN).column("spin_frequency_hz").tolist() == [value] * 4
 
 
@@ -454,10 +481,8 @@ def test_formulas_that_were_never_worked_out_say_what_to_do(tmp_path, value):
 
 
 def test_formulas_without_values_beside_the_readings_refuse_nothing(tmp_path):
-    rows = "".join(
-        f'<row r="{k}"><c r="A{k}"><v>{k}</v></c><c r="B{k}"><v>{38 - k}</v></c><c r="D{k}"><f>B{k}</f></c></row>'
-        for k in range(1, 5)
-    )
+    cells = '<c r="A{0}"><v>{0}</v></c><c r="B{0}"><v>{1}</v></c><c r="D{0}"><f>B{0}</f></c>'
+    rows = "".join(f'<row r="{k}">{cells.format(k, 38 - k)}</row>' for k in range(1, 5))
     last = '<row r="5"><c r="A5" t="inlineStr"><is><t>mean</t></is></c><c r="B5"><f>AVERAGE(B1:B4)</f></c></row>'
     sheet = f'<worksheet xmlns="{MAIN}"><sheetData>{rows}{last}</sheetData></worksheet>'
     table = read_table(workbook(tmp_path / "beside.xlsx", sheet) / "Run 1", columns={"t": "1", "f": "2"})
@@ -465,24 +490,20 @@ def test_formulas_without_values_beside_the_readings_refuse_nothing(tmp_path):
     assert "is no reading and is left out" in table.warnings[0]
 
 
-TIMES = ["0;0;38", "0;40;37.5", "1;20;37.2", "1;55;37"]
-
-
-@pytest.mark.parametrize("titles", ["min;s;f", "t [min];t [s];f", "Minuten;Sekunden;f / Hz", "Zeit min;Zeit s;f"])
-def test_times_in_two_columns_say_to_write_them_as_one(titles, tmp_path):
-    path = tmp_path / "two.csv"
-    path.write_text("\n".join([titles, *TIMES, ""]), encoding="utf-8")
-    with pytest.raises(TableError, match=r"its times stand in two columns, .* or as 1:20"):
-        read_table(path, quantities=SPIN)
+AS_ONE, WHICH = r"its times stand in two columns, .* or as 1:20", "say which: `columns` = t=1 or t=2"
+TIMES = "0;0;38\n0;40;37.5\n1;20;37.2\n1;55;37"
 
 
 @pytest.mark.parametrize(
-    "rows", ["0;0;38\n1;60;37\n2;120;36", "0.5;30;38\n0.6;36;37\n0.75;45;36", "0;9;38\n0;20;37\n0;30;36"]
+    ("text", "says"),
+    [(f"{titles}\n{TIMES}", AS_ONE) for titles in ("min;s;f", "Minuten;Sekunden;f / Hz", "Zeit min;Zeit s;f")]
+    + [(f"t [min];t [s];f\n{rows}", WHICH) for rows in ("0;0;38\n1;60;37\n2;120;36", "0;9;38\n0;20;37\n0;30;36")]
+    + [("t [min];t [s];f\n0.5;30;38\n0.6;36;37\n0.75;45;36", WHICH), (f"t;t;f\nmin;s;Hz\n{TIMES}", AS_ONE)],
 )
-def test_times_in_either_of_two_units_are_asked_about(rows, tmp_path):
-    path = tmp_path / "twice.csv"
-    path.write_text(f"t [min];t [s];f\n{rows}\n", encoding="utf-8")
-    with pytest.raises(TableError, match="say which: `columns` = t=1 or t=2"):
+def test_times_in_two_columns_are_asked_about(text, says, tmp_path):
+    path = tmp_path / "two.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(TableError, match=says):
         read_table(path, quantities=SPIN)
 
 
@@ -495,12 +516,6 @@ def test_minutes_beside_other_seconds_are_the_times(titles, seconds, columns, tm
     rows = "".join(f"{k};{seconds};{38 - k}\n" for k in range(3))
     path.write_text(f"{titles}\n{rows}", encoding="utf-8")
     assert read_table(path, quantities=SPIN, columns=columns).column("time_s").tolist() == [0, 60, 120]
-
-
-def test_a_stopwatch_may_say_so_in_its_title(tmp_path):
-    path = tmp_path / "watch.csv"
-    path.write_text("t [mm:ss];f\n0:30;38\n1:20;37\n2:00;36\n", encoding="utf-8")
-    assert read_table(path, quantities=SPIN).column("time_s").tolist() == [30, 80, 120]
 
 
 def test_a_path_into_no_file_stays_a_path():

@@ -113,6 +113,7 @@ TABLES = {
     "no end of the last line": ("t,f\n0,61.5\n0.5,61.25\n1,61", PLAIN),
     "labels with =": ("t=0.0 f=61.5\nt=0.5 f=61.25\nt=1 f=61\n", PLAIN),
     "labels without marks": ("Time 0, Freq 61.5\nTime .5, Freq 61.25\nTime 1, Freq 61\n", PLAIN),
+    "a stopwatch": ("t [mm:ss],f [Hz]\n0:00,61.5\n0:00.5,61.25\n0:01,61\n", PLAIN),
     "LabVIEW's title of the times": ("X_Value,f [Hz]\n0,61.5\n0.5,61.25\n1,61\n", PLAIN),
     "field scan": (
         "z/mm;u_z/mm;B [mT]\n10;0,5;20\n20;0,5;10\n30;0,5;5\n",
@@ -174,7 +175,7 @@ def test_times_of_hours_and_minutes_are_doubted(table_file):
     [
         ("t,f\n01/02/2026 23:59:59,61.5\n02/02/2026 0:00:00,61.25\n02/02/2026 0:00:01,61\n", "for day/month/year"),
         ("t,f\n1/2/2026 23:59:59,61.5\n1/3/2026 0:00:00,61.25\n1/3/2026 0:00:01,61\n", "for month/day/year"),
-        ("t,f\n0,61.5\n1,61.25\n2,61\nMittelwert,61.25\n", "line 5: 'Mittelwert,61.25' is no reading and is left out"),
+        ("t,f\n0,61.5\nt,f\n1,61.25\nk.A.,#DIV/0!\n2,61\n", "line 3: 't,f' is no reading and is left out"),
         ("t,f,u\n0,61.5,\n1,61.25,\n2,61,\n", "'u' is empty"),
         ("t,f,u [ppm]\n0,61.5,1\n1,61.25,1\n2,61,1\n", "'ppm' is no unit of frequency"),
         ("t,f\n0,61.5\n1,61.25\n2,61\nmean,61.25\nEnd of data\n", "line 5: 'mean,61.25' is no reading"),
@@ -209,8 +210,7 @@ def test_many_missed_readings_make_one_warning(table_file):
     table = read_table(table_file("t;f\n" + "".join(f"{i};{'' if i % 2 else '61,5'}\n" for i in range(30))))
     (warning,) = table.warnings
     assert warning.partition(": ")[2] == (
-        "15 of 30 rows are left out as missed (empty, -, --, ---, n/a, na, n.a., nan, #n/a, #nv, #num!, #wert!, "
-        "#value!, null, none, inf or 9.91E37): lines 3, 5, 7, 9, 11, …"
+        "15 of 30 rows are left out as missed (empty, -, n/a, nan, inf or 9.91E37): lines 3, 5, 7, 9, 11, …"
     )
 
 
@@ -288,14 +288,13 @@ ERRORS = {
     "only a header, no line end": ("t,f", None, ["line 1", "only a header"]),
     "two readings": ("t,f\n0,61.5\n1,61\n", None, ["2 readings", "at least 3"]),
     "all missed": ("t,f\n0,nan\n1,nan\n2,nan\n3,nan\n", None, ["0 readings and 4 missed"]),
-    "text in a number column": ("t,f\n0,61.5\n0.5,abc\n1,61\n", None, ["line 3", "'abc'", "'f'", "decimal point"]),
-    "text in the first row": ("t,f\n0,abc\n0.5,61.25\n1,61\n2,60\n", None, ["line 2", "'abc'"]),
+    "text in a number column": ("t,f\n0,61.5\n0.5,6l.5\n1,61\n", None, ["line 3", "'6l.5'", "'f'", "decimal point"]),
     "text in all rows": ("t,f\nabc,def\n", None, ["line 2", "'abc'"]),
     "decimal comma among points": ("t;f\n0;61.5\n0.5;61,25\n1;61.1\n", None, ["line 3", "'61,25'", "decimal point"]),
     "decimal commas between commas": ("t,f\n0,61,5\n1,61,25\n2,60,75\n", None, ["line 2", "3 fields", "; or tab"]),
     "too few fields": ("t,f\n0,61.5\n0.5\n1,61\n", None, ["line 3", "'0.5'", "1 field,", "2 are expected"]),
     "too many fields": ("t,f\n0,61.5\n0.5,61,7\n1,61\n2,60\n", None, ["line 3", "3 fields"]),
-    "second header": (GOOD + GOOD, None, ["line 5", "'t'"]),
+    "second header": ("t,f [Hz]\n0,61\n1,61\n2,61\nt,f [rpm]\n3,60\n", None, ["line 5", "write one unit"]),
     "thousands separator": ("t;f [Hz]\n0;1.061\n1;1.061,2\n2;1.061,1\n", None, ["line 2", "'1.061'"]),
     "underscore": ("t,f\n0,61\n1,6_1\n2,60\n", None, ["line 3", "'6_1'"]),
     "two frequencies": ("t,f,rpm\n0,1,60\n1,1,60\n2,1,60\n", None, ["'f', 'rpm'", "`columns` = f=2 or f=3"]),
@@ -308,7 +307,7 @@ ERRORS = {
     "mHz or MHz": ("a,f_mhz\n0,1\n1,2\n2,3\n", None, ["'f_mhz'"]),
     "no header, many columns": ("0,1,2,3\n1,1,2,3\n2,1,2,3\n", None, ["line 1", "4 columns and no header"]),
     "text but no header": ("Scope 7\n0,61\n1,61\n2,60\n", None, ["line 1", "no header", "t=1,f=2"]),
-    "text in the middle": ("t,f\n0,61.5\nMittel,61\n2,61\n3,60\n", None, ["line 3", "'Mittel' stands in column 't'"]),
+    "text in the middle": ("t,f\n0,61.5\nca. 1,61\n2,61\n3,60\n", None, ["line 3", "'ca. 1' stands in column 't'"]),
     "no times": ("RPM: 2403\nRPM: 2400\nRPM: 2397\nRPM: 2394\n", None, ["its times are needed"]),
     "prose in one line": ("one, two\n", None, ["begins no table of at least two columns"]),
     "prose": ("Dear all,\nsee you.\n", None, ["line 1", "Dear all"]),
@@ -318,7 +317,7 @@ ERRORS = {
     "zeros": (b"\0" * 100, None, ["binary", "export it as CSV"]),
     "one endless line": (b"1," * 50000, None, ["without end"]),
     "control characters in a field": (GOOD + "1.5,\x1b[31m6\n", None, ["line 5", "\N{REPLACEMENT CHARACTER}[31m6"]),
-    "long text": (f"t,f\n0,61\n1,{'x' * 500}\n2,60\n", None, ["line 3", "xxx…"]),
+    "long text": (f"t,f\n0,61\n1,{'7x' * 250}\n2,60\n", None, ["line 3", "7x7…"]),
 }
 
 
@@ -647,8 +646,8 @@ def test_a_comment_with_as_many_separators_as_a_row_stays_a_comment(table_file):
 
 def test_a_line_far_down_is_named(table_file):
     rows = "".join(f"{i},61.5\n" for i in range(30000))
-    with pytest.raises(TableError, match="line 30003: 'x' stands in column 'f'"):
-        read_table(table_file(f"t,f\n{rows}# pause\n30001,x\n30002,61\n"))
+    with pytest.raises(TableError, match="line 30003: '6x' stands in column 'f'"):
+        read_table(table_file(f"t,f\n{rows}# pause\n30001,6x\n30002,61\n"))
 
 
 @BOTH_WAYS

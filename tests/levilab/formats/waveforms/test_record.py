@@ -2,9 +2,11 @@
 
 import codecs
 import re
+import struct
 import sys
 import tracemalloc
 import types
+import uuid
 import wave
 
 import numpy as np
@@ -103,7 +105,6 @@ def rows(n=20, first=0):
          0.0, 1e-3, "CH1 V, CH2 A"),
         ("t,CH1\n" + "".join(f"{k / 1000},1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
         ("t CH1\n\n" + "".join(f"{k / 1000} 1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
-        ("\nt CH1\n" + "".join(f"{k / 1000} 1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
         ("X(CH1),CH1\nSecond,Volt\n" + "".join(f"{k / 1000},1\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
         ("X(CH1),Y(CH1),X(CH2),Y(CH2)\nSecond,Volt,Second,Ampere\n"
          + "".join(f"{k / 1000},1,{k / 1000},2\n" for k in range(20)), 0.0, 1e-3, "CH1 V, CH2 A"),
@@ -119,6 +120,9 @@ def rows(n=20, first=0):
         ("#CHANNEL:CH2\n#CLOCK=50.0uS\n#SIZE=20\n#UNITS:mV\n" + "1.5,\n2.5,\n" * 10, 0.0, 5e-5, "CH2 V"),
         ("Channel\t:\tCH1\tCH2\nTime interval\t:\t0.20uS\t0.20uS\n\nindex\tCH1_Voltage(mV)\tCH2_Voltage(mV)\n"
          + "".join(f"{k}\t{k % 5}.00\t3.00\n" for k in range(20)), 0.0, 2e-7, "CH1 V, CH2 V"),
+        ("Source,CH2\nSampling Period,1e-4\nTime,23-Nov-26 14:05\nData,\n" + "5,\n7,\n" * 10, 0.0, 1e-4, "CH2 V"),
+        ("XInc:,1.0E-04\nYUnits:,mV\nData:\n" + "5.5\n" * 20, 0.0, 1e-4, "CH1 V"),
+        ("in s,C1 in V\n" + "".join(f"{k}E-03,1\n" for k in range(20)), 0.0, 1e-3, "C1 V"),
         ("CH1V,CH4V,t0=-1.0e-03,tInc=1e-6\n" + "0.5,1.5\n" * 20, -1e-3, 1e-6, "CH1 V, CH4 V"),
         ("Time(s),CH1V,CH2V\n" + "".join(f"{k / 1000},1,2\n" for k in range(20)), 0.0, 1e-3, "CH1 V, CH2 V"),
         ("Zeit;Kanal A;Kanal B\n(ms);(V);(mV)\n\n" + "".join(f"{k},5;1,5;2,5\n" for k in range(20)),
@@ -349,9 +353,13 @@ def test_wav_of_every_width(bits, tmp_path):
     with wave.open(str(tmp_path / "a.wav"), "wb") as stream:
         stream.setparams((2, bits // 8, 1000, 32, "NONE", ""))
         stream.writeframes(b"".join(int(c).to_bytes(bits // 8, "little", signed=bits > 8) for c in both))
-    record = waveform(tmp_path / "a.wav")
-    assert [signal.name for signal in record.signals] == ["left", "right"]
-    np.testing.assert_array_equal(record.samples("right"), samples)
+    plain = (tmp_path / "a.wav").read_bytes()
+    pcm = uuid.UUID("00000001-0000-0010-8000-00aa00389b71").bytes_le  # of Windows' ksmedia.h
+    extended = struct.pack("<I2s14sHHI", 40, b"\xfe\xff", plain[22:36], 22, bits, 0) + pcm
+    (tmp_path / "b.wav").write_bytes(plain[:16] + extended + plain[36:])
+    for record in (waveform(tmp_path / "a.wav"), waveform(tmp_path / "b.wav")):
+        assert [signal.name for signal in record.signals] == ["left", "right"]
+        np.testing.assert_array_equal(record.samples("right"), samples)
 
 
 @pytest.mark.parametrize("kind", ["csv", "wav"])

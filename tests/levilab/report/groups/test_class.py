@@ -170,7 +170,7 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
     assert of.quantities[0].used == tuple(group.source.name != "Group 2" for group in of.groups)
     assert of.quantities[0].mean.value == pytest.approx(2.4e-4, rel=0.03)  # the halved spins have 3.3e-4
     page = Page(write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")).text
-    assert re.search(r"skipped \S*Group 4.csv, line 3: 'abc'", page)
+    assert re.search(r"skipped \S*Group 4.csv, line 1: holds 2 readings.* line 3: '10,abc' is no reading", page)
     assert re.search(r"Group 2 repeat C₃/₂: \+\d+\.\d u from its truth", page)
 
 
