@@ -1,6 +1,6 @@
 """Slow swings of a floating top, and the geometric magnetism that splits them."""
 
-from analysis.sway.geometry import Geometry, geometric_magnetism
+from analysis.sway.geometry import Geometry, choose_lines, geometric_magnetism
 from analysis.sway.known import Known
 from analysis.sway.lines import Swings, mirrored, swings_in_window, swings_of
 from analysis.sway.orbit import slow_swings
@@ -11,6 +11,7 @@ __all__ = [
     "Known",
     "Sensor",
     "Swings",
+    "choose_lines",
     "geometric_magnetism",
     "image",
     "mirrored",

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from analysis.errors import ShapesDiffer, TooFewReadings
 from analysis.sway.joint import Corrections, Joint, fit_together
+from analysis.sway.lines import COARSE
 from analysis.sway.orbit import NoSwing, slow_swings, small_swings
 from analysis.sway.vertical import vertical_swing
 from analysis.uncertainty import Estimate, partly_believed, propagate
@@ -52,14 +53,15 @@ LEAN_U = 0.3
 #: The precession's frequency is that of small swings: relative standard uncertainty of B′/2B from it, per square of the
 #: swings' amplitudes [1/m²].
 PRECESSION_SHIFT_U = 1e3
-#: A line that is so much weaker than a swing is not taken for it; the split over that of the quartic scatters by this
-#: part in a spin-down.
-_WEAK, _BENT = 0.1, 0.015
+#: The split over that of the quartic scatters by this part in a spin-down.
+_BENT = 0.015
 #: Standard uncertainty of the vertical swing that follows from the slow ones and the field [Hz].
 _VERTICAL_U_HZ = 0.015
 #: Large swings change it by so much more, times the square of the sum of amplitudes² and over the difference from the
 #: beat [Hz²/m⁴].
 _VERTICAL_SHIFT_U = 2.4e9
+#: The grid: around each choice, in standard deviations, and points.
+_FAR, _POINTS = 4.0, 17
 #: The spin at which Ω_g is given [Hz].
 REFERENCE_HZ = 30.0
 #: The usual split over the beat: what the vertical swing does to it is no smaller where the lines have less.
@@ -135,8 +137,8 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
         raise TooFewReadings(seen=0, needed=1)
     if spin.shape != (len(swings),):
         raise ShapesDiffer(quantity="the spin", seen=spin.shape, expected=(len(swings),))
-    swings, mistaken = _assigned(swings, spin, known)
     each = list(zip(swings, spin.tolist(), strict=True))
+    mistaken = np.array([one.mistake for one in swings])
     heights = np.array([known.height(one, nu) for one, nu in each])
     placed = [(one, nu, z) for (one, nu), z in zip(each, heights.tolist(), strict=True)]
     shifts = np.array([_shift(*one, known) for one in placed])
@@ -203,44 +205,63 @@ def _mean(values: Array, u: Array, independent: Array) -> tuple[float, float, fl
     return mean, partly_believed(chi_square, values.size - 1) * own, chi_square
 
 
-def _assigned(swings: Sequence[Swings], spin: Array, known: Known) -> tuple[Sequence[Swings], Array]:
-    """Return the swings, with the other lines for the backward or the forward ones or both where that fits better.
+def choose_lines(windows: Sequence[Swings], spin_hz: Array, known: Known) -> list[Swings]:
+    """Return the likeliest of the swings of each window and their rivals, with the mistake that this may be.
 
-    The split goes with the spin but for some percent, the vertical swing with both swings and the field, and a swing
-    is likelier the stronger line.  The second value is the standard uncertainty of each split from the other choices.
+    A line of the vertical swing beside a swing may be the stronger one, and both labels may suit a window.  Over all
+    windows the split goes with the spin but for some percent, and the vertical swing with both swings and the field.
+    The probability of Ω_g/ω₃, along a grid, is the product over the windows of the sum over the choices in each.
+
+    Args:
+        windows: with their rivals.
+        spin_hz: in the middle of each, positive, shape (n,) [Hz].
+        known: about top and base.
     """
-    choices = [list(swings)]
-    for k in (0, 1):
-        for one in choices[:]:
-            turned = [window.turned(k) for window in one]
-            if np.mean([window.amplitude[k] for window in turned]) > _WEAK * np.mean([w.amplitude[k] for w in one]):
-                choices.append(turned)
-    misfits = np.array([_misfit(one, spin, known) for one in choices])
-    best = int(np.argmin(misfits))
-    odds = np.exp(-(misfits - misfits[best]) / 2)
-    splits = np.array([[window.split for window in one] for one in choices])
-    return choices[best], np.sqrt(odds @ (splits - splits[best]) ** 2 / odds.sum())
+    count = len(windows)
+    owner = np.repeat(np.arange(count), [1 + len(window.rivals) for window in windows])
+    starts, spin = np.searchsorted(owner, np.arange(count)), np.asarray(spin_hz, dtype=np.float64)[owner]
+    choices = [one for window in windows for one in (window, *window.rivals)]
+    each = zip(choices, spin.tolist(), strict=True)
+    misfit, share, part = np.array([_judge(one, nu, known, 1 / count) for one, nu in each]).T
+    least = np.minimum.reduceat(misfit, starts)[owner]
+    if not np.isfinite(least).all():  # no top swings so in a window, which is said later
+        return list(windows)
+    split, own = np.array([(one.split, one.u_split) for one in choices]).T
+    around = np.linspace(-_FAR, _FAR, _POINTS)[:, None] * np.hypot(own / spin, part * share)
+    grid = np.unique(share + around)[:, None]
+    width = np.hypot(own / spin, part * grid)
+    terms = -0.5 * (misfit - least + ((share - grid) / width) ** 2) - np.log(width)
+    whole = np.logaddexp.reduceat(terms, starts, axis=1)
+    together = whole.sum(axis=1)
+    odds = np.exp(together - together.max()) * np.gradient(grid[:, 0])
+    weight = (odds / odds.sum()) @ np.exp(terms - whole[:, owner])
+    best, found, squares = terms[np.argmax(together)], [], []
+    for k, window in enumerate(windows):
+        (mine,) = np.nonzero(owner == k)
+        chosen = mine[np.argmax(best[mine])]
+        squares.append(float(weight[mine] @ (split[mine] - split[chosen]) ** 2))
+        found.append(replace(choices[chosen], rivals=(), backwards=window.backwards))
+    return [replace(one, mistake=math.sqrt(np.mean(squares))) for one in found]
 
 
-def _misfit(swings: Sequence[Swings], spin: Array, known: Known) -> float:
-    """Return χ² of split over spin, and of the vertical swing, less twice the logarithm of the swings' energy."""
-    split = np.array([one.split for one in swings])
-    size = max(abs(float(np.mean(split / spin))), _SMALL)
-    each = zip(spin.tolist(), swings, strict=True)
-    share = split / np.array([_split(size, nu, one.frequency[:2], known)[0] for nu, one in each])
-    bent = math.hypot(_BENT, float(np.mean([_doubt(one) for one in swings])))
-    middle = len(swings) // 2
-    one = swings[middle]
+def _judge(swings: Swings, spin: float, known: Known, part: float) -> tuple[float, float, float]:
+    """Return misfit, Ω_g/ω₃ and the part of it by which it scatters; the misfit is infinite where no top swings so.
+
+    It has this base's vertical swing, of which this part counts, since it is alike in all windows, and improbable
+    amplitudes.
+    """
+    backward, forward = swings.frequency[:2].tolist()
+    size = max(abs(swings.split) / spin, _SMALL)
     try:
-        slope = known.gradient(known.height(one, float(spin[middle])))
+        slope = known.gradient(known.height(swings, spin))
     except NoSwing:
-        return math.inf
-    backward, forward = one.frequency[:2].tolist()
-    off = one.vertical.value - vertical_swing(backward, forward, slope, known.top.gravity)
-    u = math.hypot(_VERTICAL_U_HZ, _VERTICAL_SHIFT_U * one.size**2 / max(_away(one), NEAREST_HZ))
-    energy = 4 * float(np.sum(np.log(one.amplitude[:2])))
-    uneven = share.std() / (bent * (abs(share.mean()) + 1e-9))
-    return float(uneven**2 + (off / u) ** 2 + 2 * math.log(u)) - energy
+        return math.inf, size, _BENT
+    off = swings.vertical.value - vertical_swing(backward, forward, slope, known.top.gravity)
+    u = math.hypot(_VERTICAL_U_HZ, _VERTICAL_SHIFT_U * swings.size**2 / max(_away(swings), NEAREST_HZ))
+    alike = (off / u) ** 2 + 2 * math.log(u) + swings.improbable - swings.misfit
+    unlikely = COARSE * swings.misfit + part * alike
+    share = size * swings.split / _split(size, spin, swings.frequency[:2], known)[0]
+    return unlikely, share, math.hypot(_BENT, _doubt(swings))
 
 
 def _away(swings: Swings) -> float:
@@ -251,7 +272,7 @@ def _away(swings: Swings) -> float:
 def _doubt(swings: Swings) -> float:
     """Return the relative standard uncertainty of a split from the vertical swing, of its own and by the slow ones."""
     away = _away(swings)
-    beside = float(np.sum(swings.others[:, 2] ** 2)) / swings.size
+    beside = float(np.sum(swings.beside**2)) / swings.size
     exchange = RESONANCE_U * swings.size**2 / max(away, NEAREST_HZ) ** 4
     return min(exchange + RISE_U * beside**2 * away**4, 1.0)
 

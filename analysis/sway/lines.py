@@ -1,11 +1,11 @@
 """The slow swings of a place over time: signed frequencies, amplitudes and uncertainties, window by window.
 
 In a window the place x + iy is a sum of waves: the backward and the forward slow swing and the precession, each with a
-frequency and a slope, and the four lines at the slow swings' frequencies plus and minus that of the vertical swing,
-since the field changes with height.  One of those four lies within 0.2 Hz of the backward swing: a fit without it is
-wrong by tens of millihertz.  Where the height is known, it gives the vertical swing.  Noise is white.  Amplitudes are
-linear; frequencies follow by Gauss and Newton from the peaks of a spectrum, from several starts, of which the likeliest
-is kept.
+frequency and a slope, and of lines at sums and differences of the slow swings' and the vertical swing's frequencies,
+since the field changes with height.  One of these lies within 0.2 Hz of the backward swing: a fit without it is wrong
+by tens of millihertz.  Where the height is known, it gives the vertical swing.  Noise is white.  Amplitudes are
+linear; frequencies follow by Gauss and Newton from the peaks of a spectrum, from several starts.  The likeliest fit is
+not always the right one, as a line beside a swing may be the stronger one: others are kept as its rivals.
 """
 
 from __future__ import annotations
@@ -41,10 +41,15 @@ SLOW_HZ, PRECESSION_HZ = (0.15, 1.6), (2.5, 15.0)
 _SLOPES_U = np.array([2e-3, 2e-3, 0.2])
 #: Slopes with which the precession is looked for [Hz/s].
 _SLOPES = (0.0, 0.03, 0.06, 0.1, 0.15)
-#: The slow swings of two windows in turn differ by less [Hz].
-_APART_HZ = 0.05
 #: Peaks of the spectrum that are tried for either swing, and steps of Gauss and Newton at most.
 _TRIED, _STEPS = 3, 25
+#: Rounding: the noise is no smaller a part of the places, and frequencies differ by no smaller a part of their effect.
+_FINEST = 1e-8
+#: This part of −2 log L counts where lines are compared, since amplitudes change within a window: the model is not
+#: exact (Miller & Dunson, J. Am. Stat. Assoc. 114, 1113 (2019)).
+COARSE = 0.03
+#: The number of likeliest swings of a window that are kept, and how far that part may be above the least.
+_KEPT, _FARTHEST = 4, 30.0
 
 
 class NoSwings(AnalysisError):
@@ -69,12 +74,14 @@ class Swings:
         u: standard uncertainties, same shape [Hz].
         amplitude: same shape [m].
         vertical: the vertical swing, as the lines beside the slow swings and the heights have it [Hz].
-        others: frequency, its u [Hz] and amplitude [m] of the lines at forward less vertical and at backward plus
-            vertical swing, shape (2, 3): they may be taken for the backward and for the forward swing that are near.
+        beside: amplitudes of the lines at forward less vertical and at backward plus vertical swing, which may be taken
+            for the backward and for the forward swing that are near, shape (2,) [m].
         noise: standard deviation of a coordinate [m].
         misfit: −2 times the logarithm of the likelihood and the priors, but for a constant.
         backwards: amplitude of the strongest line where a precession would be that turns against the spin [m].
         size_u: relative standard uncertainty that all amplitudes have in common.
+        rivals: other lines that may be the swings, less likely by this window alone.
+        mistake: standard uncertainty of the split from these [Hz].
     """
 
     time: float
@@ -82,22 +89,18 @@ class Swings:
     u: Array
     amplitude: Array
     vertical: Vertical
-    others: Array
+    beside: Array
     noise: float
     misfit: float
     backwards: float = 0.0
     size_u: float = 0.0
+    rivals: tuple[Swings, ...] = ()
+    mistake: float = 0.0
 
-    def turned(self, k: int) -> Swings:
-        """Return the same with the other line for the backward swing, 0, or the forward one, 1.
-
-        Then their beat is the vertical swing.
-        """
-        lines, others = np.array([self.frequency, self.u, self.amplitude]), self.others.copy()
-        others[k], lines[:, k] = lines[:, k], self.others[k]
-        frequency, u, amplitude = lines
-        beat = Vertical(float(self.frequency[1] - self.frequency[0]), math.hypot(*self.u[:2]))
-        return replace(self, frequency=frequency, u=u, amplitude=amplitude, vertical=beat, others=others)
+    @property
+    def improbable(self) -> float:
+        """−2 log of the probability, but for a constant: a swing is likelier the stronger line."""
+        return self.misfit - 4 * float(np.sum(np.log(self.amplitude[:2])))
 
     @property
     def size(self) -> float:
@@ -131,70 +134,43 @@ def swings_of(
         TooFewReadings, ShapesDiffer, NotFinite, TimesNotIncreasing: see `analysis.errors`.
         NoSwings: they stand out in none.
     """
-    t, s = _check(times, places)
-    z = None if heights is None else _check_heights(heights, t)
+    t, s, z = _check(times, places, heights)
     borders = np.searchsorted(t, np.linspace(t[0], t[-1], max(round(float(t[-1] - t[0]) / window), 1) + 1))
     borders[-1] = t.size
     parts = [slice(*ends) for ends in itertools.pairwise(borders.tolist()) if ends[1] - ends[0] >= FEWEST]
 
-    def look(part: slice, near: Sequence[Swings]) -> Swings | None:
-        return swings_in_window(t[part], s[part], None if z is None else z[part], near=near, rising=rising)
-
-    found: list[Swings] = []
-    used = []
-    for part in parts:
-        if one := look(part, found[-1:]):
-            found.append(one)
-            used.append(part)
+    each = (swings_in_window(t[part], s[part], None if z is None else z[part], rising=rising) for part in parts)
+    found = [one for one in each if one]
     if not found:
         raise NoSwings(start=float(t[0]), end=float(t[-1]))
-    for k, part in enumerate(used):  # a weak swing may be found in one window, and be missed in the next
-        near = [
-            one for one in found[max(k - 1, 0) : k + 2] if abs(one.frequency[0] - found[k].frequency[0]) > _APART_HZ
-        ]
-        if near and (one := look(part, near)):
-            found[k] = one
     return found
 
 
-def _check(times: Array, places: Places) -> tuple[Array, Places]:
-    t = np.asarray(times, dtype=np.float64)
-    if t.ndim != 1 or np.shape(places) != t.shape:
-        raise ShapesDiffer(quantity="the place", seen=np.shape(places), expected=(t.size,))
+def _check(times: Array, places: Places, heights: Array | None) -> tuple[Array, Places, Array | None]:
+    t, s = np.asarray(times, dtype=np.float64), np.asarray(places, dtype=np.complex128)
+    z = None if heights is None else np.asarray(heights, dtype=np.float64)
+    columns = [("time", t), ("place", s)] + ([] if z is None else [("height", z)])
+    for quantity, values in columns:
+        if t.ndim != 1 or values.shape != t.shape:
+            raise ShapesDiffer(quantity=f"the {quantity}", seen=values.shape, expected=(t.size,))
     if t.size < FEWEST:
         raise TooFewReadings(seen=t.size, needed=FEWEST)
-    s = np.asarray(places, dtype=np.complex128)
-    _refuse_unless_finite("time", t)
-    _refuse_unless_finite("place", s)
+    for quantity, values in columns:
+        if (wrong := np.flatnonzero(~np.isfinite(values))).size:
+            raise NotFinite(quantity=quantity, index=int(wrong[0]), value=math.nan)
     if (back := np.flatnonzero(np.diff(t) <= 0)).size:
         k = int(back[0])
         raise TimesNotIncreasing(index=k + 1, before=float(t[k]), after=float(t[k + 1]))
-    return t, s
+    return t, s, z
 
 
-def _check_heights(heights: Array, t: Array) -> Array:
-    z = np.asarray(heights, dtype=np.float64)
-    if z.shape != t.shape:
-        raise ShapesDiffer(quantity="the height", seen=z.shape, expected=t.shape)
-    _refuse_unless_finite("height", z)
-    return z
-
-
-def _refuse_unless_finite(quantity: str, values: Array | Places) -> None:
-    if (wrong := np.flatnonzero(~np.isfinite(values))).size:
-        raise NotFinite(quantity=quantity, index=int(wrong[0]), value=math.nan)
-
-
-def swings_in_window(
-    t: Array, s: Places, heights: Array | None = None, *, near: Sequence[Swings] = (), rising: bool = False
-) -> Swings | None:
+def swings_in_window(t: Array, s: Places, heights: Array | None = None, *, rising: bool = False) -> Swings | None:
     """Return the swings of one window; None where they do not stand out.
 
     Args:
         t: shape (n,) [s].
         s: shape (n,) [m].
         heights: shape (n,) [m]; None where they are not known.
-        near: swings at nearby times, from which the search starts, too.
         rising: see `swings_of`.
     """
     lines = _spectrum(t, s)
@@ -203,21 +179,43 @@ def swings_in_window(
         return None
     # two lines that are nearer than the window resolves have one peak between them
     apart = 0.6 / float(t[-1] - t[0])
-    starts = [one.frequency[:2] for one in near]
-    starts += [np.array([backward, forward[0]]) for backward in {*seen, seen[0] - apart, seen[0] + apart}]
+    starts = [np.array([backward, forward[0]]) for backward in {*seen, seen[0] - apart, seen[0] + apart}]
     starts += [np.array([backward, one]) for backward in seen[:2] for one in forward[1:]]
     rows = BESIDE + ALONE if rising else BESIDE
-    fits = [_fit(t, s, start, np.zeros(2), _expected(t, heights, start), rows=rows) for start in starts]
-    best = min(fits, key=lambda one: one.swings.misfit)
-    ahead, back = _precession(t, best.rest), _precession(t, best.rest.conj())
-    slow = best.swings.frequency
-    expected, rise = _expected(t, heights, slow), best.vertical(t, s).value
-    if ahead is None:
-        best = _fit(t, s, slow, np.zeros(2), expected, rows=rows, rise=rise)
-    else:
-        start, slopes = np.append(slow, ahead.frequency), np.array([0, 0, ahead.slope])
-        best = _fit(t, s, start, slopes, expected, rows=rows, rise=rise)
-    return replace(best.swings, vertical=best.vertical(t, s), backwards=0.0 if back is None else back.amplitude)
+
+    def fit(slow: Array, rise: float | None = None, line: _Precession | None = None) -> _Fit:
+        start, slopes = (slow, [0, 0]) if line is None else ([*slow, line.frequency], [0, 0, line.slope])
+        return _fit(t, s, np.array(start), np.array(slopes), _expected(t, heights, slow), rows=rows, rise=rise)
+
+    fits = [fit(start) for start in starts]
+    best = _likeliest(fits)[0]
+    # either swing, or both, may be the line that the other makes with the vertical swing, and the true one a weak line
+    (back, ahead), rise = best.swings.frequency.tolist(), best.vertical(t, s).value
+    weak = -_weak(t, best.rest.conj()), _weak(t, best.rest)
+    turned = ((back, back + rise), (ahead - rise, ahead), (back, weak[1]), (weak[0], ahead))
+    fits += [fit(np.array(slow), ahead - back) for slow in turned]
+    fits += [fit(np.array(slow), rise) for slow in ((back, ahead), (ahead - rise, back + rise))]
+    line, mirror = _precession(t, best.rest), _precession(t, best.rest.conj())
+    ends = [fit(one.swings.frequency, one.swings.vertical.value, line) for one in _likeliest(fits)]
+    first, *rivals = (replace(one.swings, vertical=one.vertical(t, s)) for one in _likeliest(ends))
+    return replace(first, backwards=0.0 if mirror is None else mirror.amplitude, rivals=tuple(rivals))
+
+
+def _likeliest(fits: Sequence[_Fit]) -> list[_Fit]:
+    """Return the likeliest of unlike fits, the likeliest first."""
+    kept: list[_Fit] = []
+    for one in sorted(fits, key=lambda one: one.swings.improbable):
+        apart = [np.abs(one.swings.frequency - other.swings.frequency)[:2].max() for other in kept]
+        if not apart or min(apart) > one.swings.u[:2].max():
+            kept.append(one)
+    least = kept[0].swings.improbable
+    return [one for one in kept if COARSE * (one.swings.improbable - least) < _FARTHEST][:_KEPT]
+
+
+def _weak(t: Array, rest: Places) -> float:
+    """Return the frequency of the strongest line where a forward swing is looked for [Hz]."""
+    even = np.arange(*SLOW_HZ, 0.5 / float(t[-1] - t[0]))
+    return float(even[np.argmax(np.abs(np.exp(-2j * np.pi * np.outer(even, t)) @ (rest * np.hanning(t.size))))])
 
 
 def _expected(t: Array, heights: Array | None, slow: Array) -> Vertical:
@@ -297,24 +295,24 @@ def _fit(
     prior[:count, count:-1] = np.diag(1 / _SLOPES_U[:count])
     prior[-1, -1] = 1 / known.u
     most = np.concatenate([np.full(count, 0.3 / half), np.full(count, 0.3 / half**2), [0.1 / half]])
-    quarter = 2j * np.pi * late[:, None]
+    quarter, size = 2j * np.pi * late[:, None], float(np.linalg.norm(s)) / math.sqrt(t.size)
+    noise = size
     for _ in range(_STEPS):
         waves = np.exp(quarter * (frequency + late[:, None] * slope / 2))
         up = np.exp(quarter[:, 0] * rise)
         lines = beside(waves, up, rows)
         linear = np.concatenate([waves, lines, still], axis=1)
-        normal = linear.conj().T @ linear + 1e-9 * t.size * np.eye(linear.shape[1])
+        # an amplitude is about as large as the places: lines that are as one do not cancel each other
+        normal = linear.conj().T @ linear + 2 * (noise / size) ** 2 * np.eye(linear.shape[1])
         amplitudes = np.linalg.solve(normal, linear.conj().T @ s)
         rest = s - linear @ amplitudes
-        noise = math.sqrt(float(np.sum(np.abs(rest) ** 2)) / (2 * (t.size - linear.shape[1] - count)))
+        left = np.linalg.norm(rest) / math.sqrt(2 * (t.size - linear.shape[1] - count))
+        noise = math.hypot(float(left), _FINEST * size)
         moving = waves * amplitudes[:count]
-        turned = quarter[:, 0] * 0
-        for (i, sign), part in zip(rows, (lines * amplitudes[count:-2]).T, strict=True):
-            if i is not None:
-                moving[:, i] += part
-            turned += sign * part
+        moved = lines * amplitudes[count:-2] @ np.array(rows)
+        moving[:, :2] += moved[:, :2]
         slopes = np.concatenate(
-            [quarter * moving, quarter * late[:, None] / 2 * moving, (quarter[:, 0] * turned)[:, None]], axis=1
+            [quarter * moving, quarter * late[:, None] / 2 * moving, quarter * moved[:, 2:]], axis=1
         )
         slopes -= linear @ np.linalg.solve(normal, linear.conj().T @ slopes)
         information = (slopes.conj().T @ slopes).real / noise**2
@@ -324,23 +322,20 @@ def _fit(
         information += prior.T @ prior
         gradient -= prior.T @ off
         scale = np.sqrt(np.diagonal(information))
-        covariance = np.linalg.inv(information / np.outer(scale, scale)) / np.outer(scale, scale)
+        unlike = information / np.outer(scale, scale) + _FINEST * np.eye(scale.size)
+        covariance = np.linalg.inv(unlike) / np.outer(scale, scale)
         step = np.clip(covariance @ gradient, -most, most)
         frequency, slope, rise = frequency + step[:count], slope + step[count:-1], rise + float(step[-1])
         if np.abs(step[:count]).max() < 1e-3 * np.sqrt(np.diagonal(covariance)[:count]).min():
             break
-    of_others = np.zeros((2, 2 * count + 1))
-    of_others[[0, 1], [1, 0]], of_others[:, -1] = 1, (-1, 1)
-    u_others = np.sqrt(np.einsum("ij,jk,ik->i", of_others, covariance, of_others))
-    shifted = frequency[1::-1] + np.array([-rise, rise])
     found = Swings(
         time=float(t.mean()),
         frequency=frequency,
         u=np.sqrt(np.diagonal(covariance)[:count]),
         amplitude=np.abs(amplitudes[:count]),
         vertical=Vertical(rise, math.sqrt(covariance[-1, -1])),
-        others=np.stack([shifted, u_others, np.abs(amplitudes[count : count + 2])], axis=1),
+        beside=np.abs(amplitudes[count : count + 2]),
         noise=noise,
-        misfit=2 * t.size * math.log(noise**2) + float(off @ off),
+        misfit=2 * t.size * math.log(noise**2) + float(off @ off) + 2 * float(np.linalg.norm(amplitudes / size)) ** 2,
     )
     return _Fit(found, rest, waves, still, known, rows)

@@ -93,17 +93,17 @@ def of_places(
     return _posterior(misfit, expected, float(np.ptp(late)))
 
 
-#: Of lines: of which swing, or of none, and which times the vertical swing is added.
-Beside = tuple[tuple[int | None, int], ...]
-#: The lines beside the slow swings, and those of the vertical swing alone.
-BESIDE: Beside = ((1, -1), (0, 1), (1, 1), (0, -1))
-ALONE: Beside = ((None, 1), (None, -1))
+#: Of each line: how often the backward, the forward and the vertical swing are in its frequency.
+Beside = tuple[tuple[int, int, int], ...]
+#: The lines beside the slow swings, and those of the vertical swing alone.  The last two are as near to the swings as
+#: the first two, for which they answer where the beat meets the vertical swing.
+BESIDE: Beside = ((0, 1, -1), (1, 0, 1), (0, 1, 1), (1, 0, -1), (-1, 2, -1), (2, -1, 1))
+ALONE: Beside = ((0, 0, 1), (0, 0, -1))
 
 
 def beside(waves: Places, up: Places, rows: Beside) -> Places:
     """Return the waves of lines, a column each, by those of swings and of the vertical swing, shape (n,)."""
-    turned = ((1 if i is None else waves[:, i], up if sign > 0 else up.conj()) for i, sign in rows)
-    return np.stack([wave * rise for wave, rise in turned], axis=1)
+    return np.stack([waves[:, 0] ** i * waves[:, 1] ** j * up**k for i, j, k in rows], axis=1)
 
 
 def _misfit(rest: NDArray[np.number], lines: NDArray[np.number], others: NDArray[np.number]) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray  # noqa: TC002 - pydantic reads it
 
 from analysis.errors import AnalysisError
 from analysis.numbers import digits
-from analysis.sway import Geometry, Swings, geometric_magnetism, mirrored, swings_of
+from analysis.sway import Geometry, Swings, choose_lines, geometric_magnetism, mirrored, swings_of
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import EachAlone
 from levilab.pipelines.options import SwayOptions
@@ -127,6 +127,7 @@ def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRu
         if view if not beside else np.mean([one.split for one in swings]) < 0:
             swings = look(places.conj())
         at = np.interp([one.time for one in swings], readings.time, np.abs(spin))
+        swings = choose_lines(swings, at, known)
         geometry = geometric_magnetism(swings, at, known)
     except AnalysisError as error:
         raise DataError(f"{source.data}: {error}") from error
@@ -173,15 +174,15 @@ def _doubts(swings: Sequence[Swings], found: Geometry, *, view: bool | None) -> 
         )
     large = _LARGE_U * abs(found.measured.value or 0.0)
     if found.parts["mistake"] > large:
-        one, ((backward, *_), (forward, *_)) = swings[len(swings) // 2], swings[len(swings) // 2].others
+        one = swings[len(swings) // 2]
         yield Text(
             "u is large: the slow swings may be the lines at {one:.2f} or {backward:.2f} Hz and at {other:.2f} or "
             "{forward:.2f} Hz; let the top swing less, by half a millimetre, or film until its spin has fallen by a "
             "third",
             one=one.frequency[0],
-            backward=backward,
+            backward=one.frequency[1] - one.vertical.value,
             other=one.frequency[1],
-            forward=forward,
+            forward=one.frequency[0] + one.vertical.value,
         )
     elif (found.measured.u or 0.0) > large:
         beat = float(np.mean([one.frequency[1] - one.frequency[0] for one in swings]))
