@@ -110,14 +110,17 @@ class FreeTop(Generic[S]):
         session: the acquisition.
         before: the readings so far, of which the last ones count.
         missed: why there was no reading, each time since the last one.
+        missed_by: when the last of these counts would have ended, which may begin late: a fallen top was down [s].
     """
 
     session: Session[S]
     before: list[Row] = field(default_factory=list)
     missed: list[Missed] = field(default_factory=list)
+    missed_by: float = math.inf
     _warned: bool = False
     _in_doubt: bool = False
     _took: float = math.inf  # the last count [s]
+    _least: float = math.inf  # the shortest [s]; a multimeter's begins a second after it was asked for
     _faster: Row = field(default_factory=dict)
 
     @property
@@ -135,7 +138,7 @@ class FreeTop(Generic[S]):
         Raises:
             AnotherTop: one that is faster, three times in a row.
         """
-        session = self.session
+        session, asked = self.session, self.session.now()
         try:
             reading = self._read_or_ask_again()
         except InstrumentError as error:
@@ -143,6 +146,7 @@ class FreeTop(Generic[S]):
             reading = Missed.LOST
         if isinstance(reading, Missed):
             self.missed.append(reading)
+            self.missed_by = min(asked + self._least, session.now())
             if self.missed[-_MOST_MISSED:] == [Missed.FASTER] * _MOST_MISSED:
                 raise AnotherTop(self.before[-1], self._faster)
             return None
@@ -150,22 +154,19 @@ class FreeTop(Generic[S]):
         self.before = [*self.before[1 - _KEPT :], reading]
         return reading
 
-    def fall(self, asked: float) -> str:
+    def fall(self) -> str:
         """Return a description of the fall, empty while the top is up.
 
         A dark counter, asked twice, means that the top fell; single odd counts do not.
-
-        Args:
-            asked: when the last reading was asked for [s].
         """
         last = self.last["time_s"] if self.last else 0.0
         if self.missed and self.missed[-1] is Missed.DARK:
             signal = self.session.bench.counter.SIGNAL.name
             return Text(
-                "no {signal} any more: the top fell between {last:.1f} s and {asked:.1f} s",
+                "no {signal} any more: the top fell between {last:.1f} s and {missed_by:.1f} s",
                 signal=signal,
                 last=last,
-                asked=asked,
+                missed_by=self.missed_by,
             )
         seen = [why for why in self.missed if why in NO_TOP]
         if len(seen) >= _MOST_MISSED:
@@ -259,6 +260,7 @@ class FreeTop(Generic[S]):
             asked = session.now()
             spin = counter.frequency()
             self._took = session.now() - asked
+            self._least = self._least if spin is None else min(self._least, self._took)
             if spin is None or counter.last is not None or self._took < usual + _STALLED_S or tries == 2:
                 break
             text = Text(

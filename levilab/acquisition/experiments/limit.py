@@ -182,26 +182,26 @@ def _lower(session: Session[LimitSettings], keep: Callable[[Row], None]) -> bool
     drive_up_and_let_go(session)
     top = free_top(session)
     seen: list[Row] = []
-    missed_since: float | None = None
+    missed_by = math.inf
     while not is_over(session):
         asked = session.now()
         if reading := top.read():
             seen.append(reading)
-            missed_since = None
+            missed_by = math.inf
             session.progress(Text("free at {spin:.2f} Hz", spin=reading["spin_frequency_hz"]), 1.0)
         else:
             # a counter that was lost saw nothing of the top, which may have been up all that time
-            if top.missed[-1] in NO_TOP and missed_since is None:
-                missed_since = asked
-            if end := top.fall(asked):
-                keep(_limit_of_fall(session, seen, asked if missed_since is None else missed_since, end))
+            if top.missed[-1] in NO_TOP:
+                missed_by = min(missed_by, top.missed_by)
+            if end := top.fall():
+                keep(_limit_of_fall(session, seen, missed_by, end))
                 return True
         session.wait(settings.interval_s - (session.now() - asked))
     return False
 
 
-def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_since: float, text: str) -> Row:
-    """Return the reading of a fall.  missed_since: when the first count was asked for that saw no top any more [s]."""
+def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_by: float, text: str) -> Row:
+    """Return the reading of a fall.  missed_by: when the first count would have ended that saw no top any more [s]."""
     settings = session.settings
     if len(seen) < _FEWEST:
         raise ExperimentFailed(
@@ -212,7 +212,7 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_sinc
             experiment=session.writer.record.experiment,
         )
     times, spins = (np.array([row[name] for row in seen]) for name in ("time_s", "spin_frequency_hz"))
-    between = (float(times[-1]) + settings.gate_s / 2, missed_since + settings.gate_s)
+    between = (float(times[-1]) + settings.gate_s / 2, missed_by)
     u = [row["spin_frequency_u_hz"] for row in seen if "spin_frequency_u_hz" in row]
     limit = spin_at_fall(times, spins, float(np.sqrt(np.mean(np.square(u)))) if u else None, between)
     assert limit.value is not None

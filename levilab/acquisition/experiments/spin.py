@@ -56,7 +56,7 @@ def run(session: Session[SpinSettings]) -> None:
     session.begin(lambda: drive_up_and_let_go(session))
     top = free_top(session, session.rows[-3:])
     said = False
-    for asked in session.readings_every(settings.interval_s, settings.longest_s):
+    for _ in session.readings_every(settings.interval_s, settings.longest_s):
         reading = top.read()
         if reading:
             rows = session.rows or [reading]
@@ -64,7 +64,7 @@ def run(session: Session[SpinSettings]) -> None:
             if not said and keeps_its_spin(rows[0], reading):
                 said = True
                 session.event(RunEvent.DOES_NOT_FALL, _why_it_keeps_its_spin(session, rows[0], reading))
-        elif end := top.fall(asked):
+        elif end := top.fall():
             session.event(RunEvent.FELL, end)
             return
 

@@ -61,12 +61,12 @@ def run(session: Session[SwaySettings]) -> None:
     prepare_counter(session)
     session.begin(lambda: _float_top(session), resumed="the film goes on")
     top, frame = free_top(session, session.rows[-3:]), _frames_kept(session)
-    for asked in session.readings_every(settings.interval_s, settings.longest_s):
+    for _ in session.readings_every(settings.interval_s, settings.longest_s):
         reading = top.read()
         if reading:
             session.keep(reading, max(0.0, settings.longest_s - session.now()))
             frame = _film(session, frame, reading["time_s"])
-        elif end := top.fall(asked):
+        elif end := top.fall():
             session.event(RunEvent.FELL, end)
             return
 
