@@ -23,7 +23,7 @@ class ImpossibleCylinder(AnalysisError):
 
     def __init__(self, *, part: str, quantity: str, seen: float, expected: str) -> None:
         self.part, self.quantity, self.seen, self.expected = part, quantity, seen, expected
-        super().__init__(f"part {part}: {quantity} = {seen:g}, {expected} is expected: correct it")
+        super().__init__("part {part:s}: {quantity} = {seen:g}, {expected} is expected: correct it")
 
 
 @dataclass(frozen=True)

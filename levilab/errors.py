@@ -6,6 +6,8 @@ import re
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
+from levilab.texts.text import Text, languages
+
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
@@ -16,6 +18,10 @@ class LevilabError(Exception):
     A quantity that the caller can set stands in the text between backquotes, by the name of the function's argument:
     "free space, or choose another place with `out`". The command line writes it as its option, ``--out``.
     """
+
+    def __init__(self, text: str = "", /, **values: object) -> None:
+        """Say why, in a template with its values, which has other languages; without values in a text."""
+        super().__init__(Text(text, **values) if values else text)
 
 
 #: A quantity in a message.
@@ -38,8 +44,9 @@ def list_known(name: str, known: Iterable[str]) -> str:
     ('did you mean spindown? Known are spin, spindown', 'known are spin, spindown')
     """
     names = [*known]
-    near = get_close_matches(name, names, n=1)
-    return f"{f'did you mean {near[0]}? Known' if near else 'known'} are {', '.join(names)}"
+    near = "".join(get_close_matches(name, names, n=1))
+    said = "did you mean {near:s}? Known are {names:s}" if near else "known are {names:s}"
+    return Text(said, near=near, names=", ".join(names))
 
 
 class RequestError(LevilabError):
@@ -63,7 +70,13 @@ class UsageError(RequestError):
     def __init__(self, name: str, text: str, *, value: object = None) -> None:
         self.name, self.text = name, text
         self.value = None if value is None else _short_text(value)
-        super().__init__(f"{name}: {text}" if self.value is None else f"{name} = {self.value}: {text}")
+        super().__init__("{name}: {text}" if value is None else "{name} = {value}: {text}", **vars(self))
+
+
+def check_language(code: str) -> None:
+    """Raise UsageError for a language that levilab does not speak."""
+    if code not in languages():
+        raise UsageError("language", Text("one of {known:s} is expected", known=", ".join(languages())), value=code)
 
 
 class DataError(LevilabError):

@@ -30,7 +30,7 @@ class CannotWrite(LevilabError):
 
     def __init__(self, problem: str, advice: str = "") -> None:
         self.problem = problem
-        super().__init__(f"{problem}: {advice}" if advice else problem)
+        super().__init__("{problem}: {advice}" if advice else "{problem}", problem=problem, advice=advice)
 
 
 #: No program writes tables within tables deeper than this; Python's recursion bears some hundreds.

@@ -6,11 +6,9 @@ import difflib
 import re
 from typing import Any, get_args
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    ValidationError,
-)
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from levilab.texts.text import Text, text_of
 
 
 class Settings(BaseModel):
@@ -29,26 +27,43 @@ def in_one_line(error: ValidationError, of: type[BaseModel] | None = None) -> st
     # a key that is unknown may be why another one is missing
     first = min(error.errors(), key=lambda one: one["type"] != "extra_forbidden")
     where = ".".join(str(part) for part in first["loc"]) or "the whole"
-    more = f" (and {error.error_count() - 1} more)" if error.error_count() > 1 else ""
+    more = Text(" (and {n} more)", n=error.error_count() - 1) if error.error_count() > 1 else ""
     if first["type"] == "extra_forbidden":
-        return f"{where} is no key known here{_suggest_key(first['loc'], of)}{more}"
+        known = _suggest_key(first["loc"], of)
+        return Text("{key:s} is no key known here{known}{more}", key=where, known=known, more=more)
     named = ("",) if "_" not in where else ()  # a unit in a key stands behind _
     hint = "" if first["type"] == "literal_error" else hint_about(first["input"], *named)  # where words are expected
     whole_table = first["type"] == "missing" or isinstance(first["input"], dict)
     given = str(first["input"])[:60]
     seen = "" if whole_table else f" = {given if first['type'] == 'range' else repr(given)}"
-    return f"{where}{seen}: {explain_message(first['msg'])}{hint}{more}"
+    what = own_words(first) or explain_message(first["msg"])
+    return Text("{key}{seen:s}: {what}{hint}{more}", key=where, seen=seen, what=what, hint=hint, more=more)
+
+
+def own_words(fault: Any) -> str:
+    """Return what a check of ours says of a fault of pydantic's; empty where it is none of ours."""
+    about = fault.get("ctx", {})
+    return about.get("problem") or (text_of(about["error"]) if "error" in about else "")
 
 
 #: Beginning and end of pydantic's message about a wrong value, and its names of the expected kinds.
 _SHOULD_BE = re.compile(r"Input should be (a valid )?(.*?)(, unable to .*|, got .*)?")
-_WHOLE = {
+_LIMIT = re.compile(r"(greater than or equal to|greater than|less than or equal to|less than) (.+)")
+WHOLE = {
     "Field required": "is missing",
     "Input should be an instance of ndarray": "numbers in lists of one length are expected",
 }
-_IN_PLAIN_WORDS = {
-    "integer": "whole number", "string": "text", "dictionary": "table", "tuple": "list", "array": "list",
+KINDS = {
+    "boolean": "true or false is expected", "integer": "a whole number is expected", "number": "a number is expected",
+    "string": "a text is expected", **dict.fromkeys(("tuple", "array", "list"), "a list is expected"),
+    "dictionary": "a table is expected",
 }  # fmt: skip
+LIMITS = {
+    "greater than": "a number greater than {limit:n} is expected",
+    "greater than or equal to": "a number greater than or equal to {limit:n} is expected",
+    "less than": "a number less than {limit:n} is expected",
+    "less than or equal to": "a number less than or equal to {limit:n} is expected",
+}
 
 
 def explain_message(text: str) -> str:
@@ -61,15 +76,15 @@ def explain_message(text: str) -> str:
     >>> explain_message("Input should be a valid boolean, unable to interpret input"), explain_message("Field required")
     ('true or false is expected', 'is missing')
     """
-    found = None if text in _WHOLE else _SHOULD_BE.fullmatch(text)
+    found = None if text in WHOLE else _SHOULD_BE.fullmatch(text)
     if not found:
-        return _WHOLE.get(text, text.removeprefix("Value error, "))
-    is_kind, what = bool(found[1]), found[2]
-    if what == "boolean":
-        return "true or false is expected"
-    if is_kind:
-        return f"a {_IN_PLAIN_WORDS.get(what, what)} is expected"
-    return f"{'' if what.startswith((chr(39), 'a ', 'an ')) else 'a number '}{what} is expected"
+        return WHOLE.get(text, text.removeprefix("Value error, "))
+    what = found[2]
+    if found[1]:
+        return KINDS.get(what, f"a {what} is expected")
+    if limit := _LIMIT.fullmatch(what):
+        return Text(LIMITS[limit[1]], limit=limit[2])
+    return Text("{what} is expected", what=what)
 
 
 def _suggest_key(where: tuple[int | str, ...], of: type[BaseModel] | None) -> str:
@@ -81,7 +96,7 @@ def _suggest_key(where: tuple[int | str, ...], of: type[BaseModel] | None) -> st
     if of is None:
         return ""
     near = difflib.get_close_matches(str(key), of.model_fields, n=1)
-    return f": did you mean {near[0]}?" if near else f": known are {', '.join(of.model_fields)}"
+    return Text(": did you mean {name:s}?" if near else ": known are {name:s}", name=", ".join(near or of.model_fields))
 
 
 def _kinds(annotation: Any) -> list[type]:
@@ -107,4 +122,4 @@ def hint_about(seen: object, unit: str = ", which is in the key's name") -> str:
         unit: where the unit stands, as the rest of the sentence.
     """
     found = (text for pattern, text in _NUMBERS if isinstance(seen, str) and pattern.fullmatch(seen))
-    return next(found, "").format(unit=unit)
+    return Text(next(found, ""), unit=unit)

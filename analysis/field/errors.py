@@ -1,7 +1,6 @@
 """Errors of the analysis of a scan of the field; each carries what was seen as attributes."""
 
 from analysis.errors import AnalysisError
-from analysis.numbers import digits
 
 
 class TooFewHeights(AnalysisError):
@@ -13,12 +12,13 @@ class TooFewHeights(AnalysisError):
 
     def __init__(self, *, seen: int, needed: int, lowest: float, highest: float) -> None:
         self.seen, self.needed, self.lowest, self.highest = seen, needed, lowest, highest
-        span = f" (from {1e3 * lowest:.4g} to {1e3 * highest:.4g} mm)" if seen else ""
-        where = f" (all at {1e3 * lowest:.4g} mm)" if seen == 1 else span
         super().__init__(
-            f"readings at {seen} height{'s' * (seen != 1)}{where}, at least {needed} are needed: "
-            "scan on, from below to above the place where the top floats"
-        )
+            "different heights: {seen}, from {low_mm:.4g} to {high_mm:.4g} mm, at least {needed} are needed: {advice}"
+            if seen
+            else "different heights: 0, at least {needed} are needed: {advice}",
+            advice="scan on, from below to above the place where the top floats", low_mm=1e3 * lowest,
+            high_mm=1e3 * highest,
+        )  # fmt: skip
 
 
 class FieldStandsStill(AnalysisError):
@@ -32,9 +32,10 @@ class FieldStandsStill(AnalysisError):
     def __init__(self, *, low: float, high: float, value: float) -> None:
         self.low, self.high, self.value = low, high, value
         super().__init__(
-            f"the flux density stays at {1e3 * value:.6g} mT from {1e3 * low:.4g} to {1e3 * high:.4g} mm, where it "
-            "must change: the probe is saturated, or not moved; choose a larger range or leave these readings out"
-        )
+            "the flux density stays at {mt:.6g} mT from {low_mm:.4g} to {high_mm:.4g} mm, where it must change: the "
+            "probe is saturated, or not moved; choose a larger range or leave these readings out",
+            mt=1e3 * value, low_mm=1e3 * low, high_mm=1e3 * high,
+        )  # fmt: skip
 
 
 class FieldTurnsOver(AnalysisError):
@@ -48,9 +49,10 @@ class FieldTurnsOver(AnalysisError):
     def __init__(self, *, low: float, high: float, reversal: float) -> None:
         self.low, self.high, self.reversal = low, high, reversal
         super().__init__(
-            f"the flux density changes its sign between {1e3 * low:.4g} and {1e3 * high:.4g} mm, this base's does so "
-            f"at about {digits(1e3 * reversal, 3)} mm: was the probe turned over in between, or not on the axis?"
-        )
+            "the flux density changes its sign between {low_mm:.4g} and {high_mm:.4g} mm, this base's does so at "
+            "about {at_mm:.3g} mm: was the probe turned over in between, or not on the axis?",
+            low_mm=1e3 * low, high_mm=1e3 * high, at_mm=1e3 * reversal,
+        )  # fmt: skip
 
 
 class NoField(AnalysisError):
@@ -64,9 +66,10 @@ class NoField(AnalysisError):
     def __init__(self, *, largest: float, background_u: float) -> None:
         self.largest, self.background_u = largest, background_u
         super().__init__(
-            f"the flux density is nowhere above {digits(1e3 * largest, 3)} mT, which zero and background alone may "
-            f"make (u = {digits(1e3 * background_u)} mT): is the base there, and was the probe zeroed in its chamber?"
-        )
+            "the flux density is nowhere above {mt:.3g} mT, which zero and background alone may make (u = {u_mt:.2g} "
+            "mT): is the base there, and was the probe zeroed in its chamber?",
+            mt=1e3 * largest, u_mt=1e3 * background_u,
+        )  # fmt: skip
 
 
 class ImpossibleRing(AnalysisError):
@@ -75,7 +78,7 @@ class ImpossibleRing(AnalysisError):
     def __init__(self, *, inner: float, outer: float) -> None:
         self.inner, self.outer = inner, outer
         super().__init__(
-            f"inner radius {inner:g} m, outer radius {outer:g} m: 0 < inner < outer is expected; correct the radii"
+            "inner radius {inner:g} m, outer radius {outer:g} m: 0 < inner < outer is expected; correct the radii"
         )
 
 
@@ -83,5 +86,5 @@ class NotFitted(AnalysisError):
     """A search that did not end."""
 
     def __init__(self, *, what: str, advice: str) -> None:
-        self.what = what
-        super().__init__(f"{what}: the fit did not converge; {advice}")
+        self.what, self.advice = what, advice
+        super().__init__("{what}: the fit did not converge; {advice}")

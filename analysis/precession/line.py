@@ -38,7 +38,7 @@ class NoRange(AnalysisError):
     def __init__(self, *, at: float, seen: int) -> None:
         self.at, self.seen = at, seen
         super().__init__(
-            f"all {seen} points are at a drive frequency of {at:g} Hz, a line needs several: sweep the drive"
+            "all {seen} points are at a drive frequency of {at:g} Hz, a line needs several: sweep the drive"
         )
 
 

@@ -1,7 +1,6 @@
 """Errors of the analysis of pulses; each carries what was seen as attributes."""
 
 from analysis.errors import AnalysisError
-from analysis.numbers import digits
 
 
 class TooFewPulses(AnalysisError):
@@ -15,8 +14,12 @@ class TooFewPulses(AnalysisError):
 
     def __init__(self, *, seen: int, needed: int, duration: float) -> None:
         self.seen, self.needed, self.duration = seen, needed, duration
-        wanted = f", at least {needed} are needed" if seen < needed else " that do not return regularly"
-        super().__init__(f"{seen} pulses in {digits(duration, 3)} s{wanted}: {self.HINT}")
+        super().__init__(
+            "{seen} pulses in {duration:.3g} s, at least {needed} are needed: {hint}"
+            if seen < needed
+            else "{seen} pulses in {duration:.3g} s that do not return regularly: {hint}",
+            hint=self.HINT,
+        )
 
 
 class OnlyHum(TooFewPulses):

@@ -1,7 +1,6 @@
 """Errors of the analysis of a magnetometer's record; each carries what was seen as attributes."""
 
 from analysis.errors import AnalysisError
-from analysis.numbers import digits
 
 
 class NoLine(AnalysisError):
@@ -16,6 +15,6 @@ class NoLine(AnalysisError):
     def __init__(self, *, lowest: float, highest: float, duration: float, gain: float) -> None:
         self.lowest, self.highest, self.duration, self.gain = lowest, highest, duration, gain
         super().__init__(
-            f"in {digits(duration, 3)} s no line from {digits(lowest, 3)} to {digits(highest, 3)} Hz stands out of the "
-            "noise: bring the sensor nearer to the top, or record longer"
+            "in {duration:.3g} s no line from {lowest:.3g} to {highest:.3g} Hz stands out of the noise: bring the "
+            "sensor nearer to the top, or record longer"
         )

@@ -31,7 +31,7 @@ class NothingToCombine(AnalysisError):
     def __init__(self, *, runs: int) -> None:
         self.runs = runs
         super().__init__(
-            f"{runs} runs have no drag law in common, at least one run and one law were expected: "
+            "{runs} runs have no drag law in common, at least one run and one law were expected: "
             "fit the same laws to each run"
         )
 

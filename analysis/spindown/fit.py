@@ -31,7 +31,7 @@ class UnknownName(AnalysisError):
 
     def __init__(self, *, kind: str, seen: str, known: Iterable[str]) -> None:
         self.kind, self.seen, self.known = kind, seen, tuple(known)
-        super().__init__(f"no {kind} is called {seen!r}: choose from {', '.join(self.known)}")
+        super().__init__("no {kind} is called '{seen:s}': choose from {names:s}", names=", ".join(self.known))
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ class NoSpinDown(AnalysisError):
     def __init__(self, *, first: float, last: float) -> None:
         self.first, self.last = first, last
         super().__init__(
-            f"the spin goes from {first:.6g} Hz to {last:.6g} Hz, a falling spin was expected: is the drive still on?"
+            "the spin goes from {first:.6g} Hz to {last:.6g} Hz, a falling spin was expected: is the drive still on?"
         )
 
 

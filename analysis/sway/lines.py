@@ -58,9 +58,10 @@ class NoSwings(AnalysisError):
     def __init__(self, *, start: float, end: float) -> None:
         self.start, self.end = start, end
         super().__init__(
-            f"from {start:.4g} to {end:.4g} s no swing to either side stands out of the noise between "
-            f"{SLOW_HZ[0]:g} and {SLOW_HZ[1]:g} Hz: give the top a small push sideways, or look at a longer record"
-        )
+            "from {start:.4g} to {end:.4g} s no swing to either side stands out of the noise between {low:g} and "
+            "{high:g} Hz: give the top a small push sideways, or look at a longer record",
+            low=SLOW_HZ[0], high=SLOW_HZ[1],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

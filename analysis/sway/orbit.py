@@ -31,9 +31,10 @@ class NoSwing(AnalysisError):
     def __init__(self, *, amplitudes: tuple[float, float], spin: float) -> None:
         self.amplitudes, self.spin = amplitudes, spin
         super().__init__(
-            f"no steady swing of {1e3 * amplitudes[0]:.3g} and {1e3 * amplitudes[1]:.3g} mm at a spin of {spin:.4g} Hz "
-            "in this field: smaller swings, or the base and the top that they were seen with, are needed"
-        )
+            "no steady swing of {first:.3g} and {second:.3g} mm at a spin of {spin:.4g} Hz in this field: smaller "
+            "swings, or the base and the top that they were seen with, are needed",
+            first=1e3 * amplitudes[0], second=1e3 * amplitudes[1],
+        )  # fmt: skip
 
 
 def small_swings(field: AxialField, top: SymmetricTop, height: float, spin_hz: float) -> tuple[float, float]:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
 from pydantic import Field, PositiveFloat, field_validator, model_validator
-from pydantic_core import PydanticCustomError
 
 from levilab.formats.typed import check_range
 from levilab.runs.channel import Channel
 from levilab.settings import Settings
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -76,11 +76,8 @@ class CounterSettings(ExperimentSettings):
     @model_validator(mode="after")
     def _gate_within_interval(self) -> Self:
         if self.gate_s >= self.interval_s:
-            raise PydanticCustomError(
-                "gate",
-                "gate_s = {gate} must be shorter than interval_s = {interval}: a reading takes the gate and more",
-                {"gate": f"{self.gate_s:g}", "interval": f"{self.interval_s:g}"},
-            )
+            why = "gate_s = {gate:g} must be shorter than interval_s = {interval:g}: a reading takes the gate and more"
+            raise ValueError(Text(why, gate=self.gate_s, interval=self.interval_s))
         return self
 
     def for_bench(self, config: BenchConfig, model_of: ModelOf) -> Self:

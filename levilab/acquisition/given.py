@@ -15,7 +15,7 @@ from levilab.bench.config import Limits
 from levilab.errors import UsageError
 from levilab.formats.typed import read_masses, read_temperature
 from levilab.present.units import split
-from levilab.settings import hint_about
+from levilab.settings import hint_about, own_words
 from levilab.simulator.keys import SceneError, parse_setting
 from levilab.texts.text import Sentences, Text, text_of
 
@@ -164,11 +164,9 @@ def _refusal(
     """Return the faults of settings that were given as texts by their names."""
     first = error.errors()[0]
     name = str(first["loc"][0]) if first["loc"] else ""
-    own = first["type"] in {"value_error", "range"} or not name  # the experiment's own words
-    about = first.get("ctx", {})
-    text = about.get("problem") or (str(about.get("error", first["msg"])) if own else "")
+    text = own_words(first)
     if name not in given:
-        return UsageError("settings", f"{experiment}: {text or first['msg']}")
+        return UsageError("settings", Text("{name:s}: {fault}", name=experiment, fault=text or first["msg"]))
     values = describe_values(name, schema_of(now, limits)[name])
     what = text or Text("{values} is expected{hint}", values=values, hint=hint_about(given[name]))
     return UsageError("settings", _with_where(what, experiment), value=f"{experiment}.{name}={given[name]}")

@@ -63,10 +63,6 @@ NAMING = {"counter": "counter", "oscilloscope": "scope"}
 class CannotResume(LevilabError):
     """This run cannot be gone on with."""
 
-    def __init__(self, template: str, /, **values: object) -> None:
-        """Say why, in a template with its values."""
-        super().__init__(Text(template, **values))
-
 
 def _unfit(template: str, **values: object) -> CannotResume:
     """Return the error for a run that does not fit the experiment."""

@@ -11,7 +11,6 @@ from instruments.drivers.generator import Limits as DriveLimits
 from levilab.errors import LevilabError
 from levilab.files import parse_toml, toml_value
 from levilab.settings import Settings, in_one_line
-from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -44,10 +43,6 @@ class SettingsTable:
 
 class ConfigError(LevilabError):
     """A configuration that cannot be used."""
-
-    def __init__(self, text: str, /, **values: object) -> None:
-        """Say why, in a template with its values; without values in a text."""
-        super().__init__(Text(text, **values) if values else text)
 
 
 class InstrumentSettings(Settings):
@@ -125,7 +120,7 @@ def read_bench(path: Path, tables: type[C], *, instead: str = ", or try `mock`")
     try:
         return tables.model_validate(read_table(path, instead=instead))
     except ValidationError as error:
-        raise ConfigError(f"{path}: {in_one_line(error, tables)}") from error
+        raise ConfigError("{path:s}: {fault}", path=path, fault=in_one_line(error, tables)) from error
 
 
 def read_table(path: Path, *, instead: str = ", or try `mock`") -> dict[str, Any]:

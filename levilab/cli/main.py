@@ -16,7 +16,7 @@ from levilab.cli.later import Later
 from levilab.cli.options import speak_from
 from levilab.cli.output import message, silence
 from levilab.cli.quantities import APPLICATION, command_of, in_options
-from levilab.texts.text import Text, in_language
+from levilab.texts.text import Sentences, Text, in_language
 
 
 class Commands(typer.core.TyperGroup):
@@ -50,8 +50,11 @@ class Commands(typer.core.TyperGroup):
             return super().invoke(ctx)
         except _WRONG_WORDS as error:
             if isinstance(error, typer.BadParameter):
-                error.message = explain_bad_value(error.message, _refused_value(error))
-            if error.ctx and isinstance(said := _as_text(error.format_message()), Text):
+                from levilab.settings import own_words  # with pydantic
+
+                errors: Any = getattr(error.__context__, "errors", list)() or [{}]
+                error.message = explain_bad_value(error.message, errors[0].get("input"), own_words(errors[0]))
+            if error.ctx and isinstance(said := _as_text(error.format_message(), error.message), Text):
                 error.ctx.fail(in_language(said))
             raise
         except KeyboardInterrupt:  # what can be lost is said by the command itself
@@ -78,18 +81,21 @@ _TEMPLATES = (
     "No such option: {name:s} (Possible options: {near:s})",
     "No such option: {name:s}",
     "Invalid value for {name:s}: {value:s} is not one of {choices:s}.",
-    "Invalid value for {name:s}: {what:s}",
+    "Invalid value for {name:s}: {what}",
 )
 
 
-def _as_text(message: str) -> str:
-    """Return a sentence of typer's as a Text, which has other languages; as it is where no template is its."""
+def _as_text(message: str, what: str = "") -> str:
+    """Return a sentence of typer's as a Text, which has other languages; as it is where no template is its.
+
+    what: the fault that it names, in our words.
+    """
     if isinstance(message, Text):
         return message
     for template in _TEMPLATES:
-        pattern = re.sub(r"\\\{(\w+):s\\\}", r"(?P<\1>.+)", re.escape(template))
+        pattern = re.sub(r"\\\{(\w+)(?::s)?\\\}", r"(?P<\1>.+?)", re.escape(template))
         if found := re.fullmatch(pattern, message, re.DOTALL):
-            return Text(template, **found.groupdict())
+            return Text(template, **found.groupdict() | ({"what": what} if "{what}" in template else {}))
     return message
 
 
@@ -101,13 +107,7 @@ def _of_another_command(name: str) -> str:
     return f"analyze {name}" if name in KINDS else f"acquire {name}" if name in EXPERIMENT_HELP else ""
 
 
-def _refused_value(error: typer.BadParameter) -> object:
-    """Return the value that pydantic refused, None where something else did."""
-    errors = getattr(error.__context__, "errors", None)
-    return errors()[0]["input"] if errors else None
-
-
-def explain_bad_value(text: str, seen: object = None) -> str:
+def explain_bad_value(text: str, seen: object = None, own: str = "") -> str:
     """Return typer's message about a wrong value, with the value and its fault.
 
     >>> explain_bad_value("Input should be a valid number, unable to parse string as a number", "0,03")
@@ -121,12 +121,13 @@ def explain_bad_value(text: str, seen: object = None) -> str:
     """
     from levilab.settings import explain_message, hint_about  # with pydantic
 
-    said = explain_message(text)
+    said = own or explain_message(text)
     if re.match(r"'(?:off|no|false|0)' is not one of .*'none'", said):
         return f"{said} Did you mean none?"
     if not said.endswith(" is expected") or said.startswith(repr(seen)):
         return said
-    return (f"{seen!r}: " if seen is not None else "") + said + hint_about(seen, ", which --help names")
+    hint = hint_about(seen, ", which --help names")
+    return Sentences("" if seen is None else Text("'{seen:s}': ", seen=str(seen)), said, hint, between="")
 
 
 app = typer.Typer(

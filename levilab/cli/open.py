@@ -121,7 +121,6 @@ def _print_looks(looks: "Sequence[Look]", *, as_json: bool) -> None:
 def _print_look(look: "Look") -> None:
     """Print how a file is understood: its columns, and the questions that are left."""
     from levilab.pipelines.look import QUANTITIES
-    from levilab.present.document.blocks import in_language_of_reader
     from levilab.present.tables import table
     from levilab.present.terminal import draw, terminal
     from levilab.texts.text import Text
@@ -142,7 +141,7 @@ def _print_look(look: "Look") -> None:
         heads = ("column", "title", "understood as", "unit", "first values")
         if rows:
             title = Text("{name:s} ({holds})", name=name, holds=look.holds) if look.holds else name
-            console.print(draw(in_language_of_reader(table(title, heads, rows))))
+            console.print(draw(table(title, heads, rows)))
         _print_doubts(look, run)
 
 

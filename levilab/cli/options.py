@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from levilab.errors import UsageError, list_known
+from levilab.errors import UsageError, check_language, list_known
 from levilab.texts.text import ENGLISH, Text, languages, speak
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ def place(metavar: str, text: str, endings: Collection[str] = (), **more: Any) -
         if path is not None and endings and path.suffix.lower() not in endings:
             *some, last = endings
             named = f"{', '.join(some)} or {last}" if some else last
-            raise UsageError("out", f"a name that ends in {named} is expected", value=path)
+            raise UsageError("out", Text("a name that ends in {named} is expected", named=named), value=path)
         target = path if endings else folder(path)
         return target if target is None or target.suffix == ".zarr" else writable(target)
 
@@ -165,6 +165,7 @@ def speak_from(args: Sequence[str]) -> None:
 
 def _speak(language: str) -> str:
     """Speak a language before the other options are read, which may be refused.  Raises UsageError."""
+    check_language(language)
     speak(language)
     return language
 

@@ -11,7 +11,7 @@ from levilab.cli.options import Json, Presets, Settings, flag, option, place, qu
 from levilab.cli.output import interruptible, message, print_json
 from levilab.cli.quantities import with_options
 from levilab.errors import UsageError
-from levilab.texts.text import Text
+from levilab.texts.text import Text, in_language, text_of
 
 if TYPE_CHECKING:
     from levilab.animation.request import AnimationRequest
@@ -31,7 +31,7 @@ def chosen_scene(name: str, settings: list[str] | None) -> "Scene":
     try:
         return with_settings(scene, settings or [])
     except SceneError as error:
-        raise UsageError("settings", str(error)) from error
+        raise UsageError("settings", text_of(error)) from error
 
 
 def simulate(
@@ -78,8 +78,9 @@ def simulate(
     with interruptible("nothing was written"), contextlib.closing(ShareBar("simulating")) as share:
         done = run_simulation(request, message, share)
     if done.folder:
-        message(f"wrote {done.folder}")
-    summary = replace(done.summary, notes=tuple(map(with_options, done.summary.notes)))
+        message(Text("wrote {path:s}", path=done.folder))
+    notes = done.summary.notes if as_json else map(in_language, done.summary.notes)
+    summary = replace(done.summary, notes=tuple(map(with_options, notes)))
     if not as_json:  # at once: what explains it takes longer
         from levilab.motion.table import print_motion
 
@@ -120,7 +121,7 @@ def _animate(request: "AnimationRequest", summary: "Summary") -> None:
 
     with interruptible("no animation was written"), contextlib.closing(ShareBar("drawing")) as share:
         shown = animate(request, summary, message, share)
-    message(f"wrote {request.path}: {shown}")
+    message(Text("wrote {path:s}: {what}", path=request.path, what=shown))
 
 
 def _switch_effects(scene: "Scene", duration: float) -> "tuple[Effect, ...]":
@@ -196,7 +197,7 @@ def _simulate_map(
         for path in write_map(found, out):
             message(Text("wrote {path:s}", path=path))
     for note in notes_of(plan):
-        message(f"note: {note}")
+        message(Text("note: {text}", text=note))
     return as_document(found)
 
 

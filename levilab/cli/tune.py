@@ -6,10 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, TypeVar
 
-from analysis.numbers import how_many
 from levilab.cli.options import Json, existing_path, flag, option
 from levilab.cli.output import message, print_json, result
 from levilab.errors import UsageError
+from levilab.present.numbers import how_many
+from levilab.texts.text import Sentences, Text, text_of
 
 if TYPE_CHECKING:
     from levilab.pipelines.tune.advice import Advice
@@ -68,14 +69,14 @@ def tune(
         advice = advise(owner, degrees)
         if owner != kept:
             write_owner(file, owner)
-            message(f"kept in {file}: {how_many(len(owner.attempts), 'trial')}")
+            message(Text("kept in {file:s}: {trials}", file=file, trials=how_many(len(owner.attempts), "trial")))
         kept = owner
         if as_json:
             print_json(advice.as_dict())
         else:
-            result(f"{advice.text}\n{advice.why}")
+            result(Sentences(advice.text, advice.why, between="\n"))
             for text in advice.warnings:
-                message(f"note: {text}")
+                message(Text("note: {text}", text=text))
         owner, degrees, ends = _next(advice) if asks else (owner, degrees, True)
     if not as_json:
         _print_chances(advice)
@@ -100,7 +101,8 @@ def _with_bench(owner: "Owner", top: str | None, washers: str | None, file: Path
     if top is not None or mass is None:
         mass = _answer("top", top, read_mass, "How heavy is the top without washers?  [g]", asks=asks)
     if mass != owner.top and owner.attempts:
-        raise UsageError("top", f"{file} has the trials of another top: name another `file` for this one", value=top)
+        why = Text("{file:s} has the trials of another top: name another `file` for this one", file=file)
+        raise UsageError("top", why, value=top)
     owner = replace(owner, top=mass)
     if washers is None and (owner.washers or not asks):
         return owner
@@ -154,7 +156,7 @@ def _answer(
         try:
             return read(given)
         except ValueError as error:
-            raise UsageError(name, str(error), value=given) from error
+            raise UsageError(name, text_of(error), value=given) from error
     if not asks:
         raise UsageError(name, "is needed, or `ask` = True to be asked for it")
     while True:
@@ -165,7 +167,7 @@ def _answer(
         try:
             return read(line.strip() if line else at_end or "")
         except ValueError as error:
-            message(str(error))
+            message(text_of(error))
 
 
 def _print_chances(advice: "Advice") -> None:

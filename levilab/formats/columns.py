@@ -66,7 +66,7 @@ class TableError(DataError):
     def __init__(self, path: Path, message: str, *, line: int | None = None) -> None:
         self.path, self.line, self.message = path, line, message
         at = "{path:s}: {message}" if line is None else "{path:s}, line {line}: {message}"
-        super().__init__(Text(at, path=shorten(str(path), 200), line=line, message=message))
+        super().__init__(at, path=shorten(str(path), 200), line=line, message=message)
 
 
 class NoTable(TableError, DoesNotSuit):

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationError, field_validator, model_validator
-from pydantic_core import PydanticCustomError
 
 from levilab.errors import DataError
 from levilab.files import parse_toml
@@ -92,11 +91,11 @@ class TopTable(Settings):
     def _goes_together(self) -> Self:
         whole = (self.mass_kg, self.inertia_transverse_kg_m2, self.inertia_axial_kg_m2)
         if self.parts and any(value is not None for value in whole):
-            raise PydanticCustomError("parts", "mass and inertias follow from the parts: leave one or the other out")
+            raise ValueError("mass and inertias follow from the parts: leave one or the other out")
         if (self.inertia_transverse_kg_m2 is None) != (self.inertia_axial_kg_m2 is None):
-            raise PydanticCustomError("inertias", "both inertias are expected, or none")
+            raise ValueError("both inertias are expected, or none")
         if (self.magnet_radius_m is None) != (self.magnet_height_m is None):
-            raise PydanticCustomError("magnet", "magnet_radius_m and magnet_height_m are expected, or none of them")
+            raise ValueError("magnet_radius_m and magnet_height_m are expected, or none of them")
         return self
 
 
@@ -114,15 +113,17 @@ def read_device(path: Path) -> Device:
     advice = "a TOML file with [base] and [top] is expected, as sample_data/device.toml"
     try:
         if path.is_dir():
-            raise DeviceError(f"{path}: is a folder; {advice}")
+            raise DeviceError("{path:s}: is a folder; {advice}", path=path, advice=advice)
         table = parse_toml(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
-        raise DeviceError(f"{path}: there is no such file; {advice}") from None
+        raise DeviceError("{path:s}: there is no such file; {advice}", path=path, advice=advice) from None
     except OSError as error:
-        raise DeviceError(f"{path}: cannot be read ({error.strerror}); {advice}") from error
+        what = "{path:s}: cannot be read ({why}); {advice}"
+        raise DeviceError(what, path=path, why=error.strerror, advice=advice) from error
     except ValueError as error:
-        raise DeviceError(f"{path}: not readable as TOML: {error}; {advice}") from error
+        what = "{path:s}: not readable as TOML: {why}; {advice}"
+        raise DeviceError(what, path=path, why=error, advice=advice) from error
     try:
         return Device.model_validate(table)
     except ValidationError as error:
-        raise DeviceError(f"{path}: {in_one_line(error)}") from error
+        raise DeviceError("{path:s}: {fault}", path=path, fault=in_one_line(error)) from error

@@ -12,6 +12,7 @@ from pydantic_core import PydanticCustomError
 from levilab.formats.ranges import problem_of
 from levilab.formats.titles import UNITS, factor_of, plain_unit
 from levilab.settings import hint_about
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -70,29 +71,30 @@ def read_number(text: str, unit: str) -> float:
     typed = factor_of(found[2] or unit, units)
     is_mega = (found[2] or "").startswith("M") and plain_unit(found[2]) not in units  # and no m in another case
     if typed is None or is_mega:
-        raise ValueError(f"{text.strip()!r}: {_words_for(unit, units)} is expected")
+        raise ValueError(Text("'{seen:s}': {expected}", seen=text.strip(), expected=_words_for(unit, units)))
     number, factor = float(found[1]), typed / units[own]
     # with the 15 digits that a float has: 25.4 g are 0.0254 kg, and not 0.025399999999999999
     return number if factor == 1 else float(f"{number * factor:.15g}")
 
 
 def _words_for(unit: str, units: Mapping[str, float]) -> str:
-    """Return a number in a unit or some other ones for the same quantity, each size once."""
+    """Say that a number in a unit or some other ones for the same quantity is expected, each size once."""
     sizes = {units[plain_unit(unit)]: unit} if unit else {}
     for name, factor in units.items():
         sizes.setdefault(factor, name)
     *some, last = list(sizes.values())[:_SHOWN]
     if not last:
-        return "a plain number"
-    return f"a number in {', '.join(some)} or {last}" if some else f"a number in {last}"
+        return "a plain number is expected"
+    said = "a number in {some:s} or {last:s} is expected" if some else "a number in {last:s} is expected"
+    return Text(said, some=", ".join(some), last=last)
 
 
 def _float(text: str, unit: str) -> float:
     try:
         return float(text)  # inf and nan, which are refused where they make no sense
     except ValueError:
-        more = hint_about(text) or (f", which may have its unit, as 5 {unit}" if unit else "")
-        raise ValueError(f"{text!r}: a number is expected{more}") from None
+        more = hint_about(text) or (Text(", which may have its unit, as 5 {unit:s}", unit=unit) if unit else "")
+        raise ValueError(Text("'{seen:s}': a number is expected{more}", seen=text, more=more)) from None
 
 
 def unit_of_key(key: str) -> str:
@@ -112,11 +114,11 @@ def read_mass(text: str) -> float:
     >>> read_mass("24.98 g"), read_mass("60mg"), round(read_mass("0.06"), 9)
     (0.02498, 6e-05, 6e-05)
     """
-    expected = "a mass such as 24.98 g"
     try:
         grams = read_number(text, "g")
     except ValueError:
-        raise ValueError(f"{expected} is expected{hint_about(text) if ',' in text else ''}") from None
+        hint = hint_about(text) if "," in text else ""
+        raise ValueError(Text("a mass such as 24.98 g is expected{hint}", hint=hint)) from None
     return round(_in_range("mass_kg", grams * 1e-3, 1e-3, asks=text.strip()[-1:].isdecimal()), 9)
 
 
@@ -126,11 +128,11 @@ def read_temperature(text: str) -> float:
     >>> read_temperature("21.5 C"), read_temperature("70 °F"), read_temperature("294.15 K")
     (21.5, 21.11, 21.0)
     """
-    expected = "a temperature of a room such as 21.5 °C"
     found = _NUMBER.fullmatch(text.strip().replace("−", "-"))
     scale = _TEMPERATURES.get(found[2] or "°C") if found else None
     if found is None or scale is None:
-        raise ValueError(f"{expected} is expected{hint_about(text) if ',' in text else ''}")
+        hint = hint_about(text) if "," in text else ""
+        raise ValueError(Text("a temperature of a room such as 21.5 °C is expected{hint}", hint=hint))
     return round(_in_range("temperature_c", float(found[1]) * scale[0] + scale[1], asks=not found[2]), 2)
 
 

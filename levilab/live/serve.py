@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
-from levilab.errors import LevilabError, UsageError
+from levilab.errors import LevilabError, UsageError, check_language
 from levilab.files import must_be_folder
 from levilab.live.desk import Desk
 from levilab.live.doors import Doors, doors_for_guests
@@ -21,7 +21,7 @@ from levilab.live.practice.bench import PracticeBench
 from levilab.live.server import Hall, application
 from levilab.live.share import address_in_network
 from levilab.runs.find import RECORD, run_or_folder
-from levilab.texts.text import ENGLISH, Text, language_of
+from levilab.texts.text import ENGLISH, Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Collection, Iterator, Mapping
@@ -118,7 +118,7 @@ def serve_live(
         CannotShow: the port is taken.
         NoNetwork: the view is to be shared, and this machine is in no network.
     """
-    language_of(options.language)
+    check_language(options.language)
     root, shown = _where(options)
     with contextlib.ExitStack() as at_end:
         hosts = [HOST, address_in_network()] if options.share else [HOST]

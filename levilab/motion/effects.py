@@ -19,6 +19,7 @@ from levilab.motion.lines import rate_for
 from levilab.simulator.equilibrium import advice, modes_at, stability_of
 from levilab.simulator.scene import SceneError
 from levilab.simulator.single import simulate
+from levilab.texts.text import Text, text_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -161,7 +162,7 @@ def _effect(kind: _Kind, scene: Scene, as_it_is: Trajectory, time: float) -> Eff
         changed = scene.changed(changes)
         other = simulate(changed, time, tolerance=1e-6, rate=rate_for(changed))
     except (SceneError, SimulationError) as error:
-        return Effect(kind.name, included, kind.what, math.nan, math.nan, math.nan, str(error))
+        return Effect(kind.name, included, kind.what, math.nan, math.nan, math.nan, text_of(error))
     with_it, without = (as_it_is, other) if included else (other, as_it_is)
     height, precession, spin = (a - b for a, b in zip(_observe(with_it), _observe(without), strict=True))
     return Effect(
@@ -208,12 +209,10 @@ def _remark(included: bool, as_it_is: Trajectory, other: Trajectory) -> str:  # 
         return "" if as_it_is.survived else "lost either way"
     assert other.fell or as_it_is.fell
     lost = as_it_is if other.survived else other
-    word = "without it" if included else "with it"
     if lost is as_it_is:
-        return f"{word} the top stays up"
-    return f"{word} the top is lost after {lost.time[-1]:.3g} s{_why(lost.scene)}"
-
-
-def _why(scene: Scene) -> str:
-    found = stability_of(scene)
-    return "" if found.floating else f": {advice(found)}"
+        return "without it the top stays up" if included else "with it the top stays up"
+    found = stability_of(lost.scene)
+    why = Text(": {advice}", advice=advice(found)) if not found.floating else ""
+    said = "without it the top is lost after {s:.3g} s{why}"
+    said = said if included else "with it the top is lost after {s:.3g} s{why}"
+    return Text(said, s=float(lost.time[-1]), why=why)

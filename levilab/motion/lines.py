@@ -16,6 +16,7 @@ from levilab.simulator.energy import spin_of
 from levilab.simulator.equilibrium import modes_at
 from levilab.simulator.kernels.motion import TIME, N, R
 from levilab.simulator.numbers import largest
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -170,7 +171,8 @@ def _name_lines(
         if i not in names and strong:
             k = min(strong, key=lambda k: abs(lines[k].frequency - line.frequency))
             away = line.frequency - lines[k].frequency
-            names[i] = f"{known[k]} {'−' if away < 0 else '+'} {abs(away):.3g} Hz"
+            beside = "{name} − {away:.3g} Hz" if away < 0 else "{name} + {away:.3g} Hz"
+            names[i] = Text(beside, name=known[k], away=abs(away))
     return tuple(
         NamedLine(line.frequency, line.amplitude, names.get(i, ""), sideband=i in names and i not in known)
         for i, line in enumerate(lines)

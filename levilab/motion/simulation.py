@@ -22,6 +22,7 @@ from levilab.runs.writer import RunWriter
 from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.single import LONGEST_S, simulate
 from levilab.software import software_versions
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -134,15 +135,15 @@ def _samples_per_state(request: SimulationRequest) -> int:
     """Return the number of samples for each kept state, as the spectrum needs more than a file.  Checks the numbers."""
     for name, value in (("duration", request.duration), ("tolerance", request.tolerance), ("rate", request.rate)):
         if not 0 < value <= LONGEST_S:
-            raise UsageError(name, f"a number above 0 and up to {LONGEST_S:.0e} is expected", value=value)
+            expected = Text("a number above 0 and up to {most:.0e} is expected", most=LONGEST_S)
+            raise UsageError(name, expected, value=value)
     states = request.duration * request.rate
     if states > MOST_STATES:
-        raise UsageError(
-            "duration",
-            f"with `rate` = {request.rate:g} these are {states:.2g} states, at most {MOST_STATES} are kept: "
-            f"take `rate` = {MOST_STATES / request.duration:.2g} or less",
-            value=request.duration,
-        )
+        what = Text(
+            "with `rate` = {rate:g} these are {states:.2g} states, at most {most} are kept: take `rate` = {less:s}",
+            rate=request.rate, states=states, most=MOST_STATES, less=f"{MOST_STATES / request.duration:.2g}",
+        )  # fmt: skip
+        raise UsageError("duration", what, value=request.duration)
     wanted: int = math.ceil(rate_for(request.scene) / request.rate)
     return max(min(wanted, int(MOST_STATES / states)), 1)
 

@@ -15,6 +15,7 @@ from levilab.motion.lock import is_locked
 from levilab.present.numbers import with_decimals
 from levilab.simulator.equilibrium import advice, stability_of
 from levilab.simulator.scene import remarks
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
@@ -29,8 +30,8 @@ CONSTANT = 1e-9
 SWINGS_HZ = 0.002
 
 FALLS = {"radius": "drifted out to {cm:.3g} cm from the axis", "height": "came down to {cm:.3g} cm"}
-#: How a motion ended; FALLS follows after a colon.  A top that drifts out has not fallen yet.
-ENDINGS = {"radius": "was lost", "height": "fell"}
+#: How a motion ended; how is one of FALLS.  A top that drifts out has not fallen yet.
+ENDINGS = {"radius": "was lost after {s:.4g} s: it {how}", "height": "fell after {s:.4g} s: it {how}"}
 
 
 @dataclass(frozen=True)
@@ -70,7 +71,7 @@ class Summary:
         """The range of the heights as text; a zero has no sign."""
         height = 100 * self.motion.position[:, 2]
         low, high, mean = (with_decimals(x, 3) for x in (height.min(), height.max(), height.mean()))
-        return f"{low} to {high} cm, mean {mean} cm"
+        return Text("{low:n} to {high:n} cm, mean {mean:n} cm", low=low, high=high, mean=mean)
 
     @property
     def fell(self) -> str:
@@ -79,16 +80,16 @@ class Summary:
             return ""
         escape = self.motion.scene.escape
         limit = {"radius": escape.radius_m, "height": escape.height_m}[self.motion.fell.name]
-        return FALLS[self.motion.fell.name].format(cm=100 * limit)
+        return Text(FALLS[self.motion.fell.name], cm=100 * limit)
 
     @property
     def ending(self) -> str:
         """The description of the motion's end."""
         if self.motion.scene.observed == "spin":
-            return f"the spin alone, {self.end:g} s"
+            return Text("the spin alone, {s:g} s", s=self.end)
         if self.motion.fell is None:
-            return f"stayed up for {self.end:g} s"
-        return f"{ENDINGS[self.motion.fell.name]} after {self.end:.4g} s: it {self.fell}"
+            return Text("stayed up for {s:g} s", s=self.end)
+        return Text(ENDINGS[self.motion.fell.name], s=self.end, how=self.fell)
 
     @property
     def spin(self) -> str:
@@ -96,13 +97,18 @@ class Summary:
         spin = self.motion.spin_hz
         first, last, low, high = (float(x) for x in (spin[0], spin[-1], spin.min(), spin.max()))
         if high - low <= CONSTANT * abs(first):
-            return f"constant, {with_decimals(first, 3)} Hz"
-        said = f"{with_decimals(first, 3)} Hz at the start, {with_decimals(last, 3)} Hz at the end"
+            return Text("constant, {hz:n} Hz", hz=with_decimals(first, 3))
+        said = start_and_end(first, last)
         if high - low <= abs(last - first) + SWINGS_HZ:
             return said
-        return (
-            f"{said}; {with_decimals(low, 3)} to {with_decimals(high, 3)} Hz, mean {with_decimals(spin.mean(), 3)} Hz"
-        )
+        lowest, highest, mean = (with_decimals(x, 3) for x in (low, high, spin.mean()))
+        return Text("{said}; {low:n} to {high:n} Hz, mean {mean:n} Hz", said=said, low=lowest, high=highest, mean=mean)
+
+
+def start_and_end(first: float, last: float) -> str:
+    """Return a spin at the start and at the end [Hz] as text."""
+    said = "{first:n} Hz at the start, {last:n} Hz at the end"
+    return Text(said, first=with_decimals(first, 3), last=with_decimals(last, 3))
 
 
 def summarise(
@@ -141,10 +147,10 @@ def _why_no_lines(motion: Trajectory, lines: AxisLines) -> str:
     if lines.signal is not None:
         return "the axis stands still"
     if (states - 1) < end * rate_for(motion.scene) / 2:
-        return f"{states} states in {end:.3g} s are too few for a spectrum"
+        return Text("{states} states in {end:.3g} s are too few for a spectrum", states=states, end=end)
     if motion.fell is not None:
-        return f"the top was up for {end:.3g} s only, which is too short; 2 s would be enough"
-    return f"{end:.3g} s are too short; 2 s are enough, and with a duration of 10 s the resolution is 0.2 Hz"
+        return Text("the top was up for {end:.3g} s only, which is too short; 2 s would be enough", end=end)
+    return Text("{end:.3g} s are too short; 2 s are enough, and 10 s give a resolution of 0.2 Hz", end=end)
 
 
 def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
@@ -156,35 +162,36 @@ def _notes(motion: Trajectory, lines: AxisLines, rate: float) -> list[str]:
         notes += [] if found.floating else [advice(found)]
     highest = max((abs(line.frequency) for line in lines.lines), default=0.0)
     if highest > rate / 2:
-        notes.append(
-            f"{rate:g} states per second are less than twice the highest line, {highest:.3g} Hz: the lines here come "
-            "from more of them, but the states show it elsewhere; "
-            f"take `rate` = {math.ceil(3 * highest / 10) * 10}"
+        note = (
+            "{rate:g} states per second are less than twice the highest line, {highest:.3g} Hz: the lines here come "
+            "from more of them, but the states show it elsewhere; take `rate` = {more}"
         )
+        notes.append(Text(note, rate=rate, highest=highest, more=math.ceil(3 * highest / 10) * 10))
     if not lines.lines and motion.scene.observed == "motion":
-        notes.append(f"no lines of the axis: {_why_no_lines(motion, lines)}")
+        notes.append(Text("no lines of the axis: {why}", why=_why_no_lines(motion, lines)))
     if lines.lines and lines.until < 0.99 * min(float(motion.time[-1]), LONGEST_S):
-        notes.append(
-            f"the lines are those of the first {lines.until:.3g} s: later the changing spin has moved them by more "
-            "than their resolution"
-        )
+        note = "the lines are those of the first {s:.3g} s: later the changing spin moves them beyond their resolution"
+        notes.append(Text(note, s=lines.until))
     return notes
 
 
 def _not_reached(accuracy: Accuracy) -> str:
     worst = max(accuracy.position, accuracy.axis)
     if accuracy.nodes > worst / 2:
-        return (
-            f"the tolerance of {accuracy.tolerance:g} was not reached: the magnet came so near to the base that the "
-            f"nodes it is averaged over leave an error of {accuracy.nodes:.1g}; end at a greater escape.height_m"
+        said = (
+            "the tolerance of {tolerance:g} was not reached: the magnet came so near to the base that the nodes it is "
+            "averaged over leave an error of {error:.1g}; end at a greater escape.height_m"
         )
-    said = f"the tolerance of {accuracy.tolerance:g} was not reached, and shorter steps do not help"
-    if worst < SMALL:
-        return f"{said}: what rounding leaves, magnified by the motion, is {worst:.1g}"
-    return (
-        f"{said}: this motion is chaotic.  How such a top moves is right; where exactly it is at a late moment, and "
-        "when exactly it falls, depends on the last digit of its start"
+        return Text(said, tolerance=accuracy.tolerance, error=accuracy.nodes)
+    said = (
+        "the tolerance of {tolerance:g} was not reached, and shorter steps do not help: rounding, magnified by the "
+        "motion, leaves {error:.1g}"
+        if worst < SMALL
+        else "the tolerance of {tolerance:g} was not reached, and shorter steps do not help: this motion is chaotic.  "
+        "How such a top moves is right; where exactly it is at a late moment, and when exactly it falls, depends on "
+        "the last digit of its start"
     )
+    return Text(said, tolerance=accuracy.tolerance, error=worst)
 
 
 def as_document(summary: Summary) -> dict[str, Any]:

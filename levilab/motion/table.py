@@ -11,18 +11,20 @@ from rich.markup import escape
 from analysis.numbers import with_minus
 from levilab.motion.effects import LEAST_HZ, LEAST_M
 from levilab.motion.lock import is_locked
-from levilab.motion.summary import changing_energy
+from levilab.motion.summary import changing_energy, start_and_end
 from levilab.present.numbers import with_decimals
-from levilab.present.terminal import new_table, terminal
+from levilab.present.tables import table
+from levilab.present.terminal import draw, terminal
+from levilab.texts.text import Sentences, Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rich.console import Console
-    from rich.table import Table
 
     from levilab.motion.effects import Effect
     from levilab.motion.summary import Summary
+    from levilab.present.tables import Table
 
 
 def print_motion(summary: Summary, console: Console | None = None) -> None:
@@ -33,26 +35,25 @@ def print_motion(summary: Summary, console: Console | None = None) -> None:
         console: where it is printed, by default the terminal.
     """
     out = console or terminal()
-    out.print(f"[bold]{escape(headline(summary))}[/bold]")
-    facts = new_table(None, "", "")
-    facts.show_header = False
-    for what, text in (*_motion_facts(summary), *_quality_facts(summary)):
-        facts.add_row(what, text)
-    out.print(facts)
+    out.print(f"[bold]{escape(in_language(headline(summary)))}[/bold]")
+    out.print(draw(table("", ("", ""), (*_motion_facts(summary), *_quality_facts(summary)))))
     if summary.lines.lines:
-        out.print(_lines_table(summary))
+        out.print(draw(_lines_table(summary)))
+        resolution, until = summary.lines.resolution, summary.lines.until
+        of = Text(", of the first {s:.3g} s", s=until) if until < 0.99 * summary.end else ""
+        out.print(in_language(Text("resolution {hz:.2g} Hz{of}", hz=resolution, of=of)))
     for note in summary.notes:
-        out.print(f"[yellow]note:[/yellow] {escape(note)}")
+        out.print(f"[yellow]{in_language('note:')}[/yellow] {escape(in_language(note))}")
 
 
 def headline(summary: Summary) -> str:
     """Return one line about the end of a motion."""
     name = summary.motion.scene.name or "the scene"
     if summary.motion.scene.observed == "spin":
-        return f"{name}: the spin alone, for {summary.duration:g} s"
+        return Text("{name}: the spin alone, for {s:g} s", name=name, s=summary.duration)
     if summary.motion.survived:
-        return f"{name}: the top stayed up for all of {summary.duration:g} s"
-    return f"{name}: the top {summary.ending}"
+        return Text("{name}: the top stayed up for all of {s:g} s", name=name, s=summary.duration)
+    return Text("{name}: the top {ending}", name=name, ending=summary.ending)
 
 
 def _motion_facts(summary: Summary) -> list[tuple[str, str]]:
@@ -62,40 +63,36 @@ def _motion_facts(summary: Summary) -> list[tuple[str, str]]:
         return facts
     facts.insert(0, ("height", summary.heights))
     if motion.scene.washers.inertia_kg_m2 > 0:
-        first, last = (with_decimals(motion.washer_spin_hz[k], 3) for k in (0, -1))
-        facts.append(("loose washers", f"{first} Hz at the start, {last} Hz at the end"))
+        facts.append(("loose washers", start_and_end(*(float(motion.washer_spin_hz[k]) for k in (0, -1)))))
     if (locked := is_locked(motion.scene, motion.states, survived=motion.survived)) is not None:
         facts.append(("drive", "holds the top, which is locked to it" if locked else "does not hold the top"))
     if len(motion.bursts):
-        facts.append(("drive", f"in {np.unique(motion.bursts[:, 3]).size} bursts, which the tape set off"))
-    facts.append(("tilt", f"up to {_angle(float(motion.tilt.max()))}"))
+        bursts = Text("in {n} bursts, which the tape set off", n=np.unique(motion.bursts[:, 3]).size)
+        facts.append(("drive", bursts))
+    tilt = float(motion.tilt.max())  # in mrad only if it is small
+    said = "up to {degrees:.3g}°" if tilt > 1 else "up to {mrad:.3g} mrad, {degrees:.3g}°"
+    facts.append(("tilt", Text(said, mrad=1000 * tilt, degrees=math.degrees(tilt))))
     return facts
-
-
-def _angle(angle: float) -> str:
-    """Return an angle, in mrad only if it is small."""
-    degrees = f"{math.degrees(angle):.3g}°"
-    return degrees if angle > 1 else f"{1000 * angle:.3g} mrad, {degrees}"
 
 
 def _quality_facts(summary: Summary) -> list[tuple[str, str]]:
     accuracy = summary.motion.accuracy
     if accuracy.steps == 0:
         return [("computed", "in closed form, nothing was integrated")]
-    verdict = "within" if accuracy.reached else "NOT within"
-    facts = [
-        (
-            "error at the end",
-            f"{accuracy.position:.1g} m of the place, {accuracy.axis:.1g} rad of the axis (estimated)",
-        ),
-        ("", f"{verdict} the tolerance of {accuracy.tolerance:g}"),
+    error = "{place:.1g} m of the place, {axis:.1g} rad of the axis (estimated)"
+    verdict = "within the tolerance of {x:g}" if accuracy.reached else "NOT within the tolerance of {x:g}"
+    facts: list[tuple[str, str]] = [
+        ("error at the end", Text(error, place=accuracy.position, axis=accuracy.axis)),
+        ("", Text(verdict, x=accuracy.tolerance)),
     ]
     if not changing_energy(summary.motion.scene):
         change = summary.energy_change
-        facts.append(("energy", f"constant to {change:.1g} of itself" if change else "exactly constant"))
-    steps = f"{accuracy.steps} steps of at most {1000 * accuracy.step:.3g} ms by {accuracy.scheme}"
-    speed = f", {_format_speed(summary.speed)} times faster than the real top" if summary.end >= 1 else ""
-    facts.append(("computed", steps + speed))  # of less than a second nothing but the overhead would be seen
+        facts.append(("energy", Text("constant to {x:.1g} of itself", x=change) if change else "exactly constant"))
+    said = "{steps} steps of at most {ms:.3g} ms by {scheme:s}"
+    steps = Text(said, steps=accuracy.steps, ms=1000 * accuracy.step, scheme=accuracy.scheme)
+    speed = Text(", {x:n} times faster than the real top", x=_format_speed(summary.speed)) if summary.end >= 1 else ""
+    # of less than a second nothing but the overhead would be seen
+    facts.append(("computed", Sentences(steps, speed, between="")))
     return facts
 
 
@@ -105,45 +102,34 @@ def _format_speed(speed: float) -> str:
 
 
 def _lines_table(summary: Summary) -> Table:
-    resolution = summary.lines.resolution
-    digits = 2 if resolution > 0.05 else 3
-    shown = new_table(
-        "Lines of the axis, n_x + i n_y",
-        "frequency \\[Hz]", "amplitude \\[mrad]", "identified as",
-        numbers=("frequency \\[Hz]", "amplitude \\[mrad]"),
-    )  # fmt: skip
-    for line in summary.lines.lines:
-        frequency = with_decimals(line.frequency, digits)
-        shown.add_row(frequency, f"{1000 * line.amplitude:.3g}", line.name or "not identified")
-    of = f", of the first {summary.lines.until:.3g} s" if summary.lines.until < 0.99 * summary.end else ""
-    shown.caption = f"resolution {resolution:.2g} Hz{of}"
-    shown.caption_justify = "left"
-    return shown
+    digits = 2 if summary.lines.resolution > 0.05 else 3
+    heads = ("frequency [Hz]", "amplitude [mrad]", "identified as")
+    rows = [
+        (with_decimals(line.frequency, digits), f"{1000 * line.amplitude:.3g}", line.name or "not identified")
+        for line in summary.lines.lines
+    ]
+    return table("Lines of the axis, n_x + i n_y", heads, rows, numbers=heads[:2])
 
 
 def print_effects(effects: Sequence[Effect]) -> None:
     """Print one row an effect: in or out, and its influence."""
-    changes = ("height \\[mm]", "precession \\[Hz]", "spin at the end \\[Hz]")
-    table = new_table(
-        "What is in this scene, and what is left out", "effect", "", *changes, "meaning; other influence",
-        numbers=changes,
-    )  # fmt: skip
-    for effect in effects:
-        words = f"{effect.what}; {effect.remark}" if effect.remark else effect.what
-        table.add_row(
+    changes = ("height [mm]", "precession [Hz]", "spin at the end [Hz]")
+    rows = [
+        (
             effect.name,
             "in" if effect.included else "out",
             _format_change(effect.height_m, LEAST_M, 1e3),
             _format_change(effect.precession_hz, LEAST_HZ, 1),
             _format_change(effect.spin_hz, LEAST_HZ, 1),
-            escape(words),
+            Sentences(effect.what, effect.remark, between="; "),
         )
-    table.caption = (
-        "changes that the effect makes when it is there and nothing else is different, computed for this scene;\n"
-        "– where one of the two motions has no such number"
-    )
-    table.caption_justify = "left"
-    terminal().print(table)
+        for effect in effects
+    ]
+    heads = ("effect", "", *changes, "meaning; other influence")
+    out = terminal()
+    out.print(draw(table("What is in this scene, and what is left out", heads, rows, numbers=changes)))
+    out.print(in_language("changes that the effect makes when it is there and nothing else is different, computed for "
+                          "this scene; – where one of the two motions has no such number"))  # fmt: skip
 
 
 def _format_change(change: float, least: float, factor: float) -> str:

@@ -15,7 +15,6 @@ from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.sway.document import SWAY
 from levilab.pipelines.video.document import VIDEO
 from levilab.present.clock import moment
-from levilab.present.document.blocks import in_language_of_reader
 from levilab.present.numbers import short_name
 from levilab.texts.text import Text, in_language
 
@@ -71,7 +70,7 @@ def print_analysis(
     if tables:
         console.print()
         for table in analysis.tables(found):
-            console.print(draw(in_language_of_reader(table)))
+            console.print(draw(table))
     starts = [f"{short_name(one.name)} {moment(one.start)}" for one in found.sources if one.start]
     if starts:
         more = [Text("and {n} more", n=len(starts) - MOST_STARTS)] * (len(starts) > MOST_STARTS)

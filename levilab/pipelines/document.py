@@ -77,7 +77,7 @@ def refuse_columns_of_runs(found: Found[Any], options: InputOptions) -> None:
     if options.columns and len(runs) == len(found.sources):
         names = ", ".join(str(channel["name"]) for channel in runs[0].record.channels if "name" in channel)
         known = f"{runs[0].folder} is a run, whose columns are known{f' ({names})' * bool(names)}"
-        raise UsageError("columns", f"goes with a data file, and {known}: leave it out")
+        raise UsageError("columns", Text("goes with a data file, and {known}: leave it out", known=known))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -380,7 +380,7 @@ class Analysis(Needs[Any], Generic[A]):
         try:
             self.check(part.result)
         except ValueError as error:
-            raise DataError(f"{earlier.file}: {error}: {AGAIN}") from error
+            raise DataError("{file:s}: {error}: {again}", file=earlier.file, error=error, again=AGAIN) from error
         return source, part.result, Origin(self._options(earlier), earlier.text)
 
     # --- for people ---

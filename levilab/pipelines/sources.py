@@ -473,7 +473,8 @@ def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
         raise DoesNotSuit(Text(other, path=run.folder, kind=f"{kind} run", analysis=needs.name, needed=needs.runs))
     data = run.folder / needs.data
     if not data.exists():  # as after a kill before the first record
-        raise DataError(f"{run.folder}: holds no {data.name}, so nothing was recorded; analyze another run")
+        what = "{path:s}: holds no {name:s}, so nothing was recorded; analyze another run"
+        raise DataError(what, path=run.folder, name=data.name)
     readings = needs.read_run(run, options)
     doubts = (Note(kind_of_text(text), text, is_doubt=True) for text in run.warnings())
     return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, (*doubts, *readings.warnings))
@@ -483,14 +484,14 @@ def sha256_of(path: Path) -> str:
     """Return the hash of a file; of a run in it, that of the file and the run's name.  Raises DataError."""
     path, inside = locate(path)
     if path.exists() and not path.is_file():  # reading from a pipe would wait for ever
-        raise DataError(f"{path}: is a folder, a pipe or a device; a file is expected")
+        raise DataError("{path:s}: is a folder, a pipe or a device; a file is expected", path=path)
     try:
         with path.open("rb") as file:
             digest = hashlib.file_digest(file, "sha256")
             digest.update(inside.encode())
             return digest.hexdigest()
     except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror})") from error
+        raise DataError("{path:s}: cannot be read ({why})", path=path, why=error.strerror) from error
 
 
 def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) -> Found[R]:

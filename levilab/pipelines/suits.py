@@ -219,7 +219,7 @@ def _look(
         except DataError as error:
             errors[name] = error
         except AnalysisError as error:
-            errors[name] = DataError(f"{path}: {error}")
+            errors[name] = DataError("{path:s}: {error}", path=path, error=error)
     return found, errors
 
 
@@ -252,11 +252,13 @@ def _refusal(path: Path, errors: Mapping[str, DataError]) -> DataError:
     seen += [f"{how_many(len(files), 'data file')}, as {files[0].name}"] if files else []
     if runs:
         kinds = " or ".join(counts)
-        return DoesNotSuit(f"{path}: there is no analysis of a {kinds} run (found {'; '.join(seen)})")
+        what = "{path:s}: there is no analysis of a {kinds:s} run (found {seen:s})"
+        return DoesNotSuit(what, path=path, kinds=kinds, seen="; ".join(seen))
     if files:
         return DoesNotSuit(
-            f"{path}: no analysis reads what is in it; {_left_out(errors) or seen[0]}: name a file to see why"
-        )
+            "{path:s}: no analysis reads what is in it; {value}: name a file to see why",
+            path=path, value=_left_out(errors) or seen[0],
+        )  # fmt: skip
     return next(iter(errors.values()))
 
 

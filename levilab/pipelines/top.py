@@ -53,12 +53,13 @@ def calculate_top(path: Path) -> Calculated:
     parts = tuple(parts_of(read_device(path).top))
     if not parts:
         raise DataError(
-            f"{path}: has no [[top.parts]]: describe each part of the top as a cylinder, as in sample_data/device.toml"
+            "{path:s}: has no [[top.parts]]: describe each part of the top as a cylinder, as sample_data/device.toml",
+            path=path,
         )
     try:
         return Calculated(parts, tuple(top_of([part]) for part in parts), top_of(parts))
     except AnalysisError as error:
-        raise DataError(f"{path}: {error}") from error
+        raise DataError("{path:s}: {error}", path=path, error=error) from error
 
 
 def top_table(found: Calculated) -> Table:

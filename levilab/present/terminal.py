@@ -16,6 +16,7 @@ from rich.padding import Padding
 from rich.table import Table as RichTable
 
 from levilab.present.characters import for_encoding, printable
+from levilab.present.document.blocks import in_language_of_reader
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -162,7 +163,8 @@ def print_rows(console: Terminal, heads: Sequence[str], rows: Sequence[Sequence[
 
 
 def draw(table: Table) -> RichTable:
-    """Return a table of data as one of rich's."""
+    """Return a table of data as one of rich's, in the language of this process."""
+    table = in_language_of_reader(table)
     drawn = new_table(escape(table.title), *map(escape, table.heads))
     drawn.show_header = any(table.heads)
     for k in table.numbers:

@@ -115,15 +115,15 @@ def run_or_folder(name: Path, root: Path = RUNS) -> Path:
     """Return the folder of a run, or one with runs, by its path or its name.  Raises DataError."""
     folder = find_run(name, root)
     if not folder.is_dir():
-        raise DataError(f"{name}: there is no such run or folder; levilab runs lists the runs")
+        raise DataError("{name}: there is no such run or folder; levilab runs lists the runs", name=name)
     return folder
 
 
 def must_be_searchable(root: Path) -> None:
     """Raise DataError for what is no folder that may be searched."""
     if root.is_file():
-        raise DataError(f"{root}: is a file; name the folder that holds the runs")
+        raise DataError("{root}: is a file; name the folder that holds the runs", root=root)
     if not root.is_dir():
         raise DataError(Text("{root:s}: there is no such folder; levilab acquire writes runs into runs/", root=root))
     if not os.access(root, os.R_OK | os.X_OK):
-        raise DataError(f"{root}: may not be searched by you; change its permissions or name another folder")
+        raise DataError("{root}: may not be searched by you; change its permissions or name another folder", root=root)

@@ -204,7 +204,7 @@ def floating_height(scene: Scene) -> Any:
     if missing:
         first = common.top.model_copy(update={"mass_kg": float(np.ravel(masses)[0])})
         found = stability_of(common.model_copy(update={"top": first}))
-        raise SceneError(f"top.mass_kg = {first.mass_kg:g}: {advice(found)}")
+        raise SceneError("top.mass_kg = {mass_kg:g}: {advice}", mass_kg=first.mass_kg, advice=advice(found))
     return heights.view(Numbers) if isinstance(masses, Numbers) else float(heights[0])
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import LevilabError, RequestError
 from levilab.files import parse_toml, toml_value
 from levilab.formats.typed import read_number, unit_of_key
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator, Mapping
@@ -57,7 +58,7 @@ class UnknownKey(SceneError):
 
     def __init__(self, given: str, problem: str) -> None:
         self.problem = problem
-        super().__init__(f"{given}: {problem}")
+        super().__init__("{given:s}: {problem}", given=given, problem=problem)
 
 
 class UnknownScene(SceneError, RequestError):
@@ -80,7 +81,9 @@ def parse_setting(setting: str) -> tuple[str, Any]:
     key, equals, text = setting.partition("=")
     key, text = key.strip(), text.strip()
     if not (key and equals):
-        raise SceneError(f"{setting!r}: KEY=VALUE is expected, such as top.mass_kg=0.025 or drag.law=stokes")
+        raise SceneError(
+            "'{seen:s}': KEY=VALUE is expected, such as top.mass_kg=0.025 or drag.law=stokes", seen=setting
+        )
     return key, _value(key, text)
 
 
@@ -96,14 +99,14 @@ def _value(key: str, text: str) -> Any:
     except tomllib.TOMLDecodeError:
         pass
     except ValueError as error:
-        raise SceneError(f"{short_text(text)!r}: {error}") from None
+        raise SceneError("'{short_text:s}': {error}", short_text=short_text(text), error=error) from None
     unit = unit_of_key(key)
     listed = text.startswith("[") and text.endswith("]")
     try:  # .5 and 5. are numbers, too, but not in TOML
         return [read_number(one, unit) for one in text[1:-1].split(",")] if listed else read_number(text, unit)
     except ValueError as error:
         if unit and _WITH_UNIT.fullmatch(text):
-            raise SceneError(f"{key} = {error}") from None
+            raise SceneError("{key} = {error}", key=key, error=error) from None
         return text
 
 
@@ -131,7 +134,7 @@ def set_key(table: Table, key: str, value: Any) -> None:
         for inner, item in value.items():
             set_key(table, f"{key}.{inner}", item)
     else:
-        raise SceneError(f"{given}: a table is expected, with the keys {', '.join(at[step])}")
+        raise SceneError("{at}: a table is expected, with the keys {names:s}", at=given, names=", ".join(at[step]))
 
 
 def _step(table: Table, at: Any, way: list[str], given: str) -> str | int:
@@ -152,9 +155,11 @@ def _step(table: Table, at: Any, way: list[str], given: str) -> str | int:
     if isinstance(at, dict):
         raise UnknownKey(given, _unknown_key(table, at, way))
     if not isinstance(at, list):
-        raise SceneError(f"{given}: {'.'.join(before)} = {short_text(at)} has no parts, give it as a whole")
+        what = "{given}: {key:s} = {seen:s} has no parts, give it as a whole"
+        raise SceneError(what, given=given, key=".".join(before), seen=short_text(at))
     if not (part.isdecimal() and int(part) < len(at)):
-        raise SceneError(f"{given}: {'.'.join(before)} has {len(at)} numbers, counted from 0 to {len(at) - 1}")
+        what = "{given}: {key:s} has {n} numbers, counted from 0 to {last}"
+        raise SceneError(what, given=given, key=".".join(before), n=len(at), last=len(at) - 1)
     return int(part)
 
 
@@ -162,9 +167,10 @@ def _unknown_key(table: Table, at: Table, way: list[str]) -> str:
     """Return what to say about an unknown key: suggestions, and the keys that exist."""
     before = way[:-1]
     similar = _suggestions(table, at, way)
-    question = f"; did you mean {' or '.join(similar)}? Known" if similar else "; known"
-    where = f" in {'.'.join(before)}" if before else ""
-    return f"there is no key {'.'.join(way)}{question}{where} are {', '.join(at)}"
+    where = Text(" in {name:s}", name=".".join(before)) if before else ""
+    said = "there is no key {key:s}; known{where} are {names:s}"
+    said = "there is no key {key:s}; did you mean {similar:s}? Known{where} are {names:s}" if similar else said
+    return Text(said, key=".".join(way), similar=" / ".join(similar), where=where, names=", ".join(at))
 
 
 def _suggestions(table: Table, at: Table, way: list[str]) -> list[str]:

@@ -11,11 +11,11 @@ import sys
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import BeforeValidator, ConfigDict, Field, NonNegativeFloat, field_validator, model_validator
-from pydantic_core import PydanticCustomError
 
 from levilab.formats.typed import check_range
 from levilab.settings import Settings
 from levilab.simulator.laws import LAWS
+from levilab.texts.text import Text
 
 FieldKind = Literal[
     "exact", "paraxial-2", "paraxial-4", "paraxial-6", "paraxial-8", "paraxial-10", "paraxial-12", "paraxial-14",
@@ -31,7 +31,7 @@ def _numbers(count: int) -> BeforeValidator:
     def check(value: Any) -> Any:
         if isinstance(value, list | tuple) and len(value) == count:
             return tuple(value)
-        raise PydanticCustomError("numbers", "{count} numbers in brackets are expected", {"count": count})
+        raise ValueError(Text("{count} numbers in brackets are expected", count=count))
 
     return BeforeValidator(check)
 
@@ -41,7 +41,7 @@ def _one_or_two(value: Any) -> Any:
     numbers = list(value) if isinstance(value, list | tuple) else [value]
     if value is None or (1 <= len(numbers) <= 2 and all(map(_from_zero, numbers))):
         return tuple(numbers) if len(numbers) == 2 else numbers[0]
-    raise PydanticCustomError("coefficient", "a number from 0 is expected, two of them ([c1, c2]) for the law mixed")
+    raise ValueError("a number from 0 is expected, two of them ([c1, c2]) for the law mixed")
 
 
 def _from_zero(value: Any) -> bool:

@@ -58,7 +58,8 @@ class Scene(Part):
         for rule in RULES:
             if not rule.holds(self):
                 value = short_text(attrgetter(rule.key)(self))
-                raise SceneError(f"{rule.key} = {value}: {rule.expected.format(s=self)}")
+                expected = Text(rule.expected, limit=attrgetter(rule.of)(self))
+                raise SceneError("{key} = {value}: {expected}", key=rule.key, value=value, expected=expected)
         return self
 
     @property
@@ -101,26 +102,29 @@ class Rule(NamedTuple):
     Attributes:
         key: of the value that the message shows.
         holds: whether the scene fulfils it.
-        expected: what is allowed, a format in which s is the scene.
+        expected: what is allowed, a template in which limit is a value of the scene.
+        of: the key of that value.
     """
 
     key: str
     holds: Callable[[Scene], bool]
     expected: str
+    of: str = "name"
 
 
 RULES: tuple[Rule, ...] = (
     Rule(
         "base.outer_radius_m",
         lambda s: s.base.outer_radius_m > s.base.inner_radius_m,
-        "more than base.inner_radius_m = {s.base.inner_radius_m} is expected",
+        "more than base.inner_radius_m = {limit} is expected",
+        "base.inner_radius_m",
     ),
     Rule(
         "top.inertia_axial_kg_m2",
         # a flat body has just twice; the margin is for sums that were rounded
         lambda s: s.top.inertia_axial_kg_m2 <= 2 * s.top.inertia_transverse_kg_m2 * (1 + 1e-9),
-        "at most twice top.inertia_transverse_kg_m2 = {s.top.inertia_transverse_kg_m2} is expected; "
-        "no symmetric body has more",
+        "at most twice top.inertia_transverse_kg_m2 = {limit} is expected; no symmetric body has more",
+        "top.inertia_transverse_kg_m2",
     ),
     Rule("top.moment_a_m2", lambda s: s.top.moment_a_m2 != 0, "any number but 0 is expected, negative to float"),
     Rule(
@@ -131,12 +135,14 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "washers.inertia_kg_m2",
         lambda s: s.washers.inertia_kg_m2 < s.top.inertia_axial_kg_m2,
-        "less than top.inertia_axial_kg_m2 = {s.top.inertia_axial_kg_m2} is expected, of which it is a part",
+        "less than top.inertia_axial_kg_m2 = {limit} is expected, of which it is a part",
+        "top.inertia_axial_kg_m2",
     ),
     Rule(
         "drag.coefficient",
         lambda s: s.drag.law == "none" or len(s.drag.constants) == len(LAWS[s.drag.law].names),
-        "two numbers, [c1, c2], are expected with drag.law = mixed and one with every other law (here: {s.drag.law})",
+        "two numbers, [c1, c2], are expected with drag.law = mixed and one with every other law (here: {limit})",
+        "drag.law",
     ),
     Rule(
         "drive.direction",
@@ -155,12 +161,14 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "start.position_m",
         lambda s: s.start.place != "given" or s.start.position_m[2] > max(0.0, s.escape.height_m),
-        "a height (the third number) above the base, 0, and above escape.height_m = {s.escape.height_m} is expected",
+        "a height (the third number) above the base, 0, and above escape.height_m = {limit} is expected",
+        "escape.height_m",
     ),
     Rule(
         "start.position_m",
         lambda s: s.start.place != "given" or s.start.away2 <= s.escape.radius_m * s.escape.radius_m,
-        "a place within escape.radius_m = {s.escape.radius_m} of the base's axis is expected",
+        "a place within escape.radius_m = {limit} of the base's axis is expected",
+        "escape.radius_m",
     ),
     Rule(
         "start.precession",
@@ -170,14 +178,13 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "observed",
         lambda s: s.observed != "spin" or s.top.aligned,
-        "motion is expected, since a moment with a transverse part (top.moment_tilt.0 = {s.top.moment_tilt[0]}) "
-        "couples the spin to it; spin goes with a transverse part of 0",
+        "motion is expected, since a transverse part of the moment, top.moment_tilt.0, couples the spin to it",
     ),
     Rule(
         "observed",
         lambda s: s.observed != "spin" or s.washers.inertia_kg_m2 == 0,
-        "motion is expected, since washers.inertia_kg_m2 = {s.washers.inertia_kg_m2} are loose; "
-        "spin goes with an inertia of 0",
+        "motion is expected, since washers.inertia_kg_m2 = {limit} are loose; spin goes with an inertia of 0",
+        "washers.inertia_kg_m2",
     ),
 )
 
@@ -187,7 +194,7 @@ class Remark(NamedTuple):
 
     Attributes:
         applies: whether the scene has it.
-        text: what to say, a format in which s is the scene.
+        text: what to say.
     """
 
     applies: Callable[[Scene], bool]
@@ -220,7 +227,7 @@ class Switch(NamedTuple):
         table: of the part.
         is_off: whether the scene has it switched off.
         keys: of the table, that have no effect then.
-        why: the value that switches it off, and what switches it on, a format in which s is the scene.
+        why: the value that switches it off, and what switches it on.
     """
 
     table: str
@@ -240,19 +247,19 @@ SWITCHES: tuple[Switch, ...] = (
         "drive",
         lambda s: s.drive.waveform != "triggered",
         ("light_rad", "latency_s", "cycle_turns"),
-        "drive.waveform = {s.drive.waveform}; triggered lets the tape set off bursts",
+        "another drive.waveform, triggered, lets the tape set off bursts",
     ),
     Switch(
         "drive",
         lambda s: s.drive.waveform == "triggered" and s.drive.cycle_turns > 0,
         ("frequency_hz",),
-        "drive.cycle_turns = {s.drive.cycle_turns:g} gives the bursts their length; 0 leaves it to the frequency",
+        "drive.cycle_turns gives the bursts their length; 0 leaves it to the frequency",
     ),
     Switch(
         "drag",
         lambda s: s.drag.law == "none",
         ("coefficient",),
-        f"drag.law = none; one of {', '.join(LAWS)} switches the drag on",
+        "drag.law = none; stokes, newton, disc or mixed switches the drag on",
     ),
     Switch(
         "washers",
@@ -265,7 +272,7 @@ SWITCHES: tuple[Switch, ...] = (
 
 def remarks(scene: Scene) -> list[str]:
     """Return a sentence for each setting of a scene that has no effect."""
-    texts = [remark.text.format(s=scene) for remark in REMARKS if remark.applies(scene)]
+    texts = [remark.text for remark in REMARKS if remark.applies(scene)]
     return texts + [text for switch in SWITCHES if switch.is_off(scene) and (text := _without_effect(scene, switch))]
 
 
@@ -273,8 +280,9 @@ def _without_effect(scene: Scene, switch: Switch) -> str:
     """Return a sentence about the keys that differ from their defaults in a part that is off; empty if none does."""
     part, usual = getattr(scene, switch.table), getattr(Scene(), switch.table)
     keys = [key for key in switch.keys if getattr(part, key) != getattr(usual, key)]
-    named = " and ".join(f"{switch.table}.{key} = {short_text(getattr(part, key))}" for key in keys)
-    return f"{named} {'do' if len(keys) > 1 else 'does'} nothing: {switch.why.format(s=scene)}" if keys else ""
+    named = ", ".join(f"{switch.table}.{key} = {short_text(getattr(part, key))}" for key in keys)
+    said = "{keys:s} do nothing: {why}" if keys[1:] else "{keys:s} does nothing: {why}"
+    return Text(said, keys=named, why=switch.why) if keys else ""
 
 
 def scene_of(table: Mapping[str, Any]) -> Scene:
@@ -355,16 +363,17 @@ def _read_file(file: Traversable | Path, name: str) -> Scene:
         table = parse_toml(file.read_bytes().decode("utf-8-sig"))
     except FileNotFoundError:
         raise SceneError(
-            f"{file}: there is no such file; scenes that come with levilab are {', '.join(presets())}, each a TOML "
-            "file to copy and change"
-        ) from None
+            "{file:s}: there is no such file; scenes that come with levilab are {names:s}, each a TOML file to copy",
+            file=file, names=", ".join(presets()),
+        ) from None  # fmt: skip
     except OSError as error:
         if file.is_dir():
-            raise SceneError(f"{file}: is a folder; a TOML file is expected, or the name of a scene") from None
-        raise SceneError(f"{file}: cannot be read ({error.strerror}): a TOML file is expected") from error
+            raise SceneError("{path:s}: is a folder; a TOML file or a scene's name is expected", path=file) from None
+        what = "{path:s}: cannot be read ({why}): a TOML file is expected"
+        raise SceneError(what, path=file, why=error.strerror) from error
     except ValueError as error:
-        raise SceneError(f"{file}: not readable as TOML: {error}") from error
+        raise SceneError("{path}: not readable as TOML: {why}", path=file, error=error) from error
     try:
         return scene_of({"name": name} | table)
     except SceneError as error:
-        raise SceneError(f"{file}: {error}") from error
+        raise SceneError("{path:s}: {error}", path=file, error=error) from error

@@ -9,32 +9,38 @@ from rich.markup import escape
 
 from levilab.files import finite
 from levilab.present.numbers import with_decimals
-from levilab.present.terminal import new_table, terminal
+from levilab.present.tables import table
+from levilab.present.terminal import draw, terminal
 from levilab.simulator.equilibrium import advice
 from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
+from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from rich.console import Console
 
+    from levilab.present.tables import Table
     from levilab.simulator.equilibrium import Stability
     from levilab.simulator.scene import Scene
 
 
-def _range(which: int) -> str:
+def _range(which: int) -> dict[str, float]:
     """Return the range of the simulated lower (0) or upper (1) limits."""
     limits = [pair[which] for pair in SIMULATED_HZ.values()]
-    return f"{min(limits):.2f} – {max(limits):.2f}"
+    return {"low": min(limits), "high": max(limits)}
 
 
 #: The master's thesis on the Levitron: its simulated limits of four starts, and what it measured.
 THESIS = {
-    "lower": f"14.005 by its own estimate; {_range(0)} simulated; {MEASURED_HZ} ± {MEASURED_U_HZ} measured",
-    "upper": f"{_range(1)} simulated; about {HIGHEST_HZ:g} highest synchronised",
+    "lower": Text(
+        "14.005 by its own estimate; {low:.2f} – {high:.2f} simulated; {measured:g} ± {u:g} measured",
+        **_range(0), measured=MEASURED_HZ, u=MEASURED_U_HZ,
+    ),
+    "upper": Text("{low:.2f} – {high:.2f} simulated; about {hz:g} highest synchronised", **_range(1), hz=HIGHEST_HZ),
     "height": "7.3 measured",
     "mass": "25.5 printed, which its own field cannot lift",
-}
+}  # fmt: skip
 
 #: What a scene may have and the theory has not: the test, and what to say.
 LEFT_OUT: tuple[tuple[Callable[[Scene], bool], str], ...] = (
@@ -60,79 +66,84 @@ LEFT_OUT: tuple[tuple[Callable[[Scene], bool], str], ...] = (
 def print_stability(found: Stability, console: Console | None = None) -> None:
     """Print the windows, the equilibria, the spins; beside the thesis's figures for the thesis's device."""
     out = console or terminal()
-    out.print(f"[bold]{escape(found.scene.name or 'the scene')}: {escape(headline(found))}[/bold]")
-    out.print(_windows_table(found))
+    title = Text("{name}: {headline}", name=found.scene.name or "the scene", headline=headline(found))
+    out.print(f"[bold]{escape(in_language(title))}[/bold]")
+    out.print(draw(_windows_table(found)))
     if found.equilibria:
-        out.print(_equilibria_table(found))
+        out.print(draw(_equilibria_table(found)))
     if found.floating:
-        out.print(_facts_table(found))
+        out.print(draw(_facts_table(found)))
     for remark in remarks(found):
-        out.print(f"[yellow]note:[/yellow] {escape(remark)}")
+        out.print(f"[yellow]{in_language('note:')}[/yellow] {escape(in_language(remark))}")
 
 
 def headline(found: Stability) -> str:
     """Return one line: at which height the top floats, or what is missing."""
     if not found.floating:
         return advice(found)
-    return f"a top of {1000 * found.scene.top.mass_kg:.2f} g floats at {100 * found.floating.height:.3f} cm"
+    mass, height = 1000 * found.scene.top.mass_kg, 100 * found.floating.height
+    return Text("a top of {mass:.2f} g floats at {height:.3f} cm", mass=mass, height=height)
 
 
-def _windows_table(found: Stability) -> Any:
-    table = new_table("Where tops float, if they spin", "region", "heights \\[cm]", "masses \\[g]", "this moment")
-    for number, window in enumerate(found.windows):
-        name = "upper" if number and number == len(found.windows) - 1 else "lower"
-        table.add_row(
-            name,
-            f"{100 * window.low:.4f} – {100 * window.high:.4f}",
-            f"{1000 * window.light:.3f} – {1000 * window.heavy:.3f}",
+def _windows_table(found: Stability) -> Table:
+    rows = [
+        (
+            "upper" if number and number == len(found.windows) - 1 else "lower",
+            Text("{low:.4f} – {high:.4f}", low=100 * window.low, high=100 * window.high),
+            Text("{low:.3f} – {high:.3f}", low=1000 * window.light, high=1000 * window.heavy),
             "is lifted" if window in found.lifted else "is pulled down; one of the other sign is lifted",
         )
-    return table
+        for number, window in enumerate(found.windows)
+    ]
+    heads = ("zone", "heights [cm]", "masses [g]", "this moment")
+    return table("Where tops float, if they spin", heads, rows)
 
 
-def _equilibria_table(found: Stability) -> Any:
-    table = new_table("Where field and weight balance", "height \\[cm]", "up and down", "sideways", "spins \\[Hz]")
-    for place in found.equilibria:
-        table.add_row(
-            f"{100 * place.height:.3f}",
+def _equilibria_table(found: Stability) -> Table:
+    rows = [
+        (
+            Text("{cm:.3f}", cm=100 * place.height),
             "stable" if place.axial > 0 else "falls or rises away",
             "stable" if place.radial > 0 else "slips away",
             _spins(place.spins) if place.axial > 0 else "none helps",
         )
-    return table
+        for place in found.equilibria
+    ]
+    heads = ("height [cm]", "up and down", "sideways", "spins [Hz]")
+    return table("Where field and weight balance", heads, rows)
 
 
 def _spins(windows: Sequence[tuple[float, float]]) -> str:
-    return ", ".join(f"{low:.2f} – {high:.2f}" for low, high in windows) or "none helps"
+    texts = tuple(Text("{low:.2f} – {high:.2f}", low=low, high=high) for low, high in windows)
+    return Text("{texts}", texts=texts) if texts else "none helps"
 
 
-def _facts_table(found: Stability) -> Any:
+def _facts_table(found: Stability) -> Table:
     assert found.floating
     beside = is_thesis_device(found.scene)
-    table = new_table("The floating top", "", "here", *(["in the thesis"] if beside else []))
     lower, upper = found.floating.spins[0] if found.floating.spins else (math.nan, math.nan)
+    small, lacks = "{hz:.2f} for small motions", "{hz:.3f}, lacks the factor 2√(I₁/I₃)"
     rows = [
-        ("height \\[cm]", f"{100 * found.floating.height:.3f}", THESIS["height"]),
-        ("mass \\[g]", f"{1000 * found.scene.top.mass_kg:.2f}", THESIS["mass"]),
-        ("slowest spin \\[Hz]", f"{lower:.2f} for small motions", THESIS["lower"]),
-        ("fastest spin \\[Hz]", f"{upper:.2f} for small motions", THESIS["upper"]),
-        ("sleeping top's limit \\[Hz]", f"{found.sleeping:.2f}", ""),
-        (
-            "the thesis's estimate \\[Hz]",
-            f"{found.thesis_estimate:.3f}, lacks the factor 2√(I₁/I₃)",
-            "14.005, lacks it, too",
-        ),
-        (f"modes at {found.scene.start.spin_hz:g} Hz \\[Hz]", _modes(found), ""),
-        ("up-and-down mode \\[Hz]", f"{found.vertical:.3f}", ""),
+        ("height [cm]", Text("{cm:.3f}", cm=100 * found.floating.height), THESIS["height"]),
+        ("mass [g]", Text("{g:.2f}", g=1000 * found.scene.top.mass_kg), THESIS["mass"]),
+        ("slowest spin [Hz]", Text(small, hz=lower), THESIS["lower"]),
+        ("fastest spin [Hz]", Text(small, hz=upper), THESIS["upper"]),
+        ("sleeping top's limit [Hz]", Text("{hz:.2f}", hz=found.sleeping), ""),
+        ("the thesis's estimate [Hz]", Text(lacks, hz=found.thesis_estimate), "14.005, lacks it, too"),
+        (Text("modes at {hz:g} Hz [Hz]", hz=found.scene.start.spin_hz), _modes(found), ""),
+        ("up-and-down mode [Hz]", Text("{hz:.3f}", hz=found.vertical), ""),
     ]
-    for what, here, there in rows:
-        table.add_row(what, here, *([there] if beside else []))
-    return table
+    heads = ("", "here", "in the thesis")
+    return table("The floating top", heads if beside else heads[:2], [row if beside else row[:2] for row in rows])
 
 
 def _modes(found: Stability) -> str:
-    grows = [f" ({'grows' if mode.imag < 0 else 'decays'})" if abs(mode.imag) > 1e-6 else "" for mode in found.modes]
-    return ", ".join(f"{with_decimals(mode.real, 3)}{word}" for mode, word in zip(found.modes, grows, strict=True))
+    return Text("{texts}", texts=tuple(map(_mode, found.modes)))
+
+
+def _mode(mode: complex) -> str:
+    said = "{hz:n} (grows)" if mode.imag < -1e-6 else "{hz:n} (decays)" if mode.imag > 1e-6 else "{hz:n}"
+    return Text(said, hz=with_decimals(mode.real, 3))
 
 
 def remarks(found: Stability) -> list[str]:
@@ -146,7 +157,8 @@ def remarks(found: Stability) -> list[str]:
     if found.floating and found.floating.spins:
         low, high = found.floating.spins[0]
         if not low < abs(scene.start.spin_hz) < high:
-            said.append(f"the scene's spin of {scene.start.spin_hz:g} Hz lies outside: the top is lost")
+            text = "the scene's spin of {hz:g} Hz lies outside: the top is lost"
+            said.append(Text(text, hz=scene.start.spin_hz))
     return said
 
 

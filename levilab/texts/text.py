@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
-from levilab.errors import UsageError
-from levilab.files import parse_toml
+from analysis.errors import AnalysisError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -53,10 +53,8 @@ def languages() -> tuple[str, ...]:
 
 @cache
 def language_of(code: str) -> Language:
-    """Return a language.  Raises UsageError."""
-    if code not in languages():
-        raise UsageError("language", f"one of {', '.join(languages())} is expected", value=code)
-    table = parse_toml((FOLDER / f"{code}.toml").read_text(encoding="utf-8"))
+    """Return a language."""
+    table = tomllib.loads((FOLDER / f"{code}.toml").read_text(encoding="utf-8"))
     parts = [part for part in table.values() if isinstance(part, dict)]
     texts = {english: text for part in parts for english, text in part.items()}
     return Language(table["name"], table["decimal"], table.get("page", {}), texts)
@@ -124,8 +122,8 @@ def text_from(table: Any, otherwise: str = "") -> str:
 
 def text_of(error: BaseException) -> str:
     """Return the message of an error, a Text where it is one."""
-    if isinstance(error, UsageError):
-        return Text("{name}: {text}" if error.value is None else "{name} = {value}: {text}", **vars(error))
+    if isinstance(error, AnalysisError):
+        return Text(error.sentence, **error.values)
     said = error.args[0] if error.args else ""
     return said if isinstance(said, Text) else str(error)
 
@@ -161,9 +159,8 @@ _of_process = ENGLISH
 
 
 def speak(code: str) -> None:
-    """Let this process speak a language.  Raises UsageError."""
+    """Let this process speak a language."""
     global _of_process  # noqa: PLW0603 - a process speaks to one person
-    language_of(code)
     _of_process = code
 
 

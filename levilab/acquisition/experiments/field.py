@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import TYPE_CHECKING
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
-from pydantic_core import PydanticCustomError
 
 from levilab.acquisition.experiment import Experiment, ExperimentSettings
 from levilab.acquisition.session import ExperimentFailed
@@ -89,19 +88,12 @@ class FieldSettings(ExperimentSettings):
     @model_validator(mode="after")
     def _heights_make_a_scan(self) -> Self:
         if not _FEWEST_HEIGHTS <= (self._count if math.isfinite(self.highest_m / self.step_m) else 0) <= _MOST_HEIGHTS:
-            raise PydanticCustomError(
-                "heights",
-                "lowest_m = {low}, highest_m = {high} and step_m = {step} make {count} heights, {least} to {most} are "
-                "expected",
-                {
-                    "low": f"{self.lowest_m:g}",
-                    "high": f"{self.highest_m:g}",
-                    "step": f"{self.step_m:g}",
-                    "count": str(max(self._count, 0)),
-                    "least": str(_FEWEST_HEIGHTS),
-                    "most": str(_MOST_HEIGHTS),
-                },
-            )
+            raise ValueError(Text(
+                "lowest_m = {low:g}, highest_m = {high:g} and step_m = {step:g} make {count} heights, "
+                "{least} to {most} are expected",
+                low=self.lowest_m, high=self.highest_m, step=self.step_m, count=max(self._count, 0),
+                least=_FEWEST_HEIGHTS, most=_MOST_HEIGHTS,
+            ))  # fmt: skip
         return self
 
     def check(self, table: str, limits: Limits) -> None:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
-from pydantic_core import PydanticCustomError
 
 from analysis.precession.gates import FEWEST, Gates, Rate, Swing, rates_at_point, swing_of
 from instruments.drivers.counter import LIGHT
@@ -139,12 +138,12 @@ class PrecessionSettings(DriveSettings):
         steps = abs(self.last_hz - self.first_hz) / self.step_hz
         points = len(self.frequencies_hz) if self.frequencies_hz is not None else steps + 1
         if not points <= _MOST_POINTS:
-            text = "a sweep of {points} points is more than {most}: take a larger step_hz"
-            raise PydanticCustomError("sweep", text, {"points": f"{points:.0f}", "most": _MOST_POINTS})
+            text = "a sweep of {points:.0f} points is more than {most}: take a larger step_hz"
+            raise ValueError(Text(text, points=points, most=_MOST_POINTS))
         if len(set(self.sweep)) < 3:
             text = "at least three drive frequencies are needed for a line: {seen} given by {names}"
             names = "frequencies_hz" if self.frequencies_hz is not None else "first_hz, last_hz and step_hz"
-            raise PydanticCustomError("sweep", text, {"seen": len(set(self.sweep)), "names": names})
+            raise ValueError(Text(text, seen=len(set(self.sweep)), names=names))
         return self
 
     def check(self, table: str, limits: Limits) -> None:

@@ -98,7 +98,7 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
         )
         floating = follow(scan, top)
     except AnalysisError as error:
-        raise DataError(f"{source.data}: {error}") from error
+        raise DataError("{path:s}: {error}", path=source.data, error=error) from error
     if floating is None:
         warnings = ["no top of this kind floats above this base at any mass and spin: are radii and inertias right?"]
     if readings.u is None:

@@ -36,8 +36,9 @@ def known_of(source: Source[FieldReadings], device: Device | None) -> Known:
     base = _base(source, of_run, device)
     if base.inner_radius_m is None or base.outer_radius_m is None:
         raise DataError(
-            f"{source.path}: the radii of the base are not known: write [base] with inner_radius_m and outer_radius_m "
-            "into a file, as sample_data/device.toml, and give it to levilab analyze field with `device`"
+            "{path:s}: the radii of the base are not known: write [base] with inner_radius_m and outer_radius_m into a "
+            "file, as sample_data/device.toml, and give it to levilab analyze field with `device`",
+            path=source.path,
         )
     magnetometer = device.magnetometer if device else None
     gain = magnetometer.gain_u if magnetometer and magnetometer.gain_u is not None else _number(of_run, "gain_u", 0.0)
@@ -68,7 +69,8 @@ def _merged(
     try:
         return table.model_validate(own | (given.model_dump(exclude_unset=True) if given else {}))
     except ValidationError as error:
-        raise DataError(f"{source.path}: configuration.field in run.json: {prefix}{in_one_line(error)}") from error
+        what = "{path:s}: configuration.field in run.json: {key:s}{fault}"
+        raise DataError(what, path=source.path, key=prefix, fault=in_one_line(error)) from error
 
 
 def _number(table: dict[str, Any], key: str, default: float) -> float:

@@ -273,7 +273,7 @@ def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
     try:
         statistics = summarize(_sample(source, which, options))
     except AnalysisError as error:
-        raise DataError(f"{source.data}: {error}") from error
+        raise DataError("{path:s}: {error}", path=source.data, error=error) from error
     conditions = _conditions(source, which, device)
     events = source.run.events() if source.run else []
     kinds = Counter(str(event["kind"]) for event in events)
@@ -407,7 +407,7 @@ def device_of(source: Source[LimitReadings]) -> Device:
         scene = scene_of(table)
         return described_device(scene, f"scene {scene.name}, {1000 * scene.top.mass_kg:g} g")
     except (SceneError, AnalysisError) as error:
-        raise DataError(f"{source.path}/run.json: configuration.scene: {error}") from error
+        raise DataError("{path:s}/run.json: configuration.scene: {error}", path=source.path, error=error) from error
 
 
 def described_device(scene: Scene, name: str) -> Device:

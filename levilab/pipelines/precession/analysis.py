@@ -97,7 +97,7 @@ def fit_source(source: Source[SweepReadings], options: PrecessionOptions) -> Pre
     try:
         fit = fit_sweep(sweep, orthogonal=options.orthogonal, keep_miscounts=options.keep_outliers)
     except AnalysisError as error:
-        raise DataError(f"{source.data}: {error}") from error
+        raise DataError("{path:s}: {error}", path=source.data, error=error) from error
     coherences, warnings = _coherences(source)
     return PrecessionRun(fit, coherences, warnings)
 

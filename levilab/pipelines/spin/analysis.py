@@ -293,7 +293,8 @@ def _spin_of(source: Source[Records], options: SpinOptions) -> SpinRun:
         return _of_several(records, options)
     except AnalysisError as error:
         channels = [note for note in records.warnings if kind_of(note) == "channels"]
-        raise DataError("; ".join([f"{source.path}: {error}", *channels])) from error
+        said = Text("{path:s}: {error}", path=source.path, error=error)
+        raise DataError(Sentences(said, *channels, between="; ")) from error
 
 
 def _of_times(times: Array) -> SpinRun:

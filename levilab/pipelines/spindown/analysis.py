@@ -89,7 +89,7 @@ def fit_source(source: Source[SpinReadings], options: SpinDownOptions) -> SpinDo
             correlated=options.correlation == "fitted",
         )
     except AnalysisError as error:
-        raise DataError(f"{source.data}: {error}") from error
+        raise DataError("{path:s}: {error}", path=source.data, error=error) from error
 
 
 def top_of_device(device: Device | None) -> Top:
@@ -102,7 +102,9 @@ def top_of_device(device: Device | None) -> Top:
     transverse, axial, _ = inertias(device.top)
     one, three = transverse.value or 0.0, axial.value or 0.0
     if not 0 < one < three:
-        raise DataError(f"the top of the device has I₁ = {one:g} and I₃ = {three:g} kg m²: I₁ < I₃ is expected")
+        raise DataError(
+            "the top of the device has I₁ = {one:g} and I₃ = {three:g} kg m²: I₁ < I₃ is expected", one=one, three=three
+        )
     share = one / three
     u = share * math.hypot((transverse.u or 0.0) / one, (axial.u or 0.0) / three)
     moment = (device.top.moment_a_m2 or THESIS["moment"][0]) / THESIS["moment"][0]

@@ -119,7 +119,9 @@ def _between(readings: SpinReadings, options: "InputOptions", path: "Path") -> S
     if inside.size < FEWEST:
         seen = f"{inside.size} of {how_many(len(readings), 'reading')} {span} are too few, at least {FEWEST} are needed"
         spins = f"{readings.frequency[0]:.4g} Hz to {readings.frequency[-1]:.4g} Hz"
-        raise DataError(f"{path}: {seen}: the spin goes from {spins}, choose `between` in it")
+        raise DataError(
+            "{path:s}: {seen}: the spin goes from {spins}, choose `between` in it", path=path, seen=seen, spins=spins
+        )
     part = slice(inside[0], inside[-1] + 1)
     u = None if readings.u is None else readings.u[part]
     kept = replace(readings, time=readings.time[part], frequency=readings.frequency[part], u=u)
@@ -247,7 +249,8 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> SpinReadings:
     u = table.column("spin_frequency_u_hz") if has_u else None
     if time.size < fewest:
         raise TableError(
-            table.path, f"holds {how_many(time.size, 'reading')}, at least {fewest} are needed: record longer"
+            table.path,
+            Text("holds {n} readings, at least {fewest} are needed: record longer", n=time.size, fewest=fewest),
         )
     _must_be_ordinary(table, time, frequency)
     if u is not None:
@@ -351,12 +354,13 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
             if turned
             else "sort the readings, or correct one"
         )
-        return TableError(table.path, f"{text}: {advice}", line=after)
+        return TableError(table.path, Text("{text}: {advice}", text=text, advice=advice), line=after)
     if isinstance(error, NotPositive):
         what, advice = _ABOVE_0[error.quantity]
         if error.quantity == "spin frequency" and error.value == 0:
             advice = "Hz, as after a fall or without a pulse: delete such rows"
-        return TableError(table.path, f"{what} is {error.value:.9g} {advice}", line=int(table.lines[error.index]))
+        text = Text("{what} is {value:.9g} {advice}", what=what, value=error.value, advice=advice)
+        return TableError(table.path, text, line=int(table.lines[error.index]))
     return TableError(table.path, str(error))
 
 

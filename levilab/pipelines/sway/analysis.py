@@ -130,7 +130,7 @@ def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRu
         swings = choose_lines(swings, at, known)
         geometry = geometric_magnetism(swings, at, known)
     except AnalysisError as error:
-        raise DataError(f"{source.data}: {error}") from error
+        raise DataError("{path:s}: {error}", path=source.data, error=error) from error
     return SwayRun(tuple(swings), at, geometry, False if beside else view, _in_words(geometry), unknown)
 
 

@@ -19,6 +19,7 @@ from levilab.pipelines.row import Quantity
 from levilab.pipelines.tune.owner import in_grams, washers_text
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.tables import Row, Table, table
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -37,7 +38,12 @@ _ROWS, _OUT_OF_REACH = 5, 0.8
 _UNLIKELY = 0.05
 #: A difference of temperature that is worth a word [K].
 _NOTABLE_K = 0.3
-_MET = {Outcome.RISES: "rose", Outcome.FLOATS: "floated", Outcome.SINKS: "sank", Outcome.SIDEWAYS: "slid off sideways"}
+MET = {
+    Outcome.RISES: "It rose at {mass:n} and {t:g} °C.",
+    Outcome.FLOATS: "It floated at {mass:n} and {t:g} °C.",
+    Outcome.SINKS: "It sank at {mass:n} and {t:g} °C.",
+    Outcome.SIDEWAYS: "It slid off sideways at {mass:n} and {t:g} °C.",
+}
 
 
 @dataclass(frozen=True)
@@ -80,8 +86,8 @@ class Advice:
     @property
     def text(self) -> str:
         """The next step, in a sentence."""
-        weighs, chance = in_grams(self.best.mass_kg), _percent(self.best.floats)
-        return f"{self._step}: the top then weighs {weighs} and floats with a chance of {chance}."
+        said = "{step}: the top then weighs {mass:n} and floats with a chance of {chance}."
+        return Text(said, step=self._step, mass=in_grams(self.best.mass_kg), chance=_percent(self.best.floats))
 
     @property
     def _step(self) -> str:
@@ -89,56 +95,61 @@ class Advice:
         if last and last.outcome is Outcome.SIDEWAYS and last.washers == self.best.washers_kg:
             return "Raise the base on the side to which the top slid, and leave the washers as they are"
         if last is None or last.washers is None:
-            return f"Put on {_named(self.best.washers_kg)}" if self.best.washers_kg else "Take no washers"
+            put_on = Text("Put on {washers}", washers=_named(self.best.washers_kg))
+            return put_on if self.best.washers_kg else "Take no washers"
         on, wanted = Counter(last.washers), Counter(self.best.washers_kg)
-        changes = [("take off", on - wanted), ("add", wanted - on)]
-        steps = [f"{verb} {_named(sorted(some.elements()))}" for verb, some in changes if some]
-        text = " and ".join(steps) or "leave the washers as they are"
-        return text[0].upper() + text[1:]
+        off, more = (_named([*some.elements()]) for some in (on - wanted, wanted - on))
+        if off:
+            return Text("Take off {off} and add {on}" if more else "Take off {off}", off=off, on=more)
+        return Text("Add {on}", on=more) if more else "Leave the washers as they are"
 
     @property
     def why(self) -> str:
         """The reason, in one or two sentences."""
-        parts = [*self._reasons, f"the middle of the window is now estimated at {self._show('mass_to_set')}."]
-        text = "; ".join(parts)
-        return f"{text[0].upper()}{text[1:]}{self._likelier}{self._beyond_reach}"
+        middle = Text("The middle of the window is now estimated at {mass:n}.", mass=self._show("mass_to_set"))
+        return Sentences(*self._reasons, middle, self._likelier, self._beyond_reach)
 
     @property
     def _likelier(self) -> str:
-        """Return why another choice of the table is not the best, as a sentence behind a blank; empty where none is."""
+        """Return why another choice of the table is not the best; empty where none is."""
         most = max(self.choices, key=lambda one: one.floats)
         chance = _percent(most.floats)
         if chance == _percent(self.best.floats):
             return ""
         on = self.owner.attempts[-1].washers if self.owner.attempts else None
         few = _changes(on, self.best.washers_kg) < _changes(on, most.washers_kg)
-        reason = "takes more changes" if few else "leaves less to try next if it fails"
-        return f" {washers_text(most.washers_kg)} floats with {chance}, but {reason}."
+        said = "{washers:n} floats with {chance}, but takes more changes."
+        said = said if few else "{washers:n} floats with {chance}, but leaves less to try next if it fails."
+        return Text(said, washers=washers_text(most.washers_kg), chance=chance)
 
     @property
     def _reasons(self) -> Iterator[str]:
-        """Yield the last trial, the change of temperature and the scan, as clauses."""
+        """Yield the last trial, the change of temperature and the scan, as sentences."""
         scan, last = self.owner.scan, self.owner.attempts[-1] if self.owner.attempts else None
         if last:
-            yield f"it {_MET[last.outcome]} at {in_grams(last.mass)} and {last.temperature:g} °C"
+            yield Text(MET[last.outcome], mass=in_grams(last.mass), t=last.temperature)
             if abs(warmer := self.temperature - last.temperature) >= _NOTABLE_K:
                 change = with_minus(f"{1e3 * warmer * (self.values['mass_per_kelvin'].value or 0.0):+.2f}")
-                word = "warmer" if warmer > 0 else "colder"
-                yield f"today is {digits(abs(warmer))} K {word}, which moves the window by {change} g"
+                said = "Today is {kelvin:n} K warmer, which moves the window by {change:n} g."
+                said = said if warmer > 0 else "Today is {kelvin:n} K colder, which moves the window by {change:n} g."
+                yield Text(said, kelvin=digits(abs(warmer)), change=change)
         if scan:
-            yield f"by the scan the middle was {_in_people_units(scan.middle)} at {scan.temperature_c:g} °C"
+            said = "By the scan the middle was {mass:n} at {t:g} °C."
+            yield Text(said, mass=_in_people_units(scan.middle), t=scan.temperature_c)
         elif not last:
-            yield "nothing is known yet, and a mass in the middle of the washers' reach tells most"
+            yield "Nothing is known yet, and a mass in the middle of the washers' reach tells most."
 
     @property
     def _beyond_reach(self) -> str:
-        """Return the mass beyond the reach of the washers, as a sentence behind a blank; empty within it."""
+        """Return the mass beyond the reach of the washers, as a sentence; empty within it."""
         middle, top = self.values["mass_to_set"].value or 0.0, self.owner.top or 0.0
         heaviest = top + sum(self.owner.washers)
         if self.best.rises > _OUT_OF_REACH and middle > heaviest:
-            return f" Even with all washers it would rise: {digits(1e3 * (middle - heaviest))} g more are needed."
+            more = "Even with all washers it would rise: {g:n} g more are needed."
+            return Text(more, g=digits(1e3 * (middle - heaviest)))
         if self.best.sinks > _OUT_OF_REACH and middle < top:
-            return f" Even without washers it would sink: it is {digits(1e3 * (top - middle))} g too heavy today."
+            less = "Even without washers it would sink: it is {g:n} g too heavy today."
+            return Text(less, g=digits(1e3 * (top - middle)))
         return ""
 
     @property
@@ -147,10 +158,11 @@ class Advice:
         texts = []
         for number, one in enumerate(self.owner.attempts, 1):
             if one.outcome is not Outcome.SIDEWAYS and self.posterior.chance_by_others(one) < _UNLIKELY:
-                texts.append(
-                    f"trial {number} ({one.text}) does not go with the other trials or the scan: was it let go badly, "
-                    "or is a mass, a temperature or the scan wrong?"
+                said = (
+                    "trial {number} ({trial:s}) does not go with the other trials or the scan: was it let go badly, or "
+                    "is a mass, a temperature or the scan wrong?"
                 )
+                texts.append(Text(said, number=number, trial=one.text))
         return tuple(texts)
 
     @property
@@ -160,10 +172,10 @@ class Advice:
         of_washers = ""
         if smallest:
             n = Estimate((width.value or 0.0) / smallest, (width.u or 0.0) / smallest, "1")
-            of_washers = f" ({with_uncertainty(n)} washers of {in_grams(smallest)})"
+            of_washers = Text(" ({n:n} washers of {mass:n})", n=with_uncertainty(n), mass=in_grams(smallest))
         mass, wide, moves = map(self._show, ("mass_to_set", "window_width", "mass_per_kelvin"))
-        at = f"Mass to set at {self.temperature:g} °C: {mass}"
-        return f"{at}; the window is {wide} wide{of_washers} and moves by {moves}."
+        said = "Mass to set at {t:g} °C: {mass:n}; the window is {wide:n} wide{washers} and moves by {moves:n}."
+        return Text(said, t=self.temperature, mass=mass, wide=wide, washers=of_washers, moves=moves)
 
     @property
     def table(self) -> Table:
@@ -171,12 +183,12 @@ class Advice:
         heads = ("washers", "mass", "rises", "floats", "sinks")
         rows = [
             Row((
-                washers_text(one.washers_kg), in_grams(one.mass_kg),
+                Text("{washers:n}", washers=washers_text(one.washers_kg)), in_grams(one.mass_kg),
                 *map(_percent, (one.rises, one.floats, one.sinks)),
             ), "best" * (one is self.best))
             for one in self.choices
         ]  # fmt: skip
-        return table(f"Which washers at {self.temperature:g} °C", heads, rows, numbers=heads[1:])
+        return table(Text("Which washers at {t:g} °C", t=self.temperature), heads, rows, numbers=heads[1:])
 
     def as_dict(self) -> dict[str, Any]:
         """Return all of it in SI, for JSON."""
@@ -247,9 +259,10 @@ def _named(washers: Sequence[float]) -> str:
     >>> _named([6e-5, 6e-5, 1e-4]), _named([1e-4])
     ('2 washers of 0.06 g and the 0.1 g washer', 'the 0.1 g washer')
     """
-    counts = sorted(Counter(washers).items())
-    names = [f"{n} washers of {in_grams(one)}" if n > 1 else f"the {in_grams(one)} washer" for one, n in counts]
-    return enumeration(names)
+    return enumeration([
+        Text("{n} washers of {mass:n}" if n > 1 else "the {mass:n} washer", n=n, mass=in_grams(one))
+        for one, n in sorted(Counter(washers).items())
+    ] or [""])  # fmt: skip
 
 
 def _percent(chance: float) -> str:

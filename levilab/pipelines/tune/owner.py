@@ -20,13 +20,17 @@ from levilab.pipelines.options import read_options
 from levilab.pipelines.suits import recall_suiting
 from levilab.runs.find import find_run
 from levilab.settings import Settings, in_one_line
+from levilab.texts.text import ENGLISH, Text, in_language, spoken
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
 _HEAD = "# Kept by levilab tune; a trial that is wrong may be corrected here, or its line deleted.\n"
-_TRIAL = 'a mass or washers, a temperature and an outcome, such as "0.06 + 0.1 g, 20.5 C, rises", are expected'
+_TRIAL = (
+    'a mass or washers, a temperature and an outcome, such as "0.06 + 0.1 g, 20.5 C, rises", are expected; the '
+    "outcome is one of {names}"
+)
 #: A lone mass is that of the whole top from this share of the bare top's on, and else that of a washer.
 _WHOLE = 0.5
 
@@ -91,9 +95,8 @@ class Owner:
         """Return the owner with these washers [kg].  Raises ValueError where one is as heavy as a top."""
         heaviest = max(masses, default=0.0)
         if self.top is not None and heaviest >= _WHOLE * self.top:
-            raise ValueError(
-                f"a washer of {in_grams(heaviest)} on a top of {in_grams(self.top)}? mg are typed as 60 mg"
-            )
+            said = "a washer of {washer:n} on a top of {top:n}? mg are typed as 60 mg"
+            raise ValueError(Text(said, washer=in_grams(heaviest), top=in_grams(self.top)))
         return replace(self, washers=tuple(sorted(masses)))
 
     def with_trial(self, text: str) -> Owner:
@@ -102,17 +105,18 @@ class Owner:
 
     def _attempt(self, text: str) -> Attempt:
         *masses, temperature, did = (piece.strip() for piece in ("," * (2 - text.count(",")) + text).split(","))
-        outcomes = [one for one in Outcome if did and one.value.startswith(did.casefold())]
+        words = [(one, in_language(one.value, code)) for code in {ENGLISH, spoken()} for one in Outcome]
+        outcomes = [one for one, word in words if did and word.startswith(did.casefold())]
         if len(outcomes) != 1 or not masses[0]:
-            names = ", ".join(one.value for one in Outcome)
-            raise ValueError(f"{_TRIAL}; the outcome is one of {names}")
+            raise ValueError(Text(_TRIAL, names=tuple(one.value for one in Outcome)))
         typed, degrees = read_masses(",".join(masses)), read_temperature(temperature)
         if self.top is None:
             raise ValueError("the mass of the top without washers is needed first: `top`")
         if len(typed) == 1 and typed[0] >= _WHOLE * self.top:
             return Attempt(typed[0], degrees, outcomes[0])
         if sum(typed) >= _WHOLE * self.top:
-            raise ValueError(f"washers of {in_grams(sum(typed))} on a top of {in_grams(self.top)}? {_TRIAL}")
+            said = "washers of {washers:n} on a top of {top:n}? mg are typed as 60 mg"
+            raise ValueError(Text(said, washers=in_grams(sum(typed)), top=in_grams(self.top)))
         return Attempt(self.top + sum(typed), degrees, outcomes[0], tuple(sorted(typed)))
 
 
@@ -159,10 +163,12 @@ def read_owner(path: Path) -> Owner:
             owner = owner.with_trial(text)
     except ValidationError as error:
         raise DataError(
-            f'{path}: {in_one_line(error, _Table)}; top, washers and trials are texts, as "24.98 g"'
-        ) from error
+            '{path:s}: {fault}; top, washers and trials are texts, as "24.98 g"',
+            path=path, fault=in_one_line(error, _Table),
+        ) from error  # fmt: skip
     except ValueError as error:
-        raise DataError(f"{path}: {where}{error}: correct it, or delete the file and begin again") from error
+        what = "{path:s}: {where:s}{error}: correct it, or delete the file and begin again"
+        raise DataError(what, path=path, where=where, error=error) from error
     return owner
 
 
@@ -202,20 +208,21 @@ def read_scan(path: Path, temperature: float | None, device: Path | None, tell: 
     results = recall_suiting([path], read_options({"device": device}, typed=True))
     found = next((result for one, result in results if one.name == "field"), None)
     if found is None:
-        raise DataError(f"{path}: is no Hall scan: one of levilab acquire field, or a table of heights and field")
+        raise DataError("{path:s}: is no Hall scan, a run of field or a table of heights and field", path=path)
     if "mass_to_set" not in found.values:
-        raise DataError(f"{path}: no top floats above this base, see levilab analyze field")
+        raise DataError("{path:s}: no top floats above this base, see levilab analyze field", path=path)
     (source, *_), (run, *_) = found.sources, found.runs
     if not run.top.weighed and not run.top.moment.u:
         raise DataError(
-            f"{path}: the moment of your top and its u are not known, so no mass follows: give them with `device`, or "
-            "first levilab analyze field with --device and --height, where a top floats"
+            "{path:s}: the moment of your top and its u are not known, so no mass follows: give them with `device`, or "
+            "first levilab analyze field with --device and --height, where a top floats",
+            path=path,
         )
     noted = source.run.record.temperature_c if source.run else None
     if temperature is None and noted is None:
         raise UsageError("scan_temperature", "is needed with `scan`: the temperature of the base at the scan")
     for text in run.warnings:
-        tell(f"note: {text}")
+        tell(Text("note: {text}", text=text))
     mass, lightest, heaviest = (found.values[name] for name in ("mass_to_set", "lightest_mass", "heaviest_mass"))
     value = float(mass.value or 0.0)
     u = math.hypot(mass.u or 0.0, 0.0 if run.top.weighed or run.top.magnet else _POINT_U * value)

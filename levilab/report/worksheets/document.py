@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
-from levilab.errors import UsageError
+from levilab.errors import UsageError, check_language
 from levilab.files import parse_toml, replace_atomically, writing
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.present.document.blocks import (
@@ -31,7 +31,7 @@ from levilab.report.groups.beside import class_of
 from levilab.report.groups.document import truth_text
 from levilab.report.page import FORMATS
 from levilab.report.worksheets.sheets import SHEETS, TOPS
-from levilab.texts.text import ENGLISH, Text, in_language, language_of
+from levilab.texts.text import ENGLISH, Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -70,7 +70,7 @@ class Language:
 
 def read_language(code: str) -> Language:
     """Return a language.  Raises UsageError."""
-    language_of(code)
+    check_language(code)
     table = parse_toml(_TEXTS.read_text(encoding="utf-8"))
     sheets = {}
     for name in SHEETS:

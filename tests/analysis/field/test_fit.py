@@ -124,9 +124,9 @@ def test_an_uncertainty_that_is_common_to_all_is_recognised():
 @pytest.mark.parametrize(
     ("z", "b", "error", "says"),
     [
-        (Z[:2], scan()[:2], TooFewHeights, "readings at 2 heights (from 30 to 35 mm), at least 4 are needed"),
-        (np.full(9, 0.07), scan()[:9], TooFewHeights, "readings at 1 height (all at 70 mm)"),
-        (Z[:0], Z[:0], TooFewHeights, "readings at 0 heights"),
+        (Z[:2], scan()[:2], TooFewHeights, "heights: 2, from 30 to 35 mm, at least 4 are needed"),
+        (np.full(9, 0.07), scan()[:9], TooFewHeights, "different heights: 1, from 70"),
+        (Z[:0], Z[:0], TooFewHeights, "heights: 0, at least 4 are needed: scan on"),
         (Z, 1e-3 * scan(), NoField, "nowhere above 0.0246 mT"),
         (Z, np.minimum(scan(), 0.0200), FieldStandsStill, "stays at 20 mT from 45 to 70 mm"),
         (Z, scan() * np.where(Z > 0.08, -1, 1), FieldTurnsOver, "between 80 and 85 mm"),

@@ -11,11 +11,13 @@ from unittest.mock import Mock
 
 import pytest
 
+from analysis.errors import AnalysisError
 from analysis.precession.miscounts import Miscount
+from analysis.pulses.errors import OnlyHum, TooFewPulses
 from analysis.uncertainty import Estimate
 from levilab.acquisition.given import settings_without_bench, with_given_settings
 from levilab.acquisition.table import EXPERIMENTS
-from levilab.errors import UsageError
+from levilab.errors import LevilabError, UsageError, check_language
 from levilab.formats.kinds import EMPTY, KINDS, OTHER
 from levilab.live.practice.experiments import PRACTICE
 from levilab.live.practice.tasks import TASKS
@@ -23,17 +25,24 @@ from levilab.live.practice.what_if import WHAT_IF
 from levilab.live.server import PAGE
 from levilab.live.views import VIEWS
 from levilab.live.words import change_texts
+from levilab.motion.effects import KINDS as EFFECTS
+from levilab.motion.effects import field_kinds
+from levilab.motion.summary import ENDINGS, FALLS
 from levilab.pipelines.analyzed import EachAlone
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.look import QUANTITIES
 from levilab.pipelines.precession.words import miscount_as_text
 from levilab.pipelines.sources import OTHER_COLUMNS
+from levilab.pipelines.tune.advice import MET
 from levilab.present.document.blocks import in_language_of_reader
 from levilab.present.numbers import with_uncertainty
 from levilab.present.tables import table
 from levilab.present.units import split
 from levilab.report.worksheets.document import read_language
 from levilab.report.worksheets.sheets import TOPS
+from levilab.settings import KINDS as OF_SETTINGS
+from levilab.settings import LIMITS, WHOLE
+from levilab.simulator.scene import REMARKS, RULES, SWITCHES, Scene
 from levilab.texts.text import Text, in_language, language_of, languages, speak, text_from, text_of
 from support.paths import SAMPLE_DATA
 from support.sources import sources
@@ -49,8 +58,8 @@ SAYING = {
     "ExperimentFailed": 0, "DidNotFollow": 0, "NoLight": 0, "_unfit": 0,
 }  # fmt: skip
 ROOMS = ("levilab.live.", "levilab.acquisition.")
-#: Errors that make a `Text` of what they are given.
-WITH_VALUES = ("ConfigError", "CannotResume", "ExperimentFailed", "DidNotFollow", "NoLight")
+#: Arguments of errors that are not values of a sentence.
+NO_VALUES = {"line", "value", "kind", "doubt", "reasons", "left_out"}
 _LITERAL = r'"((?:[^"\\]|\\.)*)"'
 #: In JavaScript: a text, or one of two.
 _PHRASE = re.compile(rf"phrase\((?:[^()\"]*\?)?\s*{_LITERAL}(?:\s*:\s*{_LITERAL})?")
@@ -108,17 +117,47 @@ def of_files() -> set[str]:
     return texts | needed | runs | {f"{r}s" for r in runs}
 
 
+def errors(base: type[Exception]) -> set[str]:
+    """The names of a class of errors and of those below it."""
+    return {base.__name__}.union(*map(errors, base.__subclasses__()))
+
+
+def of_analyses() -> set[str]:
+    """What errors of the analyses say, and of what."""
+    found: set[str] = set()
+    calls = [(name, node) for name, tree in sources().items() for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    for name, call in calls:
+        if name.startswith("analysis.") and ast.unparse(call.func) in {"super().__init__", *errors(AnalysisError)}:
+            found |= {text for one in (*call.args, *(word.value for word in call.keywords)) for text in strings(one)}
+    return found | {TooFewPulses.HINT, OnlyHum.HINT}
+
+
+def of_scenes() -> set[str]:
+    """What is said of a scene's settings and of its effects."""
+    effects = {text for one in (*EFFECTS, *field_kinds(Scene())) for text in (one.name, one.what)}
+    settings = {one.expected for one in RULES} | {one.text for one in REMARKS} | {one.why for one in SWITCHES}
+    tables = (FALLS, ENDINGS, MET, LIMITS, OF_SETTINGS, WHOLE)
+    return effects.union(settings, *(table.values() for table in tables))
+
+
 def of_program() -> set[str]:
     """What the program says in sentences: each `Text`, and what the functions of SAYING are given."""
-    found: set[str] = set()
+    found = of_analyses() | of_scenes()
+    refusals = errors(LevilabError)
     for name, tree in sources().items():
+        named: dict[str, set[str]] = {}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+                known = (text for text in strings(node.value) if not text.startswith("f-string"))
+                named.setdefault(node.targets[0].id, set()).update(known)
         for call in ast.walk(tree):
             if not isinstance(call, ast.Call):
                 continue
             called = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
-            said = call.args if called in WITH_VALUES and call.keywords else call.args[: called in {"Text", "title_of"}]
+            has_values = called in refusals and {word.arg for word in call.keywords} - NO_VALUES
+            said = call.args if has_values else call.args[: called in {"Text", "title_of"}]
             if said and name.startswith("levilab."):
-                found |= {text for one in said for text in strings(one)}
+                found |= {text for one in said for text in (*strings(one), *named.get(ast.unparse(one), ()))}
             elif called in SAYING and name.startswith(ROOMS) and len(call.args) > SAYING[called]:
                 found |= {*strings(call.args[SAYING[called]])}
     return found
@@ -205,7 +244,7 @@ def test_a_process_speaks_one_language_and_no_unknown_one(monkeypatch: pytest.Mo
     speak("de")
     assert in_language("the top follows the drive") == "der Kreisel folgt dem Antrieb"
     with pytest.raises(UsageError, match="language = xx: one of de, en is expected"):
-        speak("xx")
+        check_language("xx")
 
 
 def test_a_name_keeps_its_point_and_a_number_gets_a_comma() -> None:
@@ -245,6 +284,7 @@ def test_a_miscount_is_a_german_sentence(times: tuple[int, int], said: str) -> N
     [
         ("gate_s=abc", "erwartet wird eine Zahl über 0 [s]; levilab acquire spin --settings zeigt alle"),
         ("gates=1", "meintest du spin.gate_s"),
+        ("gate_s=99", "gate_s = 99 muss kürzer sein als interval_s = 10"),
     ],
 )
 def test_a_wrong_setting_is_answered_in_german(given: str, said: str) -> None:
@@ -253,3 +293,21 @@ def test_a_wrong_setting_is_answered_in_german(given: str, said: str) -> None:
     german = in_language(text_of(refused.value), "de")
     assert said in german
     assert " or " not in german
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "simulate tilted --duration 2 --explain", "simulate driven --duration 9 --set drive.off_s=1", "stability sway",
+        "stability undriven --set top.mass_kg=0.03", "simulate undriven --set top.masse=3",
+        "simulate undriven --set base.outer_radius_m=0.01", "simulate undriven --set top.mass_kg=abc",
+        "simulate undriven --duration abc", "tune --top 24.9 --temperature x",
+        "tune --top 24.9 --temperature 21 --washers 0.06,0.1 --trial 0.1g,20C,steigt --trial 0.06g,20C,seitlich",
+    ],
+)  # fmt: skip
+def test_what_a_command_says_is_german_to_the_last_word(levilab, words, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+    monkeypatch.setenv("LEVILAB_LANGUAGE", "de")
+    done = levilab(*words.split(), check=None)
+    said = set(re.findall(r"\w+", done.stdout + done.stderr))
+    assert len(said) > 5
+    assert {"the", "of", "is", "are", "and", "to", "with", "not", "it", "or", "at"} & said == set()

@@ -108,7 +108,7 @@ def test_a_damaged_file_is_named_with_its_fault(text, seen, tmp_path):
 def test_after_a_top_that_rose_washers_are_added():
     advice = advise(told("0.06 g, 21 C, rises"), 21.0)
     assert advice.text.startswith("Add the 0.")
-    assert advice.why.startswith("It rose at 24.96 g and 21 °C; the middle")
+    assert advice.why.startswith("It rose at 24.96 g and 21 °C. The middle")
     assert advice.best.floats == max(one.floats for one in advice.choices) or len(advice.best.washers_kg) < 4
     assert sum((advice.best.rises, advice.best.floats, advice.best.sinks)) == pytest.approx(1)
 
@@ -118,7 +118,7 @@ def test_warmth_takes_washers_off_and_says_why():
     same, warm = advise(owner, 19.0), advise(owner, 21.0)
     assert sum(warm.best.washers_kg) < sum(same.best.washers_kg)
     assert "Take off" in warm.text
-    assert "today is 2 K warmer, which moves the window by −0.2" in warm.why
+    assert "Today is 2 K warmer, which moves the window by −0.2" in warm.why
 
 
 def test_what_floated_stays_as_it_is():
