@@ -90,9 +90,8 @@ def _key_and_text(now: ExperimentSettings, experiment: str, setting: str) -> tup
     if name != experiment:
         expected = Text(
             "is a setting of levilab acquire {name:s}, this is levilab acquire {experiment:s}",
-            name=name,
-            experiment=experiment,
-        )
+            name=name, experiment=experiment,
+        )  # fmt: skip
         raise UsageError("settings", expected, value=setting)
     _refuse_unknown(now, experiment, field)
     return field, text
@@ -101,9 +100,8 @@ def _key_and_text(now: ExperimentSettings, experiment: str, setting: str) -> tup
 def _wrong_form(experiment: str, setting: str, why: str = "") -> UsageError:
     what = Text(
         "{why}{experiment:s}.KEY=VALUE is expected; levilab acquire {experiment:s} --settings lists all",
-        why=why,
-        experiment=experiment,
-    )
+        why=why, experiment=experiment,
+    )  # fmt: skip
     return UsageError("settings", what, value=setting)
 
 

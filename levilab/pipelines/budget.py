@@ -310,6 +310,8 @@ def _by_itself(
     return Details(Text("{name:s} by itself", name=source.name), blocks, on_paper="whole" if is_printed else "out")
 
 
+#: Of several results these first ones have their budget on paper, the others a line.
+_PRINTED = 2
 #: From so many runs on their budgets are not printed on paper, but for the first one where no mean has one; and so many
 #: are in a report.
 _MANY, _MOST_RUNS = 3, 12
@@ -333,12 +335,14 @@ def budget_blocks(
     said = [sentences_of(budget, shown) for budget in budgets]
     counts = Counter(text for texts in said for text in texts)
     of_all = [text for text, count in counts.items() if count > 1]
-    for budget, texts in zip(budgets, said, strict=True):
+    for k, (budget, texts) in enumerate(zip(budgets, said, strict=True)):
+        on_paper: Literal["whole", "summary"] = "whole" if k < _PRINTED else "summary"
         words = " ".join(filter(None, ("budget", of, budget.model, budget.quantity)))
         name = re.sub(r"[^a-z0-9]+", "-", words.casefold()).strip("-")
         found = budget_table(budget, shown)
         part = Tabular(name, replace(found, title=""), first_column_wraps=True, mark=mark(budget) if mark else None)
-        blocks.append(Details(found.title, (part,), more=Sentences(*(text for text in texts if text not in of_all))))
+        more = Sentences(*(text for text in texts if text not in of_all))
+        blocks.append(Details(found.title, (part,), more=more, on_paper=on_paper))
     blocks += [Paragraph(Sentences(*of_all))] if of_all else []
     notes = notes_of(budgets)
     if notes:

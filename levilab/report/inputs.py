@@ -186,10 +186,11 @@ def _events(source: Source[Any]) -> tuple[Block, ...]:
     rows = [(_moment(event, zero), text_from(event.get("says"), event["text"])) for event in events[:MOST_EVENTS]]
     left_out = len(events) - MOST_EVENTS
     note = Text("and {n} more, in events.jsonl", n=left_out) if left_out > 0 else ""
+    if len(rows) <= _FEW_EVENTS:
+        said = tuple(Text("{at:n}: {text}", at=at, text=text) if at else text for at, text in rows)
+        return (Facts((Fact("What happened", said),)),)
     heads = ("at", "what happened")
     shown = Tabular("events", table("", heads, rows, numbers=heads[:1]), note, wraps=heads[1:])
-    if len(rows) <= _FEW_EVENTS:
-        return (Section("What happened", (shown,)),)
     return (Details("What happened", (shown,), more=Text("{n} events", n=len(events)), on_paper="out"),)
 
 

@@ -85,10 +85,8 @@ def scans_as_text(means: Mapping[str, Estimate], runs: int, scatter: float) -> s
     share = 100 * scatter / abs(strength.value or 1.0)
     said = Text(
         "{runs} scans: {strength:n} in the mean; one differs from another by {percent:n} %.",
-        runs=runs,
-        strength=_format("strength", strength),
-        percent=digits(share),
-    )
+        runs=runs, strength=_format("strength", strength), percent=digits(share),
+    )  # fmt: skip
     return Sentences(said, *_advice(means))
 
 
@@ -96,10 +94,9 @@ def scan_as_text(scan: FieldScan, floating: Floating | None) -> str:
     """Return what a scan says, in a few sentences."""
     base = Text(
         "The base has the strength ρ = {strength:n}, its middle at {origin:n}; its field points {pole} above it.",
-        strength=_format("strength", scan.parameters["strength"]),
-        origin=_format("origin", scan.parameters["origin"]),
+        strength=_format("strength", scan.parameters["strength"]), origin=_format("origin", scan.parameters["origin"]),
         pole=_pole(scan),
-    )
+    )  # fmt: skip
     tops = _advice(floating.values) if floating else ("No top floats above this base.",)
     return Sentences(*tops, base, *_learned(scan))
 
@@ -126,10 +123,9 @@ def _learned(scan: FieldScan) -> Iterator[str]:
     for one, other in pairs:
         yield Text(
             "{one} and {other} can hardly be distinguished (correlation {correlation:n}).",
-            one=one.replace("_", " ").capitalize(),
-            other=other.replace("_", " "),
+            one=one.replace("_", " ").capitalize(), other=other.replace("_", " "),
             correlation=digits(scan.correlation(one, other)),
-        )
+        )  # fmt: skip
 
 
 def _advice(values: Mapping[str, Estimate]) -> Iterator[str]:
@@ -180,13 +176,9 @@ def _contradicts(found: float, stated: float, u: float, name: str) -> str:
         "the scan wants {name} = {found:.4g} {unit:s}, which lies {times:.1f} u from the stated "
         "{stated:.4g} {unit:s} (u = {u:n} {unit}): measure it again, and where the heights are "
         "counted from",
-        name=name.replace("_", " "),
-        found=times * found,
-        unit=unit,
-        times=abs(found - stated) / u,
-        stated=times * stated,
-        u=digits(times * u),
-    )
+        name=name.replace("_", " "), found=times * found, unit=unit, times=abs(found - stated) / u,
+        stated=times * stated, u=digits(times * u),
+    )  # fmt: skip
 
 
 _REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(

@@ -47,17 +47,14 @@ def _about_lock(fit: SweepFit) -> str:
         return Text(
             "The stem goes round once for each turn of the drive: slope 1 and intercept 0 agree with the {n} points "
             "(p = {p:n}).",
-            n=fit.line.n,
-            p=plain(p, 2),
-        )
+            n=fit.line.n, p=plain(p, 2),
+        )  # fmt: skip
     return Text(
         "The stem does not go round once for each turn of the drive: slope 1 and intercept 0 are excluded (p = {p:n}), "
         "and the precession that was counted lies {off:n} Hz {side} the drive at {drive:.4g} Hz.",
-        p=plain(p, 1),
-        off=digits(abs(_offset(fit))),
-        side="above" if _offset(fit) > 0 else "below",
+        p=plain(p, 1), off=digits(abs(_offset(fit))), side="above" if _offset(fit) > 0 else "below",
         drive=fit.line.centre,
-    )
+    )  # fmt: skip
 
 
 def _offset(fit: SweepFit) -> float:
@@ -73,15 +70,10 @@ def _about_power(power: Power) -> str:
         "These points would distinguish a slope of {slope:g} from 1 in {percent:.0f} % of cases only. It takes "
         "{points} points such as these ({now} now), a range of {range:n} Hz ({range_now:n} Hz now), or a u of {u:n} Hz "
         "a point ({u_now:n} Hz now), for nine cases of ten.",
-        slope=power.slope,
-        percent=100 * power.now,
-        points=points,
-        now=power.points,
-        range=plain(power.range_needed_hz, 2),
-        range_now=plain(power.range_hz, 2),
-        u=plain(power.u_needed_hz, 2),
+        slope=power.slope, percent=100 * power.now, points=points, now=power.points,
+        range=plain(power.range_needed_hz, 2), range_now=plain(power.range_hz, 2), u=plain(power.u_needed_hz, 2),
         u_now=plain(power.u_hz, 2),
-    )
+    )  # fmt: skip
 
 
 def at_most(probability: float) -> str:
@@ -120,12 +112,8 @@ def _miscount(points: tuple[Point, ...], k: float, gates_known: float = 1.0) -> 
     )
     return Text(
         "point {number:.0f}, {hz:.5g} Hz at a drive of {drive:.5g} Hz: {what}{end}",
-        number=k + 1,
-        hz=point.precession,
-        drive=point.drive,
-        what=miscount_as_text(point.miscount),
-        end=end,
-    )
+        number=k + 1, hz=point.precession, drive=point.drive, what=miscount_as_text(point.miscount), end=end,
+    )  # fmt: skip
 
 
 def _point(points: tuple[Point, ...], k: float) -> str:

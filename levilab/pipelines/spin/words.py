@@ -82,12 +82,9 @@ def _unlike(hertz: float, time: float, other_hertz: float, other_time: float, nu
     return Text(
         "neighbouring windows have {hertz:.4g} Hz at {time:.4g} s and {other_hertz:.4g} Hz at {other_time:.4g} s: "
         "pulses are missing or doubled in a pattern{often}",
-        hertz=hertz,
-        time=time,
-        other_hertz=other_hertz,
-        other_time=other_time,
+        hertz=hertz, time=time, other_hertz=other_hertz, other_time=other_time,
         often=Text(" ({number} times)", number=number) if number > 1 else "",
-    )
+    )  # fmt: skip
 
 
 def _choices(folds: tuple[float, ...]) -> str:
@@ -101,32 +98,24 @@ def _fold_doubt(rate: float, *folds: float) -> str:
     return Text(
         "at {rate:.4g} samples/s the spin may be {choices:n} Hz: the times are too even and the slope too small to "
         "know; choose with `near` = {first:.0f} or {other:.0f}",
-        rate=rate,
-        choices=_choices(folds),
-        first=folds[0],
-        other=folds[1],
-    )
+        rate=rate, choices=_choices(folds), first=folds[0], other=folds[1],
+    )  # fmt: skip
 
 
 def _folded(rate: float, *folds: float) -> str:
     return Text(
         "{first:.2f} Hz is above half of {rate:.4g} samples/s, where it looks like {choices:n} Hz: if a drive speeds "
         "the top up, choose with `near` = {other:.0f}",
-        first=folds[0],
-        rate=rate,
-        choices=_choices(folds[1:]),
-        other=folds[1],
-    )
+        first=folds[0], rate=rate, choices=_choices(folds[1:]), other=folds[1],
+    )  # fmt: skip
 
 
 def _fold_by_slope(rate: float, *folds: float) -> str:
     return Text(
         "at {rate:.4g} samples/s {choices:n} Hz look alike: the first is taken, since a free spin falls; if a drive "
         "speeds the top up, choose with `near` = {other:.0f}",
-        rate=rate,
-        choices=_choices(folds),
-        other=folds[1],
-    )
+        rate=rate, choices=_choices(folds), other=folds[1],
+    )  # fmt: skip
 
 
 #: Name and case of a finding → its values as a sentence.

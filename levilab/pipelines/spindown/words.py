@@ -245,19 +245,14 @@ def _verdict(
         first = Text(
             "These {n} readings cannot distinguish {laws}: over a fall of the spin by {percent:n} % they differ too "
             "little for readings of this number and precision.",
-            n=best.n,
-            laws=law_names(simple if len(simple) > 1 else ()),
-            percent=digits(100 * fall),
-        )
+            n=best.n, laws=law_names(simple if len(simple) > 1 else ()), percent=digits(100 * fall),
+        )  # fmt: skip
         advice = "Let the top fall further, or read it more often."
     misses = [Text("{rms:n} Hz", rms=digits(stats[name].rms_residual)) for name in said.excluded]
     excluded = Text(
         "The readings exclude {laws}, off by {rms} (rms); {law} is off by {least:n} Hz.",
-        laws=law_names(said.excluded),
-        rms=enumeration(misses or [""]),
-        law=law,
-        least=digits(best.rms_residual),
-    )
+        laws=law_names(said.excluded), rms=enumeration(misses or [""]), law=law, least=digits(best.rms_residual),
+    )  # fmt: skip
     stopped = Text("The fit of {laws} did not converge: nothing is certain about it.", laws=law_names(said.unsettled))
     weak = Text("They speak against {laws}, not strongly enough to exclude.", laws=law_names(said.weak))
     return Sentences(
@@ -320,18 +315,14 @@ def _no_law(found: SpinDown | Combined, runs: Sequence[SpinDown], rms: str) -> s
     else:
         what = Text(
             "they {way} by {hz:n} Hz beyond any drag between {first:.4g} s and {last:.4g} s, or bend there",
-            way="rise" if change.size > 0 else "fall",
-            hz=digits(abs(change.size)),
-            first=float(runs[0].time[change.first]),
-            last=float(runs[0].time[change.last]),
-        )
+            way="rise" if change.size > 0 else "fall", hz=digits(abs(change.size)),
+            first=float(runs[0].time[change.first]), last=float(runs[0].time[change.last]),
+        )  # fmt: skip
     return Text(
         "No law describes these readings: {what}; the best one, {law}, leaves {rms:n} Hz rms. Its constants and their "
         "uncertainties are those of a curve through the readings, not of a drag.",
-        what=what,
-        law=law_names([found.best]),
-        rms=rms,
-    )
+        what=what, law=law_names([found.best]), rms=rms,
+    )  # fmt: skip
 
 
 def _exponent(exponent: Estimate | None) -> str:
@@ -380,15 +371,11 @@ def _outlier(of: Remark) -> str:
     return Text(
         "the reading of {hz:.6g} Hz at {time:.12g} s lies {off:n} Hz from the {law} law, {many:n} times {unit}, and "
         "was {kept}{falling}",
-        hz=frequency,
-        time=round(time, 3),
-        off=digits(off),
-        law=law_names([of.law or ""]),
-        many=many,
+        hz=frequency, time=round(time, 3), off=digits(off), law=law_names([of.law or ""]), many=many,
         unit="its uncertainty" if stated else "the rms residual of the others",
         kept="kept as asked" if kept else "left out",
         falling="; it stands at the end: the top may already have been falling" if falling else "",
-    )
+    )  # fmt: skip
 
 
 def _few_runs(of: Remark) -> str:
@@ -396,10 +383,8 @@ def _few_runs(of: Remark) -> str:
     return Text(
         "{n:.0f} runs give their scatter, and so u of the means, to {percent:.0f} % only: a 68 % "
         "interval is {width:n} u to each side (Student's t)",
-        n=n,
-        percent=100 / (2 * (n - 1)) ** 0.5,
-        width=digits(width),
-    )
+        n=n, percent=100 / (2 * (n - 1)) ** 0.5, width=digits(width),
+    )  # fmt: skip
 
 
 _REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyType(

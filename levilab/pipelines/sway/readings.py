@@ -167,10 +167,8 @@ def _with_heights(path: Path, readings: SwayReadings, options: InputOptions) -> 
     part = {name: getattr(readings, name)[both] for name in ("time", "x", "y", "spin")}
     note = Text(
         "{side:s} begins at {start:.2f} s of {track:s}, by the spin, and gives its heights",
-        side=side.name,
-        start=time[0] + late,
-        track=path.name,
-    )
+        side=side.name, start=time[0] + late, track=path.name,
+    )  # fmt: skip
     height = np.interp(part["time"], time + late, height)
     return replace(readings, **part, height=height, warnings=(*readings.warnings, note))
 

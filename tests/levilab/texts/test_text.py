@@ -6,7 +6,7 @@ import ast
 import json
 import pickle
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 from unittest.mock import Mock
 
 import pytest
@@ -18,15 +18,14 @@ from analysis.uncertainty import Estimate
 from levilab.acquisition.given import settings_without_bench, with_given_settings
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.errors import LevilabError, UsageError, check_language
-from levilab.formats.kinds import EMPTY, KINDS, OTHER
+from levilab.formats import kinds as files
 from levilab.live.practice.experiments import PRACTICE
 from levilab.live.practice.tasks import TASKS
 from levilab.live.practice.what_if import WHAT_IF
 from levilab.live.server import PAGE
 from levilab.live.views import VIEWS
 from levilab.live.words import change_texts
-from levilab.motion.effects import KINDS as EFFECTS
-from levilab.motion.effects import field_kinds
+from levilab.motion import effects
 from levilab.motion.summary import ENDINGS, FALLS
 from levilab.pipelines.analyzed import EachAlone
 from levilab.pipelines.catalogue import ANALYSES
@@ -40,8 +39,7 @@ from levilab.present.tables import table
 from levilab.present.units import split
 from levilab.report.worksheets.document import read_language
 from levilab.report.worksheets.sheets import TOPS
-from levilab.settings import KINDS as OF_SETTINGS
-from levilab.settings import LIMITS, WHOLE
+from levilab.settings import KINDS, LIMITS, WHOLE
 from levilab.simulator.scene import REMARKS, RULES, SWITCHES, Scene
 from levilab.texts.text import Text, in_language, language_of, languages, speak, text_from, text_of
 from support.paths import SAMPLE_DATA
@@ -110,7 +108,7 @@ def of_worksheets():
 
 def of_files() -> set[str]:
     """What is said of files and runs that are left out."""
-    kinds = (*KINDS, OTHER, EMPTY, OTHER_COLUMNS)
+    kinds = (*files.KINDS, files.OTHER, files.EMPTY, OTHER_COLUMNS)
     runs = {f"{name} run" for name in EXPERIMENTS}
     needed = {one.runs for one in ANALYSES.values()}
     texts = {text for kind in kinds for text in (kind.name, kind.several, kind.advice)}
@@ -134,10 +132,10 @@ def of_analyses() -> set[str]:
 
 def of_scenes() -> set[str]:
     """What is said of a scene's settings and of its effects."""
-    effects = {text for one in (*EFFECTS, *field_kinds(Scene())) for text in (one.name, one.what)}
+    said = {text for one in (*effects.KINDS, *effects.field_kinds(Scene())) for text in (one.name, one.what)}
     settings = {one.expected for one in RULES} | {one.text for one in REMARKS} | {one.why for one in SWITCHES}
-    tables = (FALLS, ENDINGS, MET, LIMITS, OF_SETTINGS, WHOLE)
-    return effects.union(settings, *(table.values() for table in tables))
+    tables = (FALLS, ENDINGS, MET, LIMITS, KINDS, WHOLE)
+    return said.union(settings, *(table.values() for table in tables))
 
 
 def of_program() -> set[str]:
@@ -298,14 +296,13 @@ def test_a_wrong_setting_is_answered_in_german(given: str, said: str) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        "simulate tilted --duration 2 --explain", "simulate driven --duration 9 --set drive.off_s=1", "stability sway",
-        "stability undriven --set top.mass_kg=0.03", "simulate undriven --set top.masse=3",
-        "simulate undriven --set base.outer_radius_m=0.01", "simulate undriven --set top.mass_kg=abc",
-        "simulate undriven --duration abc", "tune --top 24.9 --temperature x",
+        "simulate tilted --duration 2 --explain", "simulate driven --duration 9", "stability undriven --set top.mass_kg=1",
+        "stability sway", "simulate undriven --set top.masse=3", "simulate undriven --set base.outer_radius_m=0.01",
+        "simulate undriven --set top.mass_kg=abc", "simulate undriven --duration abc", "tune --top 24 --temperature x",
         "tune --top 24.9 --temperature 21 --washers 0.06,0.1 --trial 0.1g,20C,steigt --trial 0.06g,20C,seitlich",
     ],
 )  # fmt: skip
-def test_what_a_command_says_is_german_to_the_last_word(levilab, words, monkeypatch) -> None:  # type: ignore[no-untyped-def]
+def test_what_commands_say_is_german_to_the_last_word(levilab: Any, words: str, monkeypatch: Any) -> None:
     monkeypatch.setenv("LEVILAB_LANGUAGE", "de")
     done = levilab(*words.split(), check=None)
     said = set(re.findall(r"\w+", done.stdout + done.stderr))

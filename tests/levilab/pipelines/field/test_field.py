@@ -148,8 +148,8 @@ def test_files_of_users_are_read_in_their_units(tmp_path, titles, z, b):
     ("z", "b", "says"),
     [
         (HEIGHTS_MM[:2], FIELD_MT[:2], "holds 2 readings, at least 3 readings are needed"),
-        (HEIGHTS_MM[:3], FIELD_MT[:3], "readings at 3 heights (from 30 to 40 mm), at least 4 are needed: scan on"),
-        (0 * HEIGHTS_MM + 70, FIELD_MT, "readings at 1 height (all at 70 mm)"),
+        (HEIGHTS_MM[:3], FIELD_MT[:3], "heights: 3, from 30 to 40 mm, at least 4 are needed: scan on"),
+        (0 * HEIGHTS_MM + 70, FIELD_MT, "different heights: 1, from 70"),
         (HEIGHTS_MM, np.minimum(FIELD_MT, 20.0), "the probe is saturated, or not moved"),
         (HEIGHTS_MM, np.where(HEIGHTS_MM > 80, -1, 1) * FIELD_MT, "was the probe turned over"),
         (HEIGHTS_MM * 1e3, FIELD_MT, "a height of 30 m cannot be"),
