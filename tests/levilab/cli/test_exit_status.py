@@ -101,23 +101,11 @@ WRONG_USAGE = {
 }
 #: What the command line itself does not understand is shown with the usage, over several lines.
 NOT_UNDERSTOOD = (
-    "fly",
-    "acquire",
-    "acquire fly",
-    "acquire spin --mok",
-    "acquire spin --mock --seed -1",
-    "acquire spin --mock --seed many",
-    "acquire --mock",
-    "analyze spindown x --uncertainty perhaps",
-    "analyze spindown x --reading-u much",
-    "simulate undriven --duration long",
-    "bench clock --mock --duration 0.5s",
-    "bench",
-    "bench serve --port-base 0",
-    "bench serve --port-base 65536",
-    "benchmark",
-    "benchmark fly",
-)
+    "fly", "acquire", "acquire fly", "acquire spin --mok", "acquire spin --mock --seed -1",
+    "acquire spin --mock --seed many", "acquire --mock", "analyze spindown x --uncertainty perhaps",
+    "analyze spindown x --reading-u much", "simulate undriven --duration long", "bench clock --mock --duration 0.5s",
+    "bench", "bench serve --port-base 0", "bench serve --port-base 65536", "benchmark", "benchmark fly",
+)  # fmt: skip
 FAILURES = {
     **dict.fromkeys(("analyze", "analyze spindown", "report", "report -o r.html"), "there is no folder runs here"),
     "simulate undriven --duration 1e6 --animate file/a.html": "choose another place with --animate",

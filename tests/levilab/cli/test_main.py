@@ -264,10 +264,9 @@ def test_a_result_that_cannot_be_written_is_shown(levilab, tmp_path):
         ("spindown my.csv", "No such command 'spindown': take levilab analyze spindown my.csv"),
         ("fit my.csv", "No such command 'fit': take levilab analyze my.csv"),
         ("trace --mock", "take levilab acquire trace --mock"),
-        ("analyze my.csv --unit rpm", '--columns "t=1,f=2 [rpm]"'),
-        ("open my.csv --sheet 2", "my.xlsx/Sheet2"),
+        ("analyze my.csv --unit rpm", '--columns "t=1,f=2 [rpm]"'), ("open my.csv --sheet 2", "my.xlsx/Sheet2"),
     ],
-)
+)  # fmt: skip
 def test_what_other_programs_call_a_command_or_an_option_is_told_ours(typed, says, tmp_path):
     done = command(*typed.split(), cwd=tmp_path)
     assert done.status == 2

@@ -10,22 +10,12 @@ from levilab.present.units import UNITS
 @pytest.mark.parametrize(
     ("text", "unit", "value"),
     [
-        ("10s", "s", 10.0),
-        ("2 min", "s", 120.0),
-        ("1.5h", "s", 5400.0),
-        ("25.4 g", "kg", 0.0254),
-        ("30Hz", "Hz", 30.0),
-        ("1800 rpm", "Hz", 30.0),
-        ("360°/s", "Hz", 1.0),
-        ("10 µs", "us", 10.0),
-        ("7.5cm", "mm", 75.0),
-        ("19 mT", "T", 0.019),
-        ("90°", "rad", 1.5707963267949),
-        ("900 mT cm", "T m", 0.009),
-        ("1e-7", "", 1e-7),
-        ("−3", "m", -3.0),
+        ("10s", "s", 10.0), ("2 min", "s", 120.0), ("1.5h", "s", 5400.0), ("25.4 g", "kg", 0.0254),
+        ("30Hz", "Hz", 30.0), ("1800 rpm", "Hz", 30.0), ("360°/s", "Hz", 1.0), ("10 µs", "us", 10.0),
+        ("7.5cm", "mm", 75.0), ("19 mT", "T", 0.019), ("90°", "rad", 1.5707963267949), ("900 mT cm", "T m", 0.009),
+        ("1e-7", "", 1e-7), ("−3", "m", -3.0),
     ],
-)
+)  # fmt: skip
 def test_a_number_is_read_with_any_unit_of_its_quantity(text, unit, value):
     assert read_number(text, unit) == pytest.approx(value, rel=1e-14)
 

@@ -194,11 +194,10 @@ def test_a_setting_without_key_or_value_is_reported_what_one_looks_like(word):
         ("observd=spin", "did you mean observed?"),
         ("top.mass_kg.x=3", "top.mass_kg = 0.02526 has no parts"),
         ("start.position_m.3=1", "start.position_m has 3 numbers, counted from 0 to 2"),
-        ("start.position_m.-1=1", "counted from 0 to 2"),
-        ("start.position_m.z=1", "counted from 0 to 2"),
+        ("start.position_m.-1=1", "counted from 0 to 2"), ("start.position_m.z=1", "counted from 0 to 2"),
         ("drag.coefficient.0=1", "drag.coefficient = None has no parts"),
     ],
-)
+)  # fmt: skip
 def test_a_wrong_key_is_named_with_the_nearest_and_the_known(setting, said):
     assert said in refusal(setting)
 
