@@ -153,7 +153,7 @@ def _check(times: Array, places: Places, heights: Array | None) -> tuple[Array, 
     columns = [("time", t), ("place", s)] + ([] if z is None else [("height", z)])
     for quantity, values in columns:
         if t.ndim != 1 or values.shape != t.shape:
-            raise ShapesDiffer(quantity=f"the {quantity}", seen=values.shape, expected=(t.size,))
+            raise ShapesDiffer(quantity=quantity, seen=values.shape, expected=(t.size,))
     if t.size < FEWEST:
         raise TooFewReadings(seen=t.size, needed=FEWEST)
     for quantity, values in columns:

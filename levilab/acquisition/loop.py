@@ -20,7 +20,7 @@ from levilab.acquisition.table import EXPERIMENTS, settings_of
 from levilab.bench.bench import OutputMayBeOn, open_bench
 from levilab.bench.kinds import GENERATOR, estimates_u
 from levilab.computer import utc_now
-from levilab.errors import LevilabError, unquote
+from levilab.errors import LevilabError
 from levilab.files import CannotWrite
 from levilab.interruption import Interrupted, watching_for_interruption
 from levilab.runs.events import RunEvent
@@ -145,10 +145,7 @@ def _acquire(request: AcquisitionRequest, show: Display, watch: Watch, off: Even
 def _reason_of(error: Exception) -> str:
     """Return the reason that ended a run: the text of a known failure, with the class of an unexpected one."""
     known = isinstance(error, LevilabError | InstrumentError)
-    if not known:
-        return f"{type(error).__name__}: {error}"
-    said = text_of(error)
-    return said if isinstance(said, Text) else unquote(said)
+    return text_of(error) if known else f"{type(error).__name__}: {error}"
 
 
 def _writer(request: AcquisitionRequest, show: Display) -> RunWriter:

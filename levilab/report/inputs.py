@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from datetime import UTC
 from typing import TYPE_CHECKING, Any, Literal
 
+from levilab.errors import unquote
 from levilab.pipelines.sources import mark_of
 from levilab.pipelines.tune.owner import washers_text
 from levilab.present.clock import local, moment
@@ -13,7 +14,7 @@ from levilab.present.document.blocks import Details, Fact, Facts, Listing, Note,
 from levilab.present.tables import table
 from levilab.present.units import split
 from levilab.present.words import setting_in_words, settings_in_words, value_in_words
-from levilab.texts.text import Text, text_from
+from levilab.texts.text import Text, in_language, text_from
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -183,7 +184,8 @@ def _events(source: Source[Any]) -> tuple[Block, ...]:
     if not events or source.run is None:
         return ()
     zero = source.run.record.time_zero_utc
-    rows = [(_moment(event, zero), text_from(event.get("says"), event["text"])) for event in events[:MOST_EVENTS]]
+    told = [(_moment(one, zero), in_language(text_from(one.get("says"), one["text"]))) for one in events[:MOST_EVENTS]]
+    rows = [(at, unquote(text)) for at, text in told]
     left_out = len(events) - MOST_EVENTS
     note = Text("and {n} more, in events.jsonl", n=left_out) if left_out > 0 else ""
     if len(rows) <= _FEW_EVENTS:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from analysis.numbers import how_many
 from levilab.computer import computer, utc_now
-from levilab.errors import DataError
+from levilab.errors import DataError, unquote
 from levilab.files import CannotWrite, make_folder, must_be_folder, replace_atomically
 from levilab.runs import traces
 from levilab.runs.events import RunEvent
@@ -286,7 +286,7 @@ class RunWriter:
 
     def event(self, time_s: float | None, kind: RunEvent, text: str, **data: Any) -> None:
         """Append a line to events.jsonl."""
-        event = {"utc": utc_now(), "time_s": time_s, "kind": kind, "text": text} | data
+        event = {"utc": utc_now(), "time_s": time_s, "kind": kind, "text": unquote(text)} | data
         if isinstance(text, Text):  # for views in other languages
             event |= {"says": text.as_table()}
         with _explain_errors(f"write the event {text!r}", self.folder):

@@ -167,10 +167,12 @@ def _unknown_key(table: Table, at: Table, way: list[str]) -> str:
     """Return what to say about an unknown key: suggestions, and the keys that exist."""
     before = way[:-1]
     similar = _suggestions(table, at, way)
+    *first, last = similar or [""]
+    either = Text("{first:s} or {last:s}" if first else "{last:s}", first=(*first,), last=last)
     where = Text(" in {name:s}", name=".".join(before)) if before else ""
     said = "there is no key {key:s}; known{where} are {names:s}"
-    said = "there is no key {key:s}; did you mean {similar:s}? Known{where} are {names:s}" if similar else said
-    return Text(said, key=".".join(way), similar=" / ".join(similar), where=where, names=", ".join(at))
+    said = "there is no key {key:s}; did you mean {similar}? Known{where} are {names:s}" if similar else said
+    return Text(said, key=".".join(way), similar=either, where=where, names=", ".join(at))
 
 
 def _suggestions(table: Table, at: Table, way: list[str]) -> list[str]:

@@ -227,13 +227,15 @@ class Switch(NamedTuple):
         table: of the part.
         is_off: whether the scene has it switched off.
         keys: of the table, that have no effect then.
-        why: the value that switches it off, and what switches it on.
+        why: the value that switches it off, and what switches it on; {value} is its value, {laws} are laws of drag.
+        of: the key of that value.
     """
 
     table: str
     is_off: Callable[[Scene], bool]
     keys: tuple[str, ...]
     why: str
+    of: str = "name"
 
 
 SWITCHES: tuple[Switch, ...] = (
@@ -247,19 +249,21 @@ SWITCHES: tuple[Switch, ...] = (
         "drive",
         lambda s: s.drive.waveform != "triggered",
         ("light_rad", "latency_s", "cycle_turns"),
-        "another drive.waveform, triggered, lets the tape set off bursts",
+        "drive.waveform = {value}; triggered lets the tape set off bursts",
+        "drive.waveform",
     ),
     Switch(
         "drive",
         lambda s: s.drive.waveform == "triggered" and s.drive.cycle_turns > 0,
         ("frequency_hz",),
-        "drive.cycle_turns gives the bursts their length; 0 leaves it to the frequency",
+        "drive.cycle_turns = {value:g} gives the bursts their length; 0 leaves it to the frequency",
+        "drive.cycle_turns",
     ),
     Switch(
         "drag",
         lambda s: s.drag.law == "none",
         ("coefficient",),
-        "drag.law = none; stokes, newton, disc or mixed switches the drag on",
+        "drag.law = none; one of {laws:s} switches the drag on",
     ),
     Switch(
         "washers",
@@ -280,9 +284,10 @@ def _without_effect(scene: Scene, switch: Switch) -> str:
     """Return a sentence about the keys that differ from their defaults in a part that is off; empty if none does."""
     part, usual = getattr(scene, switch.table), getattr(Scene(), switch.table)
     keys = [key for key in switch.keys if getattr(part, key) != getattr(usual, key)]
-    named = ", ".join(f"{switch.table}.{key} = {short_text(getattr(part, key))}" for key in keys)
-    said = "{keys:s} do nothing: {why}" if keys[1:] else "{keys:s} does nothing: {why}"
-    return Text(said, keys=named, why=switch.why) if keys else ""
+    *first, last = [f"{switch.table}.{key} = {short_text(getattr(part, key))}" for key in keys] or [""]
+    said = "{first:s} and {last:s} do nothing: {why}" if first else "{last:s} does nothing: {why}"
+    why = Text(switch.why, value=attrgetter(switch.of)(scene), laws=", ".join(LAWS))
+    return Text(said, first=(*first,), last=last, why=why) if keys else ""
 
 
 def scene_of(table: Mapping[str, Any]) -> Scene:
@@ -368,11 +373,12 @@ def _read_file(file: Traversable | Path, name: str) -> Scene:
         ) from None  # fmt: skip
     except OSError as error:
         if file.is_dir():
-            raise SceneError("{path:s}: is a folder; a TOML file or a scene's name is expected", path=file) from None
+            what = "{path:s}: is a folder; a TOML file is expected, or the name of a scene"
+            raise SceneError(what, path=file) from None
         what = "{path:s}: cannot be read ({why}): a TOML file is expected"
         raise SceneError(what, path=file, why=error.strerror) from error
     except ValueError as error:
-        raise SceneError("{path}: not readable as TOML: {why}", path=file, error=error) from error
+        raise SceneError("{path}: not readable as TOML: {why}", path=file, why=error) from error
     try:
         return scene_of({"name": name} | table)
     except SceneError as error:

@@ -15,8 +15,6 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Self
 
-from analysis.errors import AnalysisError
-
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
 
@@ -122,8 +120,9 @@ def text_from(table: Any, otherwise: str = "") -> str:
 
 def text_of(error: BaseException) -> str:
     """Return the message of an error, a Text where it is one."""
-    if isinstance(error, AnalysisError):
-        return Text(error.sentence, **error.values)
+    # an AnalysisError, which is not imported: `python -m levilab` may stand beside an analysis.py of a person
+    if sentence := getattr(error, "sentence", ""):
+        return Text(sentence, **getattr(error, "values", {}))
     said = error.args[0] if error.args else ""
     return said if isinstance(said, Text) else str(error)
 

@@ -248,10 +248,8 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> SpinReadings:
     has_u = "spin_frequency_u_hz" in table.columns
     u = table.column("spin_frequency_u_hz") if has_u else None
     if time.size < fewest:
-        raise TableError(
-            table.path,
-            Text("holds {n} readings, at least {fewest} are needed: record longer", n=time.size, fewest=fewest),
-        )
+        what = "holds {n}, at least {fewest} are needed: record longer"
+        raise TableError(table.path, Text(what, n=how_many(time.size, "reading"), fewest=fewest))
     _must_be_ordinary(table, time, frequency)
     if u is not None:
         _must_be_possible(table, u, frequency)
@@ -345,7 +343,7 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
     if isinstance(error, TimesNotIncreasing):
         before, after = (int(line) for line in table.lines[error.index - 1 : error.index + 1])
         what = "is repeated" if error.before == error.after else "comes"
-        text = f"the time {error.after:.16g} s {what} after {error.before:.16g} s in line {before}, times must increase"
+        text = "the time {now:.16g} s {what} after {then:.16g} s in line {line}, times must increase: {advice}"
         frequency = table.column("spin_frequency_hz")
         turned = np.all(np.diff(table.column("time_s")) < 0) and np.all(np.diff(frequency) > 0)
         advice = (
@@ -354,7 +352,8 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
             if turned
             else "sort the readings, or correct one"
         )
-        return TableError(table.path, Text("{text}: {advice}", text=text, advice=advice), line=after)
+        values = {"now": error.after, "what": what, "then": error.before, "line": before, "advice": advice}
+        return TableError(table.path, Text(text, **values), line=after)
     if isinstance(error, NotPositive):
         what, advice = _ABOVE_0[error.quantity]
         if error.quantity == "spin frequency" and error.value == 0:

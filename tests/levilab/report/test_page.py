@@ -192,7 +192,7 @@ def test_what_happened_tells_the_fall(run):
     ]
     (run / "events.jsonl").write_text("".join(json.dumps(event) + "\n" for event in events), encoding="utf-8")
     text = text_of(changed(run, time_zero_utc="2026-11-21T00:52:00Z"))
-    assert "before drive on at 30 Hz" in text
+    assert "before: drive on at 30 Hz" in text
     assert "The last reading that was fitted is 21.75 Hz at 190.0 s; fell between 190.0 s and 200.0 s." in text
 
 
