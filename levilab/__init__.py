@@ -492,7 +492,7 @@ def report(
 
 @bare
 def export(
-    data: Run | AnalysisResult | SimulatedMotion | SimulatedMap | str | PathLike[str],
+    data: Run | AnalysisResult | SimulatedMotion | SimulatedMap | str | PathLike[str] | Sequence[Any],
     output: str | PathLike[str],
     *,
     creator: str = "",
@@ -502,7 +502,8 @@ def export(
     """Write a run, a data file, a result, a motion or a map for other programs.
 
     Args:
-        data: one of them; readings, traces in volts and seconds, and the result with its uncertainties are written.
+        data: one of them, a list of runs or paths, which are analyzed together, or one of results of unlike kinds;
+            readings, traces in volts and seconds, and results with their uncertainties are written.
         output: the file; its ending chooses the format: .nc (netCDF), .h5 (HDF5), .csv, .xlsx, .zip (a data package).
         creator: who measured; by default the run's group.
         licence: under which others may use the data, as "CC-BY-4.0".

@@ -68,13 +68,30 @@ def read_number(text: str, unit: str) -> float:
         return _float(text, unit)
     own = plain_unit(unit)
     units = next((one for one in TYPED if own in one), {own: 1.0})
-    typed = factor_of(found[2] or unit, units)
-    is_mega = (found[2] or "").startswith("M") and plain_unit(found[2]) not in units  # and no m in another case
-    if typed is None or is_mega:
+    typed = _factor(found[2] or unit, units)
+    if typed is None:
         raise ValueError(Text("'{seen:s}': {expected}", seen=text.strip(), expected=_words_for(unit, units)))
     number, factor = float(found[1]), typed / units[own]
     # with the 15 digits that a float has: 25.4 g are 0.0254 kg, and not 0.025399999999999999
     return number if factor == 1 else float(f"{number * factor:.15g}")
+
+
+def ratio(unit: str, other: str) -> float | None:
+    """Return how many of another unit one of a unit is, None where they are of unlike quantities.
+
+    >>> ratio("Hz", "rpm"), ratio("T m", "mT cm"), ratio("kg", "m")
+    (60.0, 100000.0, None)
+    """
+    own, rates = plain_unit(unit), {"1/s": 1.0, "1/min": 1 / 60, "1/h": 1 / 3600}  # a decay is no frequency
+    units = rates if own == "1/s" else next((one for one in TYPED if own in one), {own: 1.0})
+    factor = _factor(other, units)
+    return None if factor is None else float(f"{units[own] / factor:.15g}")
+
+
+def _factor(unit: str, units: Mapping[str, float]) -> float | None:
+    """Return the factor of a unit in a table of them, None for any other, also for mega, which is no m."""
+    is_mega = unit.startswith("M") and plain_unit(unit) not in units
+    return None if is_mega else factor_of(unit, units)
 
 
 def _words_for(unit: str, units: Mapping[str, float]) -> str:

@@ -31,6 +31,12 @@ _OTHERS = {
 }
 #: The same, where the value is another one.
 _OTHER_VALUES = {"weights": ("reading_u", "the standard uncertainty, 1/weights, or a third array")}
+#: Options of lmfit that nothing takes the place of → why.
+_NEEDLESS = {
+    **dict.fromkeys(("params", "max_nfev", "fit_kws", "calc_covar"), "the fit finds its start, end and u by itself"),
+    "nan_policy": "rows without a number are left out, with a note",
+    "scale_covar": "u is from the scatter and, where they are stated, from u of the readings",
+}
 #: Names that a message lists.
 _MOST_NAMES = 15
 
@@ -99,7 +105,8 @@ def _refuse_unknown(function: str, named: Iterable[str], names: Iterable[str]) -
     known = [name for name in names if name != "self"]
     for name in named:
         if name not in known:
-            raise UsageError(name, f"is no option of {function}; {meant(name, known)}")
+            advice = f"leave it out: {_NEEDLESS[name]}" if name in _NEEDLESS else meant(name, known)
+            raise UsageError(name, f"is no option of {function}; {advice}")
 
 
 class Helpful:

@@ -14,6 +14,7 @@ import numpy as np
 
 from analysis.uncertainty import Estimate
 from levilab.errors import UsageError
+from levilab.formats.typed import ratio
 from levilab.notebook.names import Helpful, NoSuchAttribute, bare, border, meant
 from levilab.present.numbers import in_one_line, without_unit
 
@@ -54,6 +55,23 @@ def _comparison(compare: Callable[[float, float], bool]) -> Any:
         return compare(float(self), float(other.nominal_value if hasattr(other, "nominal_value") else other))
 
     return method
+
+
+def _multiple(operate: Callable[[Any, Any], Any]) -> Any:
+    """Return the method of a quantity that is one, too, with a plain number."""
+
+    def method(self: Quantity, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented  # numpy does it element by element
+        number = operate(self.to_ufloat(), _plain(other))
+        return number if _may_have_unit(other) else _of(number, self.unit)
+
+    return method
+
+
+def _number(operate: Callable[[Any, Any], Any]) -> Any:
+    """Return the method of a quantity that is a number of `uncertainties`."""
+    return lambda self, other: operate(self.to_ufloat(), _plain(other))
 
 
 @dataclass(frozen=True, repr=False)
@@ -124,12 +142,26 @@ class Quantity(Estimate):
             object.__setattr__(self, "number", ufloat(float(self), self.s))  # one number for all that is made of it
         return self.number
 
+    @bare
+    def to(self, unit: str) -> Quantity:
+        """Return it in another unit, as "rpm" or "rad/s" of a frequency, "mm" of a length.  Raises UsageError.
+
+        >>> Quantity(30.0, 0.01, "Hz").to("rpm"), Quantity(0.002, None, "1/s").to("1/min")
+        (1800.0(6) rpm, 0.12 1/min)
+        """
+        factor = ratio(self.unit, unit)
+        if factor is None:
+            raise UsageError("unit", f"a unit of the same quantity as {self.unit} is expected", value=unit)
+        value, u = (None if one is None else one * factor for one in (self.value, self.u))
+        ends = self.interval and (self.interval[0] * factor, self.interval[1] * factor)
+        return Quantity(value, u, unit, ends, self.to_ufloat() * factor)
+
     # --- arithmetic ---
 
     def _check_unit(self, other: object, what: str) -> None:
         """Raise UsageError for a quantity in another unit."""
         if isinstance(other, Estimate) and other.unit != self.unit:
-            raise UsageError(what, f"{self!r} and {other!r} have unlike units: convert one, or take its `to_ufloat()`")
+            raise UsageError(what, f"{self!r} and {other!r} have unlike units: take `to`, or `to_ufloat()`")
 
     def _sum(self, other: object, sign: int) -> Any:
         """Return this plus or minus a number in the same unit."""
@@ -158,27 +190,6 @@ class Quantity(Estimate):
     def __abs__(self) -> Any:
         return -self if float(self) < 0 else self
 
-    def __mul__(self, other: object) -> Any:
-        if isinstance(other, np.ndarray):
-            return NotImplemented
-        product = self.to_ufloat() * _plain(other)
-        return product if _may_have_unit(other) else _of(product, self.unit)
-
-    def __truediv__(self, other: object) -> Any:
-        if isinstance(other, np.ndarray):
-            return NotImplemented
-        ratio = self.to_ufloat() / _plain(other)
-        return ratio if _may_have_unit(other) else _of(ratio, self.unit)
-
-    def __rtruediv__(self, other: object) -> Any:
-        return _plain(other) / self.to_ufloat()
-
-    def __pow__(self, other: object) -> Any:
-        return self.to_ufloat() ** _plain(other)
-
-    def __rpow__(self, other: object) -> Any:
-        return _plain(other) ** self.to_ufloat()
-
     def __round__(self, digits: int | None = None) -> float:
         return round(float(self), digits)
 
@@ -195,6 +206,8 @@ class Quantity(Estimate):
 
         return partial(getattr(umath, name), self.to_ufloat())
 
+    __mul__, __truediv__ = map(_multiple, (operator.mul, operator.truediv))
+    __rtruediv__, __pow__, __rpow__ = map(_number, (lambda a, b: b / a, operator.pow, lambda a, b: b**a))
     __radd__, __rmul__ = __add__, __mul__
 
     __lt__, __le__, __gt__, __ge__ = map(_comparison, (operator.lt, operator.le, operator.gt, operator.ge))

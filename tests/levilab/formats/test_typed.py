@@ -3,7 +3,7 @@
 import pytest
 
 from levilab.formats.titles import plain_unit
-from levilab.formats.typed import OF_KEYS, TYPED, read_number, unit_of_key
+from levilab.formats.typed import OF_KEYS, TYPED, ratio, read_number, unit_of_key
 from levilab.present.units import UNITS
 
 
@@ -45,5 +45,6 @@ def test_endings_of_keys_have_the_units_of_results():
 
 @pytest.mark.parametrize(("typed", "unit"), [("25Mg", "kg"), ("5 MT", "T"), ("5 MM", "m")])
 def test_mega_is_not_taken_for_milli(typed, unit):
+    assert ratio(unit, typed.strip("25 ")) is None
     with pytest.raises(ValueError, match="is expected"):
         read_number(typed, unit)

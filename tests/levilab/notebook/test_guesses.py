@@ -230,6 +230,18 @@ GUESSES: dict[str, Callable[[Any], object]] = {
     "levilab.sweep('undriven', spin_hz=[18, 30], duration=0.5).plot().axes[0].lines[0].get_ydata().tolist()": (
         lambda survived: survived == [0, 1]
     ),
+    "(s := result.params['start_frequency'], turn := s.to('rad/s'), turn.interval[1] / s.interval[1], turn / s)[2:]": (
+        lambda ratios: ratios[0] == ratios[1].n == pytest.approx(2 * np.pi) and ratios[1].s < 1e-12
+    ),
+    "xr.open_dataset(levilab.export((t, f), new / 'e.nc')[0]).spin_frequency_hz.values - f": (
+        lambda off: off == pytest.approx(0)
+    ),
+    "[path.name for path in levilab.export([run, folder / 'spin-down-2'], new / 'e.csv')]": (
+        lambda names: names == ["e.csv", "e.inputs.csv", "e.result.csv"]
+    ),
+    "xr.open_dataset(levilab.export([result, levilab.analyze(folder / 'lower-limits')], new / 'e.nc')[0])": (
+        lambda data: data.result_limit_mean.item() == pytest.approx(21.86, abs=0.005) and "result_spindown_c32" in data
+    ),
     "round(result['c32'], 5)": lambda number: number == 0.00024,
     "swept.sel(spin_hz=30).survived.item() == swept.isel(spin_hz=-1).survived.item()": bool,
     "swept.sel(spin_hz=24, method='nearest')['start.spin_hz'].item()": lambda spin: spin == 20,
@@ -256,7 +268,9 @@ REFUSED = {
     "levilab.report(5)": "runs, results, motions, maps or paths are expected",
     "levilab.report([swept])": "a report needs its store",
     "levilab.sweep('undriven', 1)": "as {'spin_hz': [20, 30]}",
-    "levilab.export((t, f), 'e.nc')": "analyze arrays and lists first: export(analyze(…), …)",
+    "levilab.export([result, result], 'e.nc')": "a list of runs or of results of unlike kinds is expected",
+    "result.params['start_frequency'].to('mm')": "unit = mm: a unit of the same quantity as Hz is expected",
+    "levilab.analyze((t, f), max_nfev=5)": "leave it out: the fit finds its start, end and u by itself",
     "[one['c32'] for one in result]": "for one in result.by_input.values()",
     "swept.sel(spin_hz=24)": "method='nearest': start.spin_hz = 20.0, 30.0",
     "swept.sel(spin=20)": "start.spin_hz = 20.0, 30.0",
