@@ -146,7 +146,9 @@ class FreeTop(Generic[S]):
             reading = Missed.LOST
         if isinstance(reading, Missed):
             self.missed.append(reading)
-            self.missed_by = min(asked + self._least, session.now())
+            again, now = min(self._took, session.settings.gate_s + _SETTLED_S), session.now()
+            stood_still = max(0.0, now - asked - self._took - again)  # the computer, in the first of the two counts
+            self.missed_by = min(asked + self._least + stood_still, now)
             if self.missed[-_MOST_MISSED:] == [Missed.FASTER] * _MOST_MISSED:
                 raise AnotherTop(self.before[-1], self._faster)
             return None

@@ -59,7 +59,7 @@ class ExperimentFailed(LevilabError):
 
 
 class DidNotFollow(ExperimentFailed):
-    """The drive did not bring the top to where it should."""
+    """The drive did not bring the top to where it should, or the counts of a free top are not its spin."""
 
 
 class NoLight(ExperimentFailed):

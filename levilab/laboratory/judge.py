@@ -143,6 +143,9 @@ def compare_at_once(row: Row, plan: Plan, world: World, height_m: float | None, 
     if plan.experiment == "field" and height_m is not None:
         field = Compared(row, row["flux_density_t"], world.flux_density(now), row["flux_density_u_t"])
         return [Compared(row, row["height_m"], height_m, 0.0), field]
+    was_taken = any(event.what == "top taken" for event in plan.events)
+    if plan.experiment == "limit" and isinstance(world, SpinWorld) and not was_taken:
+        return [Compared(row, row["spin_frequency_hz"], world.fall_at(now), row["spin_frequency_u_hz"])]
     return []
 
 

@@ -296,6 +296,10 @@ class SpinWorld:
             self._stretches.cut(time)
             self._append(replace(now, phase=Phase.FALLEN, spin=0.0))
 
+    def fall_at(self, time: float) -> float:
+        """Return the spin at which the top of this time falls, or fell [Hz]."""
+        return self.scene.fall_of(self._stretches.at(time).number)
+
     def catch_up(self) -> None:
         """Drop old history; a closed form needs no simulation.  See :class:`World`."""
         self._drop_history()

@@ -212,6 +212,9 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_by: 
             experiment=session.writer.record.experiment,
         )
     times, spins = (np.array([row[name] for row in seen]) for name in ("time_s", "spin_frequency_hz"))
+    if spins[-1] > spins[0]:  # a phone's samples may show the spin's image at their rate, which rises
+        said = "the counts rise from {first:.2f} Hz to {last:.2f} Hz up to the fall: a top that coasts gains no spin"
+        raise DidNotFollow(Text(said, first=float(spins[0]), last=float(spins[-1])))
     between = (float(times[-1]) + settings.gate_s / 2, missed_by)
     u = [row["spin_frequency_u_hz"] for row in seen if "spin_frequency_u_hz" in row]
     limit = spin_at_fall(times, spins, float(np.sqrt(np.mean(np.square(u)))) if u else None, between)

@@ -69,6 +69,8 @@ FAILED_ONCE = {
     "a held spin was resumed half a reading early": draw(400407),
     "a mock's multimeter counted over 0.1 s": draw(610728),
     "a multimeter hid what the bursts do": draw(611873),
+    "the lid was closed while a top fell": draw(761304),
+    "a phone showed the image of a spin": draw(771759),
     "a folder was removed before the power went": a_plan(
         "spin", "hold_s=0", "drive_frequency_hz=35", events=[Event("folder", 0, 187), Event("power", 0, 478)]
     ),
