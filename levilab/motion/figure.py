@@ -15,8 +15,9 @@ from analysis.numbers import digits
 from levilab.motion.summary import changing_energy
 from levilab.present.drawing import SMALL, curve, headline, panel
 from levilab.present.looks import GREY, LOOKS
-from levilab.present.numbers import with_decimals
+from levilab.present.numbers import enumeration, with_decimals
 from levilab.present.style import STYLE, WIDE
+from levilab.texts.text import Sentences, Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -109,7 +110,7 @@ def _spin_figure(summary: Summary) -> Figure:
 
 def _finding(summary: Summary) -> str:
     name = (summary.motion.scene.name or "simulation").replace("\\", "\\\\").replace("$", r"\$")
-    return f"Simulated motion: {name[:60]}, {summary.ending}"
+    return Text("Simulated motion: {name:s}, {ending}", name=name[:60], ending=summary.ending)
 
 
 def _zoom(summary: Summary) -> tuple[float, float] | None:
@@ -132,7 +133,7 @@ def _draw_paths(figure: Figure, summary: Summary) -> None:
     middle = (place.min(axis=0) + place.max(axis=0)) / 2
     shape, span = wide / _PATH, np.ptp(place, axis=0)
     half = 0.5 * 1.16 * max(span[0], shape * span[1], shape * span[2], _SMALLEST_CM)
-    for axes, up, title in ((panels[0], 2, "from the side"), (panels[1], 1, "from above")):
+    for axes, up, title in ((panels[0], 2, "Path from the side"), (panels[1], 1, "Path from above")):
         points = place[:, [0, up]]
         path = LineCollection(
             np.stack([points[:-1], points[1:]], axis=1).tolist(), cmap="cividis", array=time[:-1], rasterized=True,
@@ -146,7 +147,7 @@ def _draw_paths(figure: Figure, summary: Summary) -> None:
         axes.set_ylim(middle[up] - half / shape, middle[up] + half / shape)
         axes.locator_params(nbins=6)
         axes.set(xlabel="x  [cm]", ylabel=f"{'xyz'[up]}  [cm]")
-        axes.set_title(f"Path {title}", loc="left")
+        axes.set_title(title, loc="left")
     panels[1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, handlelength=1, columnspacing=1)
     bar = figure.colorbar(path, cax=panel(figure, _LEFT + 2 * wide + 0.75, 0.62, 0.1, _PATH))
     bar.set_label("time  [s]")
@@ -189,10 +190,13 @@ def _quantities(summary: Summary) -> tuple[_Quantity, ...]:
     change = (energy - energy[0]) / (abs(energy[0]) or 1.0)
     power = math.floor(math.log10(summary.energy_change)) if summary.energy_change > 0 else 0
     return (
-        _Quantity(f"Height: {summary.heights}", "z  [cm]", (("height", "height", 100 * motion.position[:, 2]),)),
+        _Quantity(
+            Text("Height: {said}", said=summary.heights), "z  [cm]",
+            (("height", "height", 100 * motion.position[:, 2]),),
+        ),
         _spin(summary),
         _Quantity(
-            f"Tilt of the axis against the base's: up to {tilt.max():.3g}°", "tilt  [degrees]",
+            Text("Tilt of the axis against the base's: up to {degrees:.3g}°", degrees=float(tilt.max())), "tilt  [°]",
             (("tilt", "tilt", tilt),), from_zero=True,
         ),
         _Quantity(
@@ -208,7 +212,7 @@ def _spin(summary: Summary) -> _Quantity:
     if scene.washers.inertia_kg_m2 > 0:
         curves.append(("washers", "loose washers", motion.washer_spin_hz))
     return _Quantity(
-        f"Spin: {summary.spin}", "ω₃/2π  [Hz]", tuple(curves),
+        Text("Spin: {said}", said=summary.spin), "ω₃/2π  [Hz]", tuple(curves),
         drive=scene.drive.frequency_hz if scene.drive.is_periodic else None,
         least=1e-6 * abs(float(motion.spin_hz[0])),
     )  # fmt: skip
@@ -217,12 +221,9 @@ def _spin(summary: Summary) -> _Quantity:
 def _energy_title(summary: Summary) -> str:
     there = changing_energy(summary.motion.scene)
     if not there:
-        exactly = f"to {digits(summary.energy_change, 1)}" if summary.energy_change else "exactly"
-        return f"Error of the energy: it should stay as it is, and does {exactly}"
+        return Text("Error of the energy, which should be constant: {x:n}", x=digits(summary.energy_change, 1))
     own = " (without the drive's own part)" if "drive" in there else ""
-    *others, last = there
-    named = f"{', '.join(others)} and {last} change" if others else f"{last} changes"
-    return f"Energy, change since the start: {named} it{own}"
+    return Text("Energy, change since the start by {what}{own}", what=enumeration(there), own=own)
 
 
 def _draw_quantity(axes: Axes, quantity: _Quantity, time: Array) -> None:
@@ -231,10 +232,12 @@ def _draw_quantity(axes: Axes, quantity: _Quantity, time: Array) -> None:
         envelope |= curve(axes, time, values, LOOKS[name], pieces=PIECES, label=label)
     _finish(axes, quantity)
     axes.set_ylabel(quantity.axis, fontsize=8)
-    drawn = "; shaded: least to greatest, black: mean" if envelope else ""
+    title = quantity.title
+    if envelope:
+        title = Sentences(title, "shaded: least to greatest, black: mean", between="; ")
     if quantity.has_legend:
         axes.legend(loc="lower left", bbox_to_anchor=(0, 0.96), ncols=3, fontsize=SMALL, borderaxespad=0, borderpad=0.2)
-    title = quantity.title + (drawn if len(quantity.title + drawn) < _LETTERS else "")
+    title = title if len(title) < _LETTERS else quantity.title
     axes.set_title(title, loc="left", fontsize=8, pad=14 if quantity.has_legend else None)
 
 
@@ -269,7 +272,7 @@ def _finish(axes: Axes, quantity: _Quantity) -> None:
 def _draw_spectrum(axes: Axes, summary: Summary) -> None:
     lines = summary.lines
     assert lines.spectrum
-    axes.set(xlabel="frequency  [Hz], positive in the sense of a spin above 0", ylabel="amplitude  [mrad]")
+    axes.set(xlabel="frequency  [Hz]", ylabel="amplitude  [mrad]")
     frequency, amplitude = lines.spectrum[0], 1000 * lines.spectrum[1]
     places = [0.0, *(line.frequency for line in lines.lines)]
     margin = 3 + 0.15 * max(map(abs, places))
@@ -280,8 +283,9 @@ def _draw_spectrum(axes: Axes, summary: Summary) -> None:
     room = DECADES * _NAMES_SHARE / (1 - _NAMES_SHARE)  # decades above the highest line, for the names
     axes.set(xlim=limits, ylim=(top / 10**DECADES, top * 10**room))
     _name_lines(axes, summary)
-    piece = "" if lines.until > 0.99 * summary.end else f" of the first {lines.until:.3g} s"
-    axes.set_title(f"Spectrum of the axis, n$_x$ + i n$_y${piece}: resolution {lines.resolution:.2g} Hz", loc="left")
+    of = "" if lines.until > 0.99 * summary.end else Text(", of the first {s:.3g} s", s=lines.until)
+    said = "Spectrum of the axis, n$_x$ + i n$_y$, positive in the sense of a positive spin; resolution {hz:.2g} Hz{of}"
+    axes.set_title(Text(said, hz=lines.resolution, of=of), loc="left", fontsize=8)
 
 
 def _outline(frequency: Array, amplitude: Array) -> tuple[Array, Array]:
@@ -327,8 +331,8 @@ def _name_lines(axes: Axes, summary: Summary) -> None:
     lines = sorted(summary.lines.lines, key=lambda line: line.sideband)[:MOST_NAMED]
     for k, line in enumerate(lines):
         waiting = [_pole(axes, other.frequency) for other in lines[k + 1 :] if not other.sideband]
-        number = with_decimals(line.frequency, 2)
-        texts = [number] if line.sideband or not line.name else [f"{number} {line.name}", number]
+        number = in_language(Text("{hz:n}", hz=with_decimals(line.frequency, 2)))
+        texts = [number] if line.sideband or not line.name else [f"{number} {in_language(line.name)}", number]
         found = next(filter(None, (_place(axes, line.frequency, text, flags, waiting) for text in texts)), None)
         if found:
             flags.append(found)

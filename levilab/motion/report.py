@@ -13,9 +13,10 @@ import shlex
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import DataError, LevilabError
+from levilab.errors import DataError, LevilabError, unquote
 from levilab.motion.effects import KINDS, field_kinds
 from levilab.motion.simulation import COLUMNS, FIGURE, SimulationRequest, run_simulation
+from levilab.motion.summary import as_document
 from levilab.present.document.blocks import (
     Banner,
     Code,
@@ -33,6 +34,7 @@ from levilab.present.numbers import plain, with_decimals
 from levilab.present.tables import table
 from levilab.runs.run import STATES, Run
 from levilab.simulator.scene import SceneError, changes, scene_of
+from levilab.texts.text import Sentences, Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
@@ -54,19 +56,24 @@ _PROGRAMS = {"levilab", "levilab.exe", "__main__.py", "levilab-script.py"}
 def motion_section(run: Run) -> Section:
     """Return the section of a simulated motion.  Raises DataError for a folder in which one is not, or not whole."""
     found, scene = _document(run), _scene(run)
+    if summary := _simulate_again(run, scene, found):  # its texts can be said in other languages
+        notes = [unquote(in_language(note)) for note in summary.notes]
+        texts = as_document(summary) | {"notes": notes}
+        found = {**found, **{key: texts[key] for key in ("fell", "lines", "no_lines_because", "notes")}}
     name = str(found.get("scene") or scene.name or "without a name")
     blocks: list[Block] = [
         SYNTHETIC,
         Verdict(_verdict(found, name)),
         *_notes(found),
-        *_pictures(run, scene, name, found),
+        *_pictures(run, name, summary),
         Tabular("motion", table("The motion in numbers", NUMBERS, _numbers(found, scene), numbers=NUMBERS[1:2])),
         *_lines(found),
         Section("Accuracy and cost", (Facts(tuple(_accuracy(found))),)),
         Section("What was simulated", scene_blocks(scene, _how_long(run))),
         Section("How to reproduce it", tuple(_reproduction(run))),
     ]
-    return Section(f"Simulated motion: {name}", tuple(blocks), "motion", run.folder.name, new_page=True)
+    title = Text("Simulated motion: {name:s}", name=name)
+    return Section(title, tuple(blocks), "motion", run.folder.name, new_page=True)
 
 
 def motions_overview(runs: Sequence[Run]) -> Section:
@@ -86,7 +93,8 @@ def motions_overview(runs: Sequence[Run]) -> Section:
     shown = Tabular("motions", table("", heads, rows, numbers=heads[3:]), first_column_wraps=True)
     note = Note("A report of up to twelve simulated motions has a chapter with figure, lines and accuracy for each.")
     warnings = [Warnings(tuple(unusable))] if unusable else []
-    return Section(f"{len(runs)} simulated motions", (SYNTHETIC, *warnings, shown, note), "motions", new_page=True)
+    title = Text("{n} simulated motions", n=len(runs))
+    return Section(title, (SYNTHETIC, *warnings, shown, note), "motions", new_page=True)
 
 
 def motion_values(runs: Sequence[Run]) -> tuple[tuple[str, ...], tuple[tuple[str | float | bool | None, ...], ...]]:
@@ -124,19 +132,21 @@ def _scene(run: Run) -> Scene:
 # --- the motion in numbers -----------------------------------------------------------------------------------
 
 
-_LOCKED = {"True": " It is locked to its drive.", "False": " It is not locked to its drive."}
+_LOCKED = {"True": "It is locked to its drive.", "False": "It is not locked to its drive."}
 
 
 def _verdict(found: Mapping[str, Any], name: str) -> str:
     fell = found.get("fell")
     if isinstance(fell, dict):
-        said = f"{name}: the top was up for {plain(fell.get('time_s'), 4)} s: it {fell.get('text', 'fell')}."
+        time, how = plain(fell.get("time_s"), 4), fell.get("text", "fell")
+        said = Text("{name:s}: the top was up for {s:n} s: it {how}.", name=name, s=time, how=how)
     else:
-        said = f"{name}: the top stayed up for all of {found['end_s']:g} s."
+        said = Text("{name:s}: the top stayed up for all of {s:g} s.", name=name, s=found["end_s"])
+    accuracy = "The estimated error at the end is NOT within the tolerance of {x:n}."
+    if found.get("tolerance_reached"):
+        accuracy = "The estimated error at the end is within the tolerance of {x:n}."
     locked = _LOCKED.get(str(found.get("locked")), "")
-    reached = "within" if found.get("tolerance_reached") else "NOT within"
-    accuracy = f" The estimated error at the end is {reached} the tolerance of {_digits(found, 'tolerance', 1)}."
-    return said + locked + accuracy
+    return Sentences(said, locked, Text(accuracy, x=_digits(found, "tolerance", 1)))
 
 
 def _notes(found: Mapping[str, Any]) -> Iterator[Warnings]:
@@ -183,38 +193,38 @@ def _lines(found: Mapping[str, Any]) -> Iterator[Block]:
     if not lines:
         because = found.get("no_lines_because")
         if because:
-            yield Note(f"No lines of the axis: {because}.")
+            yield Note(Text("no lines of the axis: {why}", why=because))
         return
     heads = ("frequency [Hz]", "amplitude [mrad]", "identified as")
     rows = [
         (
             with_decimals(line.get("frequency_hz", math.nan), 3),
             plain(1e3 * line.get("amplitude_rad", math.nan)),
-            str(line.get("name") or "not identified"),
+            line.get("name") or "not identified",
         )
         for line in lines
     ]
     resolution, until = found.get("line_resolution_hz"), found.get("lines_until_s")
-    note = f"Lines of n_x + i n_y, positive in the sense of a positive spin; resolution {plain(resolution, 2)} Hz"
-    if isinstance(until, int | float) and until < 0.99 * found["end_s"]:
-        note += f", of the first {plain(until)} s"
-    drawn = table("Lines of the axis", heads, rows, numbers=heads[:2])
-    yield Tabular("lines", drawn, f"{note}.")
+    is_part = isinstance(until, int | float) and until < 0.99 * found["end_s"]
+    of = Text(", of the first {s:.3g} s", s=until) if is_part else ""
+    note = Text("positive in the sense of a positive spin; resolution {hz:n} Hz{of}", hz=plain(resolution, 2), of=of)
+    drawn = table("Lines of the axis, n_x + i n_y", heads, rows, numbers=heads[:2])
+    yield Tabular("lines", drawn, note)
 
 
 def _accuracy(found: Mapping[str, Any]) -> Iterator[Fact]:
     reached = "reached" if found.get("tolerance_reached") else "NOT reached"
-    yield Fact(
-        "Asked for", (f"an error of at most {_digits(found, 'tolerance', 1)} at the end, in m and in rad: {reached}",)
-    )
+    said = "an error of at most {x:n} at the end, in m and in rad: {reached}"
+    yield Fact("Asked for", (Text(said, x=_digits(found, "tolerance", 1), reached=reached),))
     position, axis = (_digits(found, key, 1) for key in ("position_error_m", "axis_error_rad"))
-    yield Fact("Estimated", (f"{position} m of the place, {axis} rad of the axis, at the end",))
+    said = "{place:n} m of the place, {axis:n} rad of the axis, at the end"
+    yield Fact("Estimated", (Text(said, place=position, axis=axis),))
     if steps := found.get("steps"):
-        step = found.get("step_s")
-        size = f" of at most {plain(1e3 * step)} ms" if isinstance(step, int | float) else ""
-        yield Fact("Integrated", (f"{steps} steps{size} by {found.get('scheme', 'a scheme that is not recorded')}",))
+        size = plain(1e3 * found.get("step_s", math.nan))
+        said = "{steps} steps of at most {ms:n} ms by {scheme:s}"
+        yield Fact("Integrated", (Text(said, steps=steps, ms=size, scheme=found.get("scheme", "—")),))
     took, speed = _digits(found, "computing_time_s"), _digits(found, "times_real_time", 2)
-    yield Fact("Cost", (f"{took} s on that machine, {speed} times as fast as the top itself",))
+    yield Fact("Cost", (Text("{s:n} s on that machine, {n:n} times as fast as the top itself", s=took, n=speed),))
 
 
 def _digits(found: Mapping[str, Any], key: str, count: int = 3) -> str:
@@ -237,8 +247,8 @@ def scene_blocks(scene: Scene, more: Sequence[Fact] = ()) -> tuple[Block, ...]:
     facts = (
         Fact("Scene", tuple(filter(None, (scene.name or "without a name", scene.description)))),
         Fact("Changed keys", said or (same,), code=bool(said)),
-        Fact("In it", (", ".join(included) or "none of the effects that the simulator can add",)),
-        Fact("Left out", (", ".join(left_out) or "no effect that the simulator knows",)),
+        Fact("In it", (Sentences(*included, between=", ") or "none of the effects that the simulator can add",)),
+        Fact("Left out", (Sentences(*left_out, between=", ") or "no effect that the simulator knows",)),
         *more,
     )
     note = Note("levilab simulate computes the change by each effect where it is asked to explain.")
@@ -251,26 +261,22 @@ def scene_blocks(scene: Scene, more: Sequence[Fact] = ()) -> tuple[Block, ...]:
 
 def _how_long(run: Run) -> tuple[Fact, ...]:
     settings = run.record.configuration
-    texts = tuple(
-        f"{words} {settings[key]}{unit}"
-        for key, words, unit in (("duration_s", "up to", " s"), ("rate_hz", "states kept:", " per second"))
-        if key in settings
-    )
+    kept = (("duration_s", "up to {x} s"), ("rate_hz", "states kept: {x} per second"))
+    texts = tuple(Text(said, x=settings[key]) for key, said in kept if key in settings)
     return (Fact("Length", texts),) if texts else ()
 
 
 # --- figure --------------------------------------------------------------------------------------------
 
 
-def _pictures(run: Run, scene: Scene, name: str, found: Mapping[str, Any]) -> Iterator[Picture]:
-    summary = _simulate_again(run, scene, found)
+def _pictures(run: Run, name: str, summary: Summary | None) -> Iterator[Picture]:
     stored = run.folder / FIGURE
     if summary is None and not stored.is_file():
         return
     caption = "Path from the side and from above; height, spin, tilt and energy in time; the spectrum of the axis."
     draw = partial(_draw, summary) if summary else partial(_load_figure, stored)
-    alt = f"Simulated motion of the scene {name}: path, height, spin, tilt, energy and spectrum"
-    yield Picture("motion", f"Simulated motion of {name}, SYNTHETIC.", caption, alt, draw, raster=summary is None)
+    alt = Text("Simulated motion of {name:s}, SYNTHETIC.", name=name)
+    yield Picture("motion", alt, caption, alt, draw, raster=summary is None)
 
 
 def _simulate_again(run: Run, scene: Scene, found: Mapping[str, Any]) -> Summary | None:

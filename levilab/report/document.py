@@ -76,10 +76,11 @@ def document_of(
     if results:
         blocks.append(reproduction(results, asked))
     counts = count_inputs(sources)
-    first, *more = [*(part.subject for part in parts), *(one.title.lower() for one in others)]
+    first, *more = [*(part.subject for part in parts), *(one.title for one in others)]
+    capital = first[:1].upper() + first[1:] if parts else first
     return Document(
         title=parts[0].heading if alone else _title(counts, others),
-        lead=_lead(results[0][1], parts[0]) if alone else Text("{parts}", parts=(first[:1].upper() + first[1:], *more)),
+        lead=_lead(results[0][1], parts[0]) if alone else Text("{parts}", parts=(capital, *more)),
         blocks=tuple(blocks),
         banner=banner,
         contents=True,

@@ -11,6 +11,7 @@ from levilab.present.document.blocks import Banner, Code, Fact, Facts, Section, 
 from levilab.present.numbers import plain
 from levilab.present.tables import table
 from levilab.simulator.scene import changes, scene_of
+from levilab.texts.text import Sentences, Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -31,18 +32,20 @@ def stability_section(path: Path) -> Section:
         blocks = tuple(_blocks(found, scene))
     except (OSError, ValueError, KeyError, TypeError, AttributeError, LevilabError) as error:
         raise DataError(f"{path}: is no whole result of levilab stability ({error}); print it anew") from error
-    return Section(f"Where the top floats: {scene.name or 'a scene'}", blocks, "stability", path.name, new_page=True)
+    title = Text("Where the top floats: {name:s}", name=scene.name or "—")
+    return Section(title, blocks, "stability", path.name, new_page=True)
 
 
 def _blocks(found: Mapping[str, Any], scene: Scene) -> Iterator[Block]:
     yield Banner("SYNTHETIC.", "This follows from a model: nothing of it was measured.")
     mass = plain(1e3 * scene.top.mass_kg, 4)
     if found["floats"]:
-        yield Verdict(f"A top of {mass} g floats at {plain(100 * found['height_m'], 4)} cm.")
+        height = plain(100 * found["height_m"], 4)
+        yield Verdict(Text("A top of {g:n} g floats at {cm:n} cm.", g=mass, cm=height))
     else:
         near = found.get("nearest_mass_kg")
-        more = "" if near is None else f"; the nearest mass that does is {plain(1e3 * near, 5)} g"
-        yield Verdict(f"A top of {mass} g does not float{more}.")
+        more = "" if near is None else Text("The nearest mass that does is {g:n} g.", g=plain(1e3 * near, 5))
+        yield Verdict(Sentences(Text("A top of {g:n} g does not float.", g=mass), more))
     if found["remarks"]:
         yield Warnings(tuple((str(text),) for text in found["remarks"]))
     heads = ("heights [cm]", "masses [g]")
@@ -56,7 +59,7 @@ def _blocks(found: Mapping[str, Any], scene: Scene) -> Iterator[Block]:
         (
             plain(100 * place["height_m"], 5),
             "stable" if place["stable"] else "not stable",
-            ", ".join(f"{_number(low)} – {_number(high)}" for low, high in place["spins_hz"]) or "none helps",
+            "; ".join(f"{_number(low)} – {_number(high)}" for low, high in place["spins_hz"]) or "none helps",
         )
         for place in found["equilibria"]
     ]
@@ -68,14 +71,15 @@ def _blocks(found: Mapping[str, Any], scene: Scene) -> Iterator[Block]:
 
 
 def _facts(found: Mapping[str, Any], scene: Scene) -> Iterator[Fact]:
-    modes = ", ".join(
-        plain(mode["frequency"], 4) + (" (grows)" if mode["growth_per_s"] > 1e-6 else "") for mode in found["modes_hz"]
+    modes = tuple(
+        Text("{hz:n} Hz (grows)" if mode["growth_per_s"] > 1e-6 else "{hz:n} Hz", hz=plain(mode["frequency"], 4))
+        for mode in found["modes_hz"]
     )
     if modes:
-        yield Fact(f"Modes at {scene.start.spin_hz:g} Hz", (f"{modes} Hz",))
+        yield Fact(Text("Modes at {hz:g} Hz", hz=scene.start.spin_hz), modes)
     for name, key in (("Up and down", "vertical_mode_hz"), ("Sleeping top's limit", "sleeping_limit_hz")):
         if found[key] is not None:
-            yield Fact(name, (f"{plain(found[key], 4)} Hz",))
+            yield Fact(name, (Text("{hz:n} Hz", hz=plain(found[key], 4)),))
 
 
 def _range(window: Mapping[str, Any], low: str, high: str, factor: float) -> str:

@@ -270,7 +270,7 @@ def _draw_folded(axes: Axes, excerpt: _Excerpt) -> None:
     axes.axvline(0, linewidth=0.9, zorder=1, **LOOKS["pulses"].as_line)
     turns = round(float(np.ptp(excerpt.turns)))
     axes.set(xlabel="part of a turn", ylabel=f"signal  [{excerpt.unit}]", xlim=(-0.5, 0.5))
-    axes.set_title(f"{turns} turns over each other; black: mean", loc="left")
+    axes.set_title(Text("{turns} turns over each other; black: mean", turns=turns), loc="left")
 
 
 def _draw_field(panel: Axes, samples: LineSamples, axes: Sequence[str], spin: SpinFrequency) -> None:
@@ -314,7 +314,7 @@ def _draw_folded_field(panel: Axes, samples: LineSamples, axes: Sequence[str]) -
         panel.plot(fine, 1e6 * _wave(samples, k, fine), color=AXES[k], linewidth=0.9)
     turns = round(float(np.ptp(samples.turns)))
     panel.set(xlabel="part of a turn", ylabel="field  [µT]", xlim=(0, 1))
-    panel.set_title(f"{turns} turns over each other: means and line", loc="left")
+    panel.set_title(Text("{turns} turns over each other: means and line", turns=turns), loc="left")
 
 
 def _draw_spectrum(panel: Axes, samples: LineSamples, found: FieldSpin) -> None:
@@ -348,7 +348,7 @@ def _draw_phases_of_pulses(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -
     axes.axvline(0, linewidth=1, **LOOKS["pulses"].as_line)
     axes.margins(x=0.08, y=0.12)
     axes.set(xlabel="pulse − fit  [µs]", ylabel="pulses")
-    axes.set_title(f"Scatter of a pulse: {digits(1e6 * spin.scatter, 3)} µs", loc="left")
+    axes.set_title(Text("Scatter of a pulse: {us:n} µs", us=digits(1e6 * spin.scatter, 3)), loc="left")
 
 
 def _draw_residuals(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:

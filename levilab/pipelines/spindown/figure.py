@@ -288,7 +288,8 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
         band(axes, t, np.zeros(len(t)), 2 * u, LOOKS[best].colour, alpha=0.25, zorder=1.9)
     most = max(map(abs, limits_about(found, 0.02)))
     axes.locator_params(axis="y", nbins=6)
-    axes.set(xlabel="time  [s]", ylabel=f"ν − ν$_{{\\rm {best}}}$  [Hz]", ylim=(-most, most))
+    label = Text("ν − ν$_{\\rm {law}}$  [Hz]", law=short_law(best))
+    axes.set(xlabel="time  [s]", ylabel=label, ylim=(-most, most))
     ends = []
     for name, difference in curves.items():
         axes.plot(t, difference, linewidth=1.3, zorder=2.6, **LOOKS[name].as_line)
@@ -357,14 +358,8 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
         axes.locator_params(nbins=4)
         axes.set_title(short_law(name), loc="left", color=LOOKS[name].of_text, fontsize=8, fontweight="bold", pad=3)
         if own:
-            axes.set_title(
-                "own scale" if width > 1 else "own",
-                loc="right",
-                color="black",
-                fontsize=SMALL,
-                fontstyle="italic",
-                pad=3,
-            )
+            said = "own scale" if width > 1 else "own"
+            axes.set_title(said, loc="right", color="black", fontsize=SMALL, fontstyle="italic", pad=3)
             axes.set_facecolor("#F4F4F4")
         if place == 0:
             axes.set_ylabel(Text("residual / {unit}", unit=unit.symbol))

@@ -362,9 +362,7 @@ def _beside_truth(of: Compared) -> str:
     if of.truth is None:
         return ""
     agrees = "agrees with" if abs(of.truth[1]) <= _AGREES else "disagrees with"
-    return Text(
-        ", and {agrees} the truth, which is {times:n} u from it", agrees=agrees, times=with_sign(-of.truth[1], 1)
-    )
+    return Text(", and {agrees} the truth ({times:n} u)", agrees=agrees, times=with_sign(of.truth[1], 1))
 
 
 def agreement(of: Class) -> str:

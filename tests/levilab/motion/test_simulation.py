@@ -257,10 +257,10 @@ def test_the_figure_calls_a_change_of_the_energy_an_error_only_where_nothing_cha
     assert "Error of the energy" in texts(summary(preset("undriven"), 2.0))
     dragged = texts(summary(preset("friction"), 2.0))
     assert "Error" not in dragged
-    assert "since the start: drag changes it\n" in dragged
+    assert "since the start by drag\n" in dragged
     washers = texts(summary(preset("loose-washers"), 2.0))
-    assert "drag, drive and friction of the washers change it (without the drive's own part)" in washers
-    assert "since the start: drive changes it (without" in texts(summary(preset("driven"), 2.0))
+    assert "by drag, drive and friction of the washers (without the drive's own part)" in washers
+    assert "since the start by drive (without" in texts(summary(preset("driven"), 2.0))
 
 
 def test_the_figure_shows_the_path_to_scale_and_that_it_is_synthetic():
@@ -318,7 +318,7 @@ def test_of_a_long_tilt_the_envelope_is_drawn_with_its_mean_and_a_second_of_it_b
     found = summary(preset("driven"), 30.0, rate=400.0)
     tilt = np.degrees(found.motion.tilt)
     panels = {panel.get_ylabel(): panel for panel in motion_figure(found).axes}
-    whole = panels["tilt  [degrees]"]
+    whole = panels["tilt  [°]"]
     lines = [np.asarray(line.get_ydata()) for line in whole.get_lines()]
     assert [len(line) for line in lines] == [PIECES, PIECES, PIECES // 12]
     assert (lines[0].min(), lines[1].max()) == pytest.approx((tilt.min(), tilt.max()))

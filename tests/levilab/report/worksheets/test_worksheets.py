@@ -58,6 +58,11 @@ def test_the_commands_of_a_worksheet_find_the_numbers_of_its_key(experiment, tmp
     assert all(None not in one.truths for one in key.quantities if one.name not in sheet.asked)
     assert {*sheet.asked} <= {one.name for one in key.quantities}
     assert json.loads(next((tmp_path / "class").glob("2*/run.json")).read_text(encoding="utf-8"))["seed"] == 41
+    if experiment == "spin":  # what students calculate by hand is within the 0.5 % of the key's answer
+        (readings,) = (tmp_path / "class").glob("2*/readings.csv")
+        (t1, nu1), *_, (t2, nu2) = np.loadtxt(readings, delimiter=",", skiprows=1, usecols=(0, 1))
+        by_hand = 2 * ((2 * np.pi * nu2) ** -0.5 - (2 * np.pi * nu1) ** -0.5) / (t2 - t1)
+        assert by_hand == pytest.approx(key.quantities[0].estimates[0].value, rel=0.005)
 
 
 @pytest.mark.slow
