@@ -10,17 +10,8 @@ from matplotlib.text import Text
 from levilab.errors import DataError
 from levilab.motion.report import motion_section
 from levilab.motion.simulation import SimulationRequest, run_simulation
-from levilab.present.document.blocks import (
-    Banner,
-    Code,
-    Details,
-    Facts,
-    Picture,
-    Section,
-    Tabular,
-    Verdict,
-    in_language_of_reader,
-)
+from levilab.present.document.blocks import Banner, Code, Details, Facts, Picture, Section, Tabular, Verdict
+from levilab.present.document.blocks import in_language_of_reader as in_language
 from levilab.report.kinds import KINDS, MOST_IN_FULL, SWEEP
 from levilab.report.page import write_report
 from levilab.runs.run import Run
@@ -32,7 +23,6 @@ from levilab.sweeps.axes import axis_of
 from levilab.sweeps.request import SweepRequest, store_for
 from levilab.sweeps.run import compile_for, run
 from levilab.sweeps.store import SCHEMA
-from levilab.texts.text import in_language
 from levilab.workers import this_process
 from support.paths import SAMPLE_DATA
 
@@ -93,12 +83,11 @@ def test_a_motion_says_how_it_ended_what_was_changed_and_how_good_it_is(folder):
 @pytest.mark.parametrize("of", ["motion", "stability"])
 def test_a_simulation_is_reported_in_german_to_the_last_word(of, place, folder):
     section = motion_section(Run.load(folder)) if of == "motion" else stability_section(place / "where.json")
-    said = [repr(in_language_of_reader(section, "de")).replace(preset("undriven").description, "")]
+    said = [repr(in_language(section, "de")).replace(preset("undriven").description, "")]
     for figure in (picture.draw() for picture in of_kind(section, Picture)):
         said += [in_language(text.get_text(), "de") for text in figure.findobj(Text)]
-    assert {"the", "of", "is", "and", "with", "it"} & set(
-        re.findall(r"(?<![\w-])[a-z]+(?!-)\b", re.sub("<.*?>", "", " ".join(said)))
-    ) == set()
+    words = re.findall(r"(?<![\w-])[a-z]+(?!-)\b", re.sub("<.*?>", "", " ".join(said)))
+    assert {"the", "of", "is", "and", "with", "it"} & {*words} == set()
 
 
 def test_a_motion_is_drawn_anew_only_if_it_ends_in_the_state_that_was_recorded(folder, tmp_path):
