@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.errors import unquote
 from levilab.files import check_writable
-from levilab.pipelines.suits import recall_suiting
+from levilab.pipelines.sources import OTHER_COLUMNS, LeftOut
+from levilab.pipelines.suits import recall_suiting, remarks
 from levilab.present.document.blocks import (
     Details,
     Document,
@@ -72,9 +73,8 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str) -
     sources = list({source.path.resolve(): source for of in classes for source in of.found.sources}.values())
     classes = sorted(classes, key=lambda of: -len(of.groups))  # what one group alone measured comes last
     alone = len(classes) == 1
-    warnings = dict.fromkeys(
-        unquote(in_language(text)).replace("`", "") for of in classes for text in of.found.warnings
-    )
+    found = [*(text for of in classes for text in of.found.warnings), *_unread(classes)]
+    warnings = dict.fromkeys(unquote(in_language(text)).replace("`", "") for text in found)
     of_all = [Warnings(tuple((text,) for text in warnings))] if warnings else []
     chapters: list[Block] = []
     for k, of in enumerate(classes):
@@ -88,6 +88,16 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str) -
         banner=banner_of(sources),
         contents=True,
     )
+
+
+def _unread(classes: Sequence[Class]) -> list[str]:
+    """Return the tables of which no analysis could make a result; other files are no matter of a class."""
+    said = "{file}: a table that could not be read: `levilab open` shows its columns, and keeps what you correct"
+    return [
+        Text(said, file=one.path)
+        for one in remarks([of.found.remarks for of in classes])
+        if isinstance(one, LeftOut) and one.kind == OTHER_COLUMNS
+    ]
 
 
 def _subject(of: Class) -> str:
@@ -265,6 +275,8 @@ def write_class(
         content = class_workbook(classes, date)
     write_content(output, content)
     if tell:
+        for text in _unread(classes):
+            tell(text)
         found = ", ".join(f"{one.analysis.name} ({len(one.groups)})" for one in classes)
         tell(Text("groups or runs side by side: {found:s}", found=found))
     return output

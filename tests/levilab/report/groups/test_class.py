@@ -162,6 +162,8 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
     halved = [f"{t},{float(spin) / 2},{u}" for t, spin, u in (row.split(",") for row in rows)]
     (wrong / "readings.csv").write_text("\n".join([heads, *halved, ""]), encoding="utf-8")
     (root / "Group 4.csv").write_text("t in s,f in Hz\n0,40\n10,abc\n20,37\n", encoding="utf-8")
+    in_rpm = "".join(f"{10 * k},{2400 - 60 * k}\n" for k in range(15))  # or in Hz: the file does not say it
+    (root / "Group 5.csv").write_text(f"t,f\n{in_rpm}", encoding="utf-8")
     of = compared(root)
     assert {group.source.name: one.word for group, one in zip(of.groups, of.marks, strict=True)} == {
         HOSTILE: GOOD, "Group 2": REPEAT, "Group 10": GOOD,
@@ -169,7 +171,9 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
     assert verdict(of).startswith("2 of 3 results are good. To repeat: Group 2.")
     assert of.quantities[0].used == tuple(group.source.name != "Group 2" for group in of.groups)
     assert of.quantities[0].mean.value == pytest.approx(2.4e-4, rel=0.03)  # the halved spins have 3.3e-4
-    page = Page(write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")).text
+    page = Page(write_class([root], tmp_path / "class.html", tell=(told := []).append).read_text("utf-8")).text
+    assert "Group 5.csv: a table that could not be read: levilab open shows its columns" in page
+    assert any("Group 5.csv" in text for text in told)
     assert re.search(r"skipped \S*Group 4.csv, line 1: holds 2 readings.* line 3: '10,abc' is no reading", page)
     assert re.search(r"Group 2 repeat C₃/₂: \+\d+\.\d u from its truth", page)
 
