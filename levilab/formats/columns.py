@@ -349,8 +349,8 @@ def _with_periods(header: Sequence[str]) -> list[Title]:
     titles = [read_title(text) for text in header]
     if sum(title.column == "time_s" for title in titles) > 1:
         titles = [as_a_period(text) or title for text, title in zip(header, titles, strict=True)]
-        if any(title.inverse for title in titles):
-            titles = [_of_the_period(text, title) for text, title in zip(header, titles, strict=True)]
+    if any(title.inverse for title in titles):
+        titles = [_of_the_period(text, title) for text, title in zip(header, titles, strict=True)]
     if any(title.column == "spin_frequency_hz" and not title.inverse for title in titles):
         titles = [Title(None, title.unit) if title.inverse else title for title in titles]
     return titles

@@ -125,7 +125,10 @@ UNCERTAINTIES = (
     "osäkerhet", "error", "err", "fehler", "messfehler", "stderr", "standard_error", "standard_uncertainty",
 )  # fmt: skip
 # These stand alone: beside a mean they are of one reading.
-_SCATTERS = ("sd", "std", "stddev", "std_dev", "standardabweichung", "se", "df")
+_SCATTERS = (
+    "sd", "std", "stddev", "stdev", "std_dev", "std._dev.", "stabw", "standardabweichung", "se", "sem", "std_error",
+    "df",
+)  # fmt: skip
 COMPANION_FORMS = (
     "u({})",
     "δ{}",

@@ -66,7 +66,7 @@ SLOWEST_SPIN_HZ, FASTEST_SPIN_HZ = 10.0, 100.0
 _EXPANDED = re.compile(r"2 ?(?:σ|sigma)|k ?= ?2|fehler|error|unsicherheit|uncertaint", re.IGNORECASE)
 #: Units in which the numbers of a file may be meant.
 _UNITS = ("Hz", "rpm", "rad/s", "°/s")
-#: Relative uncertainties [%] below which those of a spreadsheet are probably parts of one, shown in %.
+#: Uncertainties of a spreadsheet, in % or without a unit, below which they may be parts of one, shown in %.
 _LEAST_PERCENT = 0.02
 #: Columns of a spin-down.
 SPIN = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
@@ -557,11 +557,13 @@ def _notes_on_u(path: Path, layout: Layout, chosen: Sequence[Column], *, wanted:
     notes: list[str] = [
         of_file("expanded u", f"{name}: column '{shorten(title)}' is not read: {how}") for title in expanded
     ]
-    said = "{path:s}: column '{title:s}' holds {number:g}, taken in %; if it shows {shown:g} %, write u in Hz"
-    for column in (one for one in chosen if layout.aligned and one.unit == "%"):
+    said = "{path:s}: column '{title:s}' holds {number:g}, taken in {unit:s}; if it shows {shown:g} %, write u in Hz"
+    for column in (one for one in chosen if layout.aligned and one.name == companion(_SPIN)):
+        bare = column.unit == "%" or read_title(column.label).unit is None
         number = max(_numbers(layout, column.index), default=1.0)
-        if number < _LEAST_PERCENT:
-            text = Said(said, path=name, title=shorten(column.label), number=number, shown=100 * number)
+        if bare and number < _LEAST_PERCENT:
+            title, unit = shorten(column.label), column.unit or "Hz"
+            text = Said(said, path=name, title=title, number=number, unit=unit, shown=100 * number)
             notes.append(of_file("percent", text))
     return notes
 

@@ -56,8 +56,7 @@ def test_counts_of_twice_the_spin_are_no_readings_and_warned_of_once():
     (warning,) = bench.warnings
     assert "61.7 Hz after 31 Hz, 2 times what follows" in warning
     assert "second bright mark" in warning
-    reading = top.read()
-    assert reading["spin_frequency_hz"] == 30.1
+    assert top.read()["spin_frequency_hz"] == 30.1
 
 
 def test_after_a_miscount_the_true_spin_is_taken_again():
@@ -72,8 +71,7 @@ def test_after_a_miscount_the_true_spin_is_taken_again():
 
 def test_a_lower_spin_that_two_counts_agree_on_is_a_reading():
     top = Bench(12.0, 12.0).top((90.0, 31.0))  # touched
-    reading = top.read()
-    assert reading["spin_frequency_hz"] == 12.0
+    assert top.read()["spin_frequency_hz"] == 12.0
 
 
 @pytest.mark.parametrize(("spin", "taken"), [(31.9, True), (15.4, True), (15.0, False), (32.6, False), (40.0, False)])

@@ -133,6 +133,16 @@ def test_readings_are_read_however_they_are_written(text, u, tmp_path):
         assert "behind the ± is taken as the standard uncertainty" in " ".join(table.warnings)
 
 
+@pytest.mark.parametrize(("title", "unit"), [("u", "Hz"), ("u [%]", "%")])
+def test_a_u_whose_cells_may_show_percent_is_said(title, unit, tmp_path):
+    with xlsxwriter.Workbook(tmp_path / "u.xlsx") as book:
+        sheet = book.add_worksheet()
+        for k, row in enumerate([("t [s]", "f [Hz]", title), *((10 * k, f, 0.001) for k, f in enumerate(SPINS))]):
+            sheet.write_row(k, 0, row)
+    (note,) = read_table(tmp_path / "u.xlsx").warnings
+    assert f"column '{title}' holds 0.001, taken in {unit}; if it shows 0.1 %, write u in Hz" in note
+
+
 @pytest.mark.parametrize("name", ["Messung {}", "{}"])
 def test_tables_below_and_beside_one_another_are_runs(name, tmp_path):
     names = [name.format(k) for k in (1, 2)]

@@ -100,6 +100,7 @@ TABLES = {
     "month first": ("t,f\n12/31/2025 11:59:59 PM,61.5\n1/1/2026 12:00:00 AM,61.25\n1/1/2026 12:00:01 AM,61\n", SECONDS),
     "one day": ("t,f\n1/2/2026 9:59:59,61.5\n1/2/2026 10:00,61.25\n1/2/2026 10:00:01,61\n", SECONDS),
     "percent": ("t,f,u [%]\n0,50,1\n1,40,1\n2,20,5\n", {T: [0, 1, 2], F: [50, 40, 20], U: [0.5, 0.4, 1]}),
+    "scatter": ("t,rpm,Std. Dev. [rpm]\n0,3000,6\n1,2400,6\n2,1200,6\n", {T: [0, 1, 2], F: [50, 40, 20], U: [0.1] * 3}),
     "Arduino's clock": ("millis,rpm\n0,3690\n500,3675\n1000,3660\n", PLAIN),
     "Arduino's finer clock": ("micros,rpm\n0,3690\n500000,3675\n1000000,3660\n", PLAIN),
     "guarded against formulas": ("t,f\n'-1,61.5\n0,61.25\n1,61\n", PLAIN | {T: [-1, 0, 1]}),
@@ -437,9 +438,10 @@ def test_periods_and_turns_in_a_time_are_read_as_frequencies(title, values, tabl
 HZ = (1.0, 2.0, math.nan, 4.0)
 
 
-@pytest.mark.parametrize("title", ["u [ms]", "u", "u_T [ms]", "T_err [ms]", "u_T"])
-def test_the_uncertainty_of_a_period_becomes_that_of_the_frequency(title, table_file):
-    table = read_table(table_file(f"t,T [ms],{title}\n0,25,0.1\n1,20,0.1\n2,40,0.1\n"))
+@pytest.mark.parametrize("period", ["T [ms]", "period (ms)"])
+@pytest.mark.parametrize("title", ["u [ms]", "u", "u_T [ms]", "T_err [ms]", "u_T", "ΔT [ms]", "u(T) [ms]"])
+def test_the_uncertainty_of_a_period_becomes_that_of_the_frequency(title, period, table_file):
+    table = read_table(table_file(f"t,{period},{title}\n0,25,0.1\n1,20,0.1\n2,40,0.1\n"))
     assert table.column(U).tolist() == pytest.approx([1e-4 * f**2 for f in (40.0, 50.0, 25.0)])
 
 

@@ -286,8 +286,7 @@ def test_an_interrupted_series_goes_on_with_the_next_top(tmp_path):
     run = acquire(mock(tmp_path, seed=None, resume=half.folder), Silent())
     limits = run.readings().frame["spin_frequency_hz"].tolist()
     assert limits[:2] == before
-    truth = [random_scene(1).fall_of(number) for number in range(4)]
-    assert np.allclose(limits, truth, rtol=0, atol=0.25)  # 4 standard uncertainties
+    assert limits == pytest.approx([random_scene(1).fall_of(number) for number in range(4)], abs=0.25)  # 4 u
 
 
 def test_a_series_that_is_resumed_after_its_time_has_it_anew(tmp_path):
@@ -295,9 +294,7 @@ def test_a_series_that_is_resumed_after_its_time_has_it_anew(tmp_path):
     file = half.folder / "readings.csv"
     header, row, *_ = file.read_text(encoding="utf-8").splitlines()
     file.write_text(f"{header}\n{','.join(['90000.0', *row.split(',')[1:]])}\n", encoding="utf-8")
-    show = Silent()
-    run = acquire(mock(tmp_path, seed=None, resume=half.folder), show)
-    assert run.count() == 2
+    assert acquire(mock(tmp_path, seed=None, resume=half.folder), show := Silent()).count() == 2
     assert show.left == [0.0]
 
 
