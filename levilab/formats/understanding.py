@@ -552,7 +552,7 @@ def _notes_on_u(path: Path, layout: Layout, chosen: Sequence[Column], *, wanted:
     """Return notes on columns of expanded uncertainties, where standard ones are missing, and on cells in %."""
     name = shorten(str(path), 200)
     how = "u is half of 2σ or of U (k = 2), and a greatest error divided by √3: write it in a column u [Hz]"
-    missing = wanted and companion(_SPIN) not in {one.name for one in chosen}
+    missing = wanted and {_SPIN, companion(_SPIN)} & {one.name for one in chosen} == {_SPIN}
     expanded = [title for title in layout.header if missing and _EXPANDED.search(title)]
     notes: list[str] = [
         of_file("expanded u", f"{name}: column '{shorten(title)}' is not read: {how}") for title in expanded

@@ -445,10 +445,13 @@ def test_the_uncertainty_of_a_period_becomes_that_of_the_frequency(title, period
     assert table.column(U).tolist() == pytest.approx([1e-4 * f**2 for f in (40.0, 50.0, 25.0)])
 
 
-@pytest.mark.parametrize(("header", "column"), [("t,u_t,T [ms]", "time_u_s"), ("T,u_T,f", "time_u_s")])
-def test_the_uncertainty_of_a_time_stays_that_of_the_time(header, column, table_file):
+@pytest.mark.parametrize(("header", "column", "u"), [
+    ("t,u_t,T [ms]", "time_u_s", 0.1), ("T,u_T,f", "time_u_s", 0.1), ("z [m],u,B [mT]", "flux_density_u_t", 1e-4),
+    ("z [m],Fehler [G],B [mT]", "flux_density_u_t", 1e-5), ("z [m],u [mm],B [mT]", "height_u_m", 1e-4),
+])  # fmt: skip
+def test_an_uncertainty_is_that_of_what_stands_beside_it(header, column, u, table_file):
     table = read_table(table_file(f"{header}\n0,0.1,40\n1,0.1,50\n2,0.1,25\n"))
-    assert table.column(column).tolist() == [0.1, 0.1, 0.1]
+    assert (table.column(column).tolist(), table.warnings) == (pytest.approx([u] * 3), ())
 
 
 def test_a_missing_column_is_reported_with_those_there_are(table_file):
