@@ -40,7 +40,7 @@ from levilab.present.units import split
 from levilab.report.worksheets.document import read_language
 from levilab.report.worksheets.sheets import TOPS
 from levilab.settings import KINDS, LIMITS, WHOLE
-from levilab.simulator.scene import REMARKS, RULES, SWITCHES, Scene
+from levilab.simulator.scene import REMARKS, RULES, SWITCHES, Scene, preset, presets
 from levilab.texts.text import Text, in_language, language_of, languages, speak, text_from, text_of
 from support.paths import SAMPLE_DATA
 from support.sources import sources
@@ -107,12 +107,13 @@ def of_worksheets():
 
 
 def of_files() -> set[str]:
-    """What is said of files and runs that are left out."""
+    """What is said of files and runs that are left out, and of scenes."""
     kinds = (*files.KINDS, files.OTHER, files.EMPTY, OTHER_COLUMNS)
     runs = {f"{name} run" for name in EXPERIMENTS}
     needed = {one.runs for one in ANALYSES.values()}
     texts = {text for kind in kinds for text in (kind.name, kind.several, kind.advice)}
-    return texts | needed | runs | {f"{r}s" for r in runs}
+    scenes = {preset(name).description for name in presets()}
+    return texts | needed | scenes | runs | {f"{r}s" for r in runs}
 
 
 def errors(base: type[Exception]) -> set[str]:
