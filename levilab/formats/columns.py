@@ -354,15 +354,17 @@ def _with_periods(header: Sequence[str]) -> list[Title]:
     if any(title.column == "spin_frequency_hz" and not title.inverse for title in titles):
         titles = [Title(None, title.unit) if title.inverse else title for title in titles]
     found = {title.column for title in titles}
-    if "flux_density_t" in found and "spin_frequency_hz" not in found:
-        titles = [_of_the_field(title) if title.column == companion("spin_frequency_hz") else title for title in titles]
+    other = next((name for name in ("flux_density_t", "precession_frequency_hz") if name in found), None)
+    if other and "spin_frequency_hz" not in found:
+        bare = companion("spin_frequency_hz")
+        titles = [_of_another(title, other) if title.column == bare else title for title in titles]
     return titles
 
 
-def _of_the_field(title: Title) -> Title:
-    """Return the title of a u that stands alone beside a field: that of the height where its unit is a length."""
+def _of_another(title: Title, other: str) -> Title:
+    """Return the title of a u that stands alone beside no spin: that of the height where its unit is a length."""
     of_height = title.unit is not None and unit_factor(title.unit, "length") is not None
-    return Title(companion("height_m" if of_height else "flux_density_t"), title.unit)
+    return Title(companion("height_m" if of_height else other), title.unit)
 
 
 def _of_the_period(text: str, title: Title) -> Title:

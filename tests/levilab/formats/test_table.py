@@ -448,6 +448,7 @@ def test_the_uncertainty_of_a_period_becomes_that_of_the_frequency(title, period
 @pytest.mark.parametrize(("header", "column", "u"), [
     ("t,u_t,T [ms]", "time_u_s", 0.1), ("T,u_T,f", "time_u_s", 0.1), ("z [m],u,B [mT]", "flux_density_u_t", 1e-4),
     ("z [m],Fehler [G],B [mT]", "flux_density_u_t", 1e-5), ("z [m],u [mm],B [mT]", "height_u_m", 1e-4),
+    ("drive [Hz],u,precession [Hz]", "precession_frequency_u_hz", 0.1),
 ])  # fmt: skip
 def test_an_uncertainty_is_that_of_what_stands_beside_it(header, column, u, table_file):
     table = read_table(table_file(f"{header}\n0,0.1,40\n1,0.1,50\n2,0.1,25\n"))
