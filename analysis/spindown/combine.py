@@ -115,9 +115,7 @@ def combine(runs: Sequence[SpinDown]) -> Combined:
     correlation = _correlation(runs)
     fits = tuple(_combine_law(name, [run.fit(name) for run in runs], weighed[name]) for name in names)
     changes = tuple(1.0 if run.verdict.change is None else run.verdict.change.p for run in runs)
-    unsettled = frozenset(name for run in runs for name in run.verdict.unsettled)
-    several = verdict(weighed, criterion, changes=changes, unsettled=unsettled)
-    decision = runs[0].verdict if len(runs) == 1 else several
+    decision = runs[0].verdict if len(runs) == 1 else verdict(weighed, criterion, changes=changes)
     mixed = 0 < sum(run.u is None for run in runs) < len(runs)
     said = [
         *comparison_remarks(weighed, decision.best, mixed=mixed),

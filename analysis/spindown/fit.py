@@ -170,9 +170,8 @@ def fit_spin_down(
         if keep_outliers or not agree.any():
             break
         outliers = outliers[~agree]
-    unsettled = frozenset(name for name, each in found.items() if not each.converged)
     change = _change(found[best], found.get("power"))
-    decision = verdict(stats, criterion, change=change, unsettled=unsettled)
+    decision = verdict(stats, criterion, change=change)
     best = decision.best
     return SpinDown(
         fits=tuple(replace(fits[name], statistics=stats[name]) for name in chosen),

@@ -12,23 +12,25 @@ from analysis.least_squares import solve
 from analysis.remarks import Remark
 from analysis.residuals import durbin_watson, runs_test_p, studentise
 from analysis.spindown.drag import LAWS, DragLaw
-from analysis.spindown.posterior import RHO, Posterior, posterior
+from analysis.spindown.posterior import RHO, STATED_FREEDOM, Noise, Posterior, posterior, probability
 from analysis.spindown.readings import Readings
 from analysis.spindown.selection import Statistics, statistics
-from analysis.spindown.tilt import MORE, THESIS_TOP, CountedLaw, Release, Top, count_of
+from analysis.spindown.tilt import ACCURACY, MORE, THESIS_TOP, CountedLaw, Release, Top, count_of
 from analysis.uncertainty import ROUNDING, Estimate, propagate
 
 Array = NDArray[np.float64]
 
-#: A search ends where a step moves no parameter by more of its u; the answer is within the square of that.
-_CLOSE = 0.05
-_MOST_STEPS = 30
-#: Share of each step that is taken; a search that led to and fro is begun again with the next.
-_SHARES = (1.0, 0.5, 0.25)
+#: A search ends where a step promises to move the parameters by no more of their u; it has converged where a whole
+#: step, without damping, promises no more than one: with u near the accuracy of the count no step leads closer.
+_CLOSE, _CONVERGED = 0.05, 1.0
+_MOST_STEPS = 200  # a law that fits takes 5, one that fits badly up to 100
+_DAMPING = 1e-3  # of the first step, relative to the squares of the slopes
+#: With fewer readings beyond all parameters law and tilt together fit any noise, and s at its mode would fall to zero:
+#: it is held during each search, as if so many readings told it, and settles from the scatter about the law with the
+#: tilt that is expected.
+_FEW, _HELD, _SEARCHES = 4, 1_000_000, 3
 #: Of more readings means over neighbours are fitted, for which a spin-down is straight within the noise.
 _MOST = 3000
-#: Of a step: the longest in a, and in A in units of its prior u.  The tilt bends more than linearly beyond.
-_LONGEST_GAP, _LONGEST_TILT = 0.25, 0.5
 #: Of ln of the spin that the air takes from a driven top: after ten minutes the nutation no longer grows, or it falls.
 _MOST_LOST = 2.0
 MAX_STATED_FACTOR = 3.0  # u(ln c) above which "known to a factor" says nothing
@@ -69,7 +71,7 @@ class LawFit:
         start_time: time of the first reading [s].
         solution: the same parameters, dimensionless (see `analysis.spindown.drag`, and `tilt.counted`).
         reference: their units, spin frequency [Hz] and time [s].
-        top: whose count it is.
+        top: whose count it is, as the readings move κ and β.
         shared_u: by parameter, the part of its u that is the same for all runs of one top, with one sign.
         parts: by parameter, what u is made of; empty where u is undefined.
         rho: correlation of neighbouring readings' noise; None where undefined, or known.
@@ -221,9 +223,7 @@ class Solution:
             return np.zeros(len(self.readings))
         expected, u = self.counted.expected if self.counted else (np.empty(0), np.empty(0))
         p, sigma = len(self.q) - len(u), np.sqrt(found.variance)
-        moved = np.zeros(len(self.q))
-        moved[p + MORE : p + MORE + 2] = found.step[p + MORE : p + MORE + 2]  # what the fit itself keeps
-        left = np.append(self.residuals - moved @ self.slopes, sigma * ((self.q + moved)[p:] - expected) / u)
+        left = np.append(self.residuals, sigma * (self.q[p:] - expected) / u)
         own = np.append(
             np.einsum("pn,pq,qn->n", self.slopes, found.covariance, self.slopes) / found.variance,
             np.diagonal(found.covariance)[p:] / u**2,
@@ -252,19 +252,15 @@ def solution(
     """
     few = readings.means(_MOST)
     tau, weight = few.tau, few.weight
-    q, converged = solve(
+    q, _ = solve(
         lambda q: (law.spin(tau, q) - few.x) * weight, lambda q: law.gradient(tau, q) * weight, _start(law, few)
     )
     with_tilt = _with_tilt(law, readings, q, top, release) if tilt else None
     form: DragLaw | CountedLaw = with_tilt or law
     expected, u = with_tilt.expected if with_tilt else (np.empty(0), np.empty(0))
-    start = np.concatenate([q, expected])
-    for share in _SHARES:
-        q, close, found = _search(form, few, start, (expected, u), share=share, rho=rho)
-        if close:
-            break
+    q, converged, found = _search(form, few, np.concatenate([q, expected]), (expected, u), rho)
     left, slopes = _of_readings(form, readings, q)
-    return Solution(law, with_tilt, readings, q, converged and close, left, slopes, found)
+    return Solution(law, with_tilt, readings, q, converged, left, slopes, found)
 
 
 def _with_tilt(law: DragLaw, readings: Readings, q: Array, top: Top, release: Release | None) -> CountedLaw:
@@ -280,51 +276,68 @@ def _with_tilt(law: DragLaw, readings: Readings, q: Array, top: Top, release: Re
 
 
 def _search(
-    form: DragLaw | CountedLaw,
-    readings: Readings,
-    start: Array,
-    prior: tuple[Array, Array],
-    *,
-    share: float,
-    rho: Array,
+    form: DragLaw | CountedLaw, readings: Readings, start: Array, prior: tuple[Array, Array], rho: Array
 ) -> tuple[Array, bool, Posterior | None]:
-    """Return where a search ends, whether it converged, and the posterior there.
+    """Return the mean of what is known after the readings, whether the search converged, and the posterior.
+
+    The most probable point is searched for by damped steps (K. Levenberg & D. Marquardt; how damping follows the gain:
+    H. B. Nielsen, IMM-REP-1999-05, Technical University of Denmark), and the posterior is linear about it.
 
     Args:
         form: the law, or the count under it.
         readings: to which it is fitted.
         start: first parameters, shape (p,).
         prior: expected values and u of the last parameters, those of the tilt, shapes (k,).
-        share: of each step, that is taken.
         rho: correlations of neighbouring readings' noise that are possible.
     """
-    expected, u = prior
-    p, least = len(start) - len(expected), ROUNDING * float(np.max(readings.weight))
-    q, found = start, None
+    n, p, law = len(readings), len(start), len(start) - len(prior[0])
+    rounding = ROUNDING * float(np.max(readings.weight))
+    if readings.sigma_known or n - p >= _FEW:
+        least = ACCURACY / ROUNDING * rounding if law < p else rounding
+        noise = Noise(STATED_FREEDOM if readings.sigma_known else 0, STATED_FREEDOM * readings.sigma_known, least, rho)
+        return _climb(form, readings, start, prior, (noise, noise))
+    left, slopes = _of_readings(form, readings, start)
+    if np.isfinite(slopes).all():
+        left = left - slopes[:law].T @ np.linalg.lstsq(slopes[:law].T, left, rcond=None)[0]
+    variance = max(float(left @ left) / max(n - law, 1), rounding**2)
+    settling, q = Noise(0, 0.0, rounding, rho, variance), start
+    for _ in range(_SEARCHES):
+        held = Noise(_HELD, _HELD * variance, rounding, rho)
+        q, converged, found = _climb(form, readings, q, prior, (held, settling))
+        variance = found.variance if found else variance
+    return q, converged, found
+
+
+def _climb(
+    form: DragLaw | CountedLaw, readings: Readings, start: Array, prior: tuple[Array, Array], noises: tuple[Noise, ...]
+) -> tuple[Array, bool, Posterior | None]:
+    """Return the same, for what is known of the noise in the search and at its end."""
+    (expected, u), p, law = prior, len(start), len(start) - len(prior[0])
+    q, tried, value, promised, damping, growth = start, start, np.inf, np.inf, _DAMPING, 2.0
     with np.errstate(all="ignore"):
         for _ in range(_MOST_STEPS):
-            left, slopes = _of_readings(form, readings, q)
-            if not (np.isfinite(slopes).all() and np.isfinite(left).all()):
-                return q, False, None
-            found = posterior(
-                readings.time, left, slopes, (expected - q[p:], u), stated=readings.sigma_known, least=least, rho=rho
-            )
-            if found is None:
+            here = (readings.time, *_of_readings(form, readings, tried), (expected - tried[law:], u), noises[0])
+            now, rows = probability(*here)
+            if now < value:
+                gain = (value - now) / max(promised, ROUNDING) if value < np.inf else 1.0
+                damping, growth = damping * max(1 / 3, 1 - (2 * gain - 1) ** 3), 2.0
+                q, value, best = tried, now, here
+                size = np.maximum(np.linalg.norm(rows[:, :p], axis=0), 1e-300)
+                basis, r = np.linalg.qr(rows[:, :p] / size)
+                aim = basis.T @ rows[:, p]
+                promised = float(aim @ aim)
+            else:
+                damping, growth = damping * growth, 2 * growth
+            if promised <= _CLOSE**2 or value == np.inf:
                 break
-            step, own = found.step.copy(), np.sqrt(np.diagonal(found.covariance))
-            step[p + MORE : p + MORE + 2] = 0.0  # κ and β stay as they were given
-            if not np.isfinite(step).all():
-                return q, False, found
-            if (np.abs(step) <= _CLOSE * own).all():
-                return q + step, True, found
-            if len(expected):
-                step *= min(
-                    1.0,
-                    _LONGEST_GAP / max(abs(float(step[p + 1])), _LONGEST_GAP),
-                    _LONGEST_TILT * u[0] / max(abs(float(step[p])), _LONGEST_TILT * u[0]),
-                )
-            q = q + share * step
-    return q, False, found
+            damped = np.vstack([r, np.sqrt(damping) * np.eye(p)])
+            step = np.linalg.lstsq(damped, np.append(aim, np.zeros(p)), rcond=None)[0]
+            promised = float(aim @ aim - np.sum((aim - r @ step) ** 2))
+            tried = q + step / size
+        found = posterior(*best[:-1], noises[1]) if value < np.inf else None
+    if found is None or not np.isfinite(found.step).all():
+        return q, False, found
+    return q + found.step, float(aim @ aim) <= _CONVERGED**2, found
 
 
 def _of_readings(form: DragLaw | CountedLaw, readings: Readings, q: Array) -> tuple[Array, Array]:
@@ -367,7 +380,7 @@ def fit_law(found: Solution, gate: float | None = None) -> LawFit:
         start_time=readings.start_time,
         solution=found.counted.solution(found.q) if found.counted else found.q,
         reference=(readings.reference_hz, readings.duration),
-        top=found.counted.top if found.counted else THESIS_TOP,
+        top=found.counted.moved_top(found.q) if found.counted else THESIS_TOP,
         shared_u=_shared_u(found, slopes) if known and found.counted else {},
         parts=_parts(found, slopes, u, gate) if known else {},
         rho=None if after is None or not known or not after.rho_u else Estimate(after.rho, after.rho_u, "1"),

@@ -16,6 +16,7 @@ the mixture over ρ, with the evidence as weights (A. Gelman et al., Bayesian Da
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,11 +33,25 @@ INDEPENDENT = np.zeros(1)
 _ALIKE = 1e-12
 #: Rounds in which s settles: to 1e-3 of itself.
 _ROUNDS = 3
-#: With fewer readings beyond the parameters s starts from the scatter about the law with all others as expected: from
-#: below it would fall to zero, for as many parameters as readings fit any noise.
-_FEW = 4
 #: Numbers that are worked on at once.
 _AT_ONCE = 2_000_000
+
+
+class Noise(NamedTuple):
+    """What is known of the noise beforehand.
+
+    Attributes:
+        freedom, squares: degrees of freedom that tell s², and the sum of their squares.
+        least: of s: the rounding of numbers.
+        rho: correlations of neighbours, equally probable.
+        few: s² from which s settles where law and tilt together fit any noise: from below it would fall to zero.
+    """
+
+    freedom: int
+    squares: float
+    least: float
+    rho: Array
+    few: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,14 +80,7 @@ class Posterior:
 
 
 def posterior(
-    time: Array,
-    residuals: Array,
-    slopes: Array,
-    priors: tuple[Array, Array],
-    *,
-    stated: bool,
-    least: float,
-    rho: Array = RHO,
+    time: Array, residuals: Array, slopes: Array, priors: tuple[Array, Array], noise: Noise
 ) -> Posterior | None:
     """Average over the noise and all parameters but those that are asked for.
 
@@ -81,15 +89,13 @@ def posterior(
         residuals: readings less the model, in units of u or of ν_ref, shape (n,).
         slopes: of the model in the same units, shape (p, n).
         priors: of the last k parameters: expected value less the present one, and its standard uncertainty.
-        stated: whether u was.
-        least: of s: the rounding of numbers.
-        rho: correlations of neighbours, equally probable beforehand.
+        noise: what is known of it.
 
     Returns:
         None where the readings do not separate the parameters.
     """
-    (p, n), (expected, u) = slopes.shape, priors
-    k, stated_freedom = len(u), STATED_FREEDOM if stated else 0
+    (p, n), (expected, u), (freedom, squares, least, rho, few) = slopes.shape, priors, noise
+    k = len(u)
     scale = np.linalg.norm(slopes, axis=1)
     scale[p - k :] = np.where(scale[p - k :] > 0, scale[p - k :], 1.0)
     if not (np.isfinite(scale).all() and (scale > 0).all()):
@@ -101,14 +107,11 @@ def posterior(
     ridge[:, np.arange(k), np.arange(k)] = 1 / (u * scale[p - k :])
     ridge[:, :, p] = expected / u
 
-    s2 = np.maximum(triangles[:, p, p] ** 2 / max(n - p, 1), least**2)
-    if n - p < _FEW:
-        expected_left = triangles[:, :, p] - triangles[:, :, :k] @ (scale[p - k :] * expected)
-        _, of_law = np.linalg.qr(np.concatenate([triangles[:, :, k:p], expected_left[:, :, None]], axis=2))
-        s2 = np.maximum(of_law[:, -1, -1] ** 2 / max(n - (p - k), 1), least**2)
-    if stated:
-        s2 = (stated_freedom + triangles[:, p, p] ** 2) / (stated_freedom + max(n - p, 0))
+    # s by the residuals of the point itself: a law that fits badly is far from linear where a step would fit best
+    free = np.full(len(rho), n - (p - k))
+    present = (triangles[:, :, p] ** 2).sum(axis=1) if few is None else few * free
     for _ in range(_ROUNDS):
+        s2 = np.maximum((squares + present) / np.maximum(freedom + free, 0.5), least**2)
         both = np.concatenate([triangles[:, :p] / np.sqrt(s2)[:, None, None], ridge], axis=1)
         q, r = np.linalg.qr(both[:, :, :p])
         if (np.abs(np.diagonal(r, axis1=1, axis2=2)) < _ALIKE * np.abs(r).max(axis=(1, 2))[:, None]).any():
@@ -117,11 +120,11 @@ def posterior(
         left = triangles[:, :, p] - np.einsum("jab,jb->ja", triangles[:, :, :p], x)
         rss = (left**2).sum(axis=1)
         free = n - (q[:, :p] ** 2).sum(axis=(1, 2))
-        s2 = np.maximum((stated_freedom + rss) / np.maximum(stated_freedom + free, 0.5), least**2)
+        present = present if few is None else rss
     distance = (ridge[:, :, p] - ridge[:, np.arange(k), np.arange(k)] * x[:, :k]) ** 2
     roots = 2 * np.log(np.abs(np.diagonal(r, axis1=1, axis2=2)))
-    total = n + stated_freedom
-    mode = np.maximum((stated_freedom + rss) / total, least**2)
+    total = n + freedom
+    mode = np.maximum((squares + rss) / total, least**2)
     misfits = total * np.log(mode) + total + log_det + distance.sum(axis=1) + roots[:, :k].sum(axis=1)
     misfits += 2 * np.log(u * scale[p - k :]).sum()
     evidence = misfits + roots[:, k:].sum(axis=1)
@@ -137,20 +140,43 @@ def posterior(
     units = scale[order]
     spread = np.einsum("j,jab,jcb->ac", weight, inverse, inverse) + np.einsum("j,ja,jb->ab", weight, away, away)
     full = inverse @ np.swapaxes(inverse, 1, 2)
-    known = full[:, :, :k] * ridge[:, None, np.arange(k), np.arange(k)]
-    of_priors = np.sqrt(np.einsum("j,jak->ka", weight, known**2)) * np.sign(np.einsum("j,jak->ka", weight, known))
-    alone = full[0] - known[0] @ known[0].T
+    of_prior = full[:, :, :k] * ridge[:, None, np.arange(k), np.arange(k)]
+    squared, signed = (np.einsum("j,jak->ka", weight, each) for each in (of_prior**2, of_prior))
+    beforehand = np.sqrt(squared) * np.sign(signed)
+    alone = full[0] - of_prior[0] @ of_prior[0].T
     back = np.argsort(order)
     return Posterior(
         step=(mean / units)[back],
         covariance=(spread / np.outer(units, units))[np.ix_(back, back)],
-        beforehand=(of_priors / units)[:, back],
+        beforehand=(beforehand / units)[:, back],
         independent=(alone / np.outer(units, units))[np.ix_(back, back)],
         rho=float(weight @ rho),
         rho_u=float(np.sqrt(max(weight @ rho**2 - (weight @ rho) ** 2, 0.0))),
         variance=float(s2[0]),
         misfit=float(misfit),
     )
+
+
+def probability(
+    time: Array, residuals: Array, slopes: Array, priors: tuple[Array, Array], noise: Noise
+) -> tuple[float, Array]:
+    """Return −2 ln of a point's probability, averaged over ρ with s at its mode, and rows that lead to a better point.
+
+    The arguments are those of `posterior`.  The rows have the shape (m, p + 1): where the model is linear a step x
+    makes the number less as it does |rows (−x, 1)|².
+    """
+    (p, n), (expected, u), (freedom, squares, least, rho, _) = slopes.shape, priors, noise
+    if not (np.isfinite(slopes).all() and np.isfinite(residuals).all()):
+        return float("inf"), np.empty((0, p + 1))
+    k, away = len(u), expected / u
+    triangles, log_det = _triangles(time, np.vstack([slopes, residuals]), rho)
+    total = squares + np.maximum((triangles[:, :, p] ** 2).sum(axis=1), n * least**2)
+    free = max(n - (p - k) + freedom, 0.5)
+    each = free * np.log(total) + log_det
+    weight = np.exp((each.min() - each) / 2)
+    rows = (np.sqrt(weight / weight.sum() * free / total)[:, None, None] * triangles).reshape(-1, p + 1)
+    ridge = np.column_stack([np.zeros((k, p - k)), np.diag(1 / u), away])
+    return float(each.min() - 2 * np.log(weight.mean()) + away @ away), np.vstack([rows, ridge])
 
 
 def _triangles(time: Array, columns: Array, rho: Array) -> tuple[Array, Array]:

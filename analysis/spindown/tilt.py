@@ -30,7 +30,7 @@ function of η, and depends on s alone, so that s = 0 is an ordinary point, and 
 Source: H. Goldstein, Classical Mechanics, §5.7 for the symmetric top; PHYSICS.md §4, §5.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,6 +87,10 @@ _AT_ONCE = 20_000
 #: Steps of A, a, K/ν_ref, κ, β and the share for slopes by differences.
 _STEPS = (1e-4, 1e-3, 1e-4, 1e-3, 1e-2, 1e-2)
 _LARGEST_TILT2 = 0.3  # tan²θ: far beyond what a top survives
+_LARGEST_DELTA2 = 0.1  # of a moment 18° off the axis; a tenth of it below zero
+_FARTHEST = 4.0  # of κ and β, in u: beyond κ = 1/2 and β = 0 there is no top
+#: Of the count, relative to ν_ref: cubics between the nodes.  No noise is taken to be smaller.
+ACCURACY = 1e-7
 # Times at which the wobble is worked out; between them it is a straight line, good to 1e-5 Hz.
 _MOST_POINTS = 1000
 _GAUSS = np.array([0.5 - np.sqrt(0.15), 0.5, 0.5 + np.sqrt(0.15)]), np.array([5.0, 8.0, 5.0]) / 18
@@ -133,8 +137,8 @@ class CountedLaw:
 
     The additional parameters are A, tan²θ at the last reading by linear theory, and a, by which the last reading
     stands above the resonance, x = 1 + exp(a): these two hardly depend on each other, δ and ν_r do.
-    The third is K/ν_ref beyond that of a release.  κ, β and SHARE follow; κ and β keep the values that are expected,
-    and only add to uncertainties.
+    The third is K/ν_ref beyond that of a release.  κ, β and SHARE follow.  A law that fits badly asks for any tilt: δ²,
+    κ and β approach their bounds smoothly, for a search would end at a kink.
 
     Attributes:
         law: of the drag.
@@ -175,12 +179,17 @@ class CountedLaw:
         gap_u = 2 * resonance_u / resonance * x / gap
         return value, np.array([tilt2_u * value[0], gap_u, CALM_U, top.kappa_u, top.beta_u, SHARE_U])
 
-    def shape(self, q: Array) -> tuple[float, float, float]:
-        """Return δ², ν_r/ν_ref, and K/ν_ref, from A, a, K/ν_ref beyond that of a release, κ, β and the share."""
-        a = min(max(float(q[1]), -5.0), 40.0)
-        s = min(max(float(q[0]) * float(np.exp(min(2 * a, 8.0))), -0.01), 0.1)
+    def shape(self, q: Array) -> tuple[float, float, float, float, float]:
+        """Return δ², ν_r/ν_ref, K/ν_ref, κ and β, from A, a, K/ν_ref beyond that of a release, κ, β and the share."""
+        top, a = self.top, min(max(float(q[1]), -5.0), 40.0)
+        s = float(q[0]) * float(np.exp(min(2 * a, 8.0)))
+        s = _bound(s, _LARGEST_DELTA2 if s > 0 else _LARGEST_DELTA2 / 10)
+        kappa, beta = (
+            value + _bound(float(moved) - value, _FARTHEST * u)
+            for moved, value, u in zip(q[3:5], (top.kappa, top.beta), (top.kappa_u, top.beta_u), strict=True)
+        )
         resonance = self.last / float(np.sqrt(1 + np.exp(a)))
-        return s, resonance, float(q[2]) + float(q[5]) * s * self._nutation(resonance, float(q[3]))
+        return s, resonance, float(q[2]) + float(q[5]) * s * self._nutation(resonance, kappa), kappa, beta
 
     def _nutation(self, resonance: float, kappa: float) -> float:
         """Return K/ν_ref over δ² after the release; the top of the file derives it."""
@@ -209,7 +218,7 @@ class CountedLaw:
     def spins(self, tau: Array, rows: Array) -> Array:
         """Return the same for several q, shape (r, p) → (r, n)."""
         p = len(self.law.parameters)
-        shapes = np.array([[*self.shape(q[p:]), *q[p + MORE : p + MORE + 2]] for q in rows])
+        shapes = np.array([self.shape(q[p:]) for q in rows])
         with np.errstate(all="ignore"):
             if len(tau) <= _MOST_POINTS:
                 return counts(self.law, tau, rows[:, :p], shapes)
@@ -226,7 +235,7 @@ class CountedLaw:
         """
         n = len(self.law.parameters)
         values, slopes = self.law.natural(q[:n], reference_hz, duration)
-        s, resonance, wobble = self.shape(q[n:])
+        s, resonance, wobble, *_ = self.shape(q[n:])
         delta = float(np.sqrt(max(s, 0.0)))
         growth = float(np.exp(min(2 * float(q[n + 1]), 8.0)))
         share = float(1 / (1 + np.exp(-min(float(q[n + 1]), 40.0)))) / 2
@@ -246,7 +255,16 @@ class CountedLaw:
     def solution(self, q: Array) -> Array:
         """Return the law's parameters, then δ², ν_r/ν_ref and K/ν_ref, shape (p + 3,)."""
         n = len(self.law.parameters)
-        return np.array([*q[:n], *self.shape(q[n:])])
+        return np.array([*q[:n], *self.shape(q[n:])[:MORE]])
+
+    def moved_top(self, q: Array) -> Top:
+        """Return the top with κ and β as the readings move them."""
+        kappa, beta = self.shape(q[len(self.law.parameters) :])[MORE:]
+        return replace(self.top, kappa=kappa, beta=beta)
+
+
+def _bound(value: float, most: float) -> float:
+    return most * float(np.tanh(value / most))
 
 
 def count_of(law: DragLaw, tau: Array, solution: Array, top: Top = THESIS_TOP) -> Array:

@@ -32,8 +32,6 @@ class Verdict:
         change: the most improbable change of the readings about the best law [Hz]; None: none can be told.
         changed: numbers, from 0 on, of the runs that no law describes.
         describes: whether any law describes the readings: of several runs, more than half of them.
-        unsettled: names of laws whose fit did not converge, though it may be the best: none of them is excluded, and
-            nothing is decided where a law with as few constants is among them.
     """
 
     best: str
@@ -45,7 +43,6 @@ class Verdict:
     change: Change | None = None
     changed: tuple[int, ...] = ()
     describes: bool = True
-    unsettled: tuple[str, ...] = ()
 
 
 def verdict(
@@ -54,7 +51,6 @@ def verdict(
     *,
     change: Change | None = None,
     changes: tuple[float, ...] = (),
-    unsettled: frozenset[str] = frozenset(),
 ) -> Verdict:
     """Return what the readings say about the laws.
 
@@ -63,14 +59,12 @@ def verdict(
         criterion: by which.
         change: the most improbable one about the law with the smallest criterion, of one run.
         changes: probabilities of the most improbable change in each of several runs.
-        unsettled: names of the laws whose fit did not converge.
     """
     first = next(iter(fits))
     telling = criterion == "aicc" or (criterion == "bic" and fits[first].sigma_known)
     kinds = {name: _kind(fits, name, first) if telling else "tied" for name in fits}
-    kinds |= {name: "weak" for name in unsettled if kinds.get(name) == "excluded"}
     listed = {k: tuple(n for n in fits if kinds[n] == k) for k in ("tied", "needless", "weak", "excluded")}
-    listed["tied"] = tuple(sorted(listed["tied"], key=lambda name: (name in unsettled, fits[name].n_parameters)))
+    listed["tied"] = tuple(sorted(listed["tied"], key=lambda name: fits[name].n_parameters))
     probabilities = changes or ((change.p,) if change else ())
     changed = tuple(k for k, p in enumerate(probabilities) if p * len(probabilities) < CHANGED)  # Bonferroni
     describes = 2 * len(changed) <= len(probabilities) - (len(probabilities) == 1)
@@ -78,7 +72,7 @@ def verdict(
     best = listed["tied"][0]
     return Verdict(
         best,
-        telling and len(simple) <= 1 and describes and best == first and not unsettled.intersection([best, *simple]),
+        telling and len(simple) <= 1 and describes and best == first,
         indistinguishable=listed["tied"],
         needless=listed["needless"],
         weak=listed["weak"],
@@ -86,7 +80,6 @@ def verdict(
         change=change,
         changed=changed,
         describes=describes,
-        unsettled=tuple(name for name in fits if name in unsettled),
     )
 
 

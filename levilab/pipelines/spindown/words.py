@@ -253,11 +253,9 @@ def _verdict(
         "The readings exclude {laws}, off by {rms} (rms); {law} is off by {least:n} Hz.",
         laws=law_names(said.excluded), rms=enumeration(misses or [""]), law=law, least=digits(best.rms_residual),
     )  # fmt: skip
-    stopped = Text("The fit of {laws} did not converge: nothing is certain about it.", laws=law_names(said.unsettled))
     weak = Text("They speak against {laws}, not strongly enough to exclude.", laws=law_names(said.weak))
     return Sentences(
         first,
-        stopped if said.unsettled else "",
         Text("If the {law} law holds, {how}.", law=law, how=how) if how and said.describes and not said.decided else "",
         excluded if misses else "",
         Text("They cannot distinguish it from {laws}.", laws=names(others)) if others and said.decided else "",

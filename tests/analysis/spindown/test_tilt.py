@@ -8,14 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from scipy.optimize import brentq, least_squares
 from scipy.stats import norm
 
 from analysis.residuals import largest_change
 from analysis.spindown.combine import combine
 from analysis.spindown.drag import LAWS, spin
 from analysis.spindown.fit import fit_spin_down
+from analysis.spindown.lawfit import solution
 from analysis.spindown.posterior import RHO
+from analysis.spindown.readings import check_readings
 from analysis.spindown.tilt import STANDING, THESIS_TOP, TILT2, CountedLaw, Release, Top, count_of
 
 T = np.arange(0, 160, 10.0)
@@ -236,7 +238,6 @@ def test_counts_of_the_bench_for_practice_give_back_drag_and_law():
     for run in runs:
         assert {"stokes", "newton"} <= {*run.verdict.excluded}
         assert run.best == "disc"
-        assert run.verdict.unsettled == ()
         assert run.fit("disc").statistics.misfit < run.fit("mixed").statistics.misfit + 3
 
 
@@ -256,7 +257,8 @@ def test_a_top_of_another_shape_is_described_by_its_file():
     fits = []
     for top in (THESIS_TOP, Top(kappa=0.3, kappa_u=0.01, resonance_hz=18.0)):
         fits.append(fit_spin_down(T, COUNTS, 0.01, laws=["disc"], keep_outliers=True, top=top).fit("disc"))
-        assert fits[-1].top == top
+        assert fits[-1].top.resonance_hz == top.resonance_hz
+        assert abs(fits[-1].top.kappa - top.kappa) < top.kappa_u  # the readings hardly move it
         assert fits[-1].spin_frequency(T) == pytest.approx(COUNTS - fits[-1].residuals, abs=1e-9)
     assert fits[0].parameters["c32"].value != fits[1].parameters["c32"].value
 
@@ -287,9 +289,7 @@ def test_a_tilt_that_noise_hides_is_in_the_uncertainties():
     rng = np.random.default_rng(12)
     tops = [top for top in SIMULATED if top["law"] in NAMES]
     noisy = [(top, np.add(top["spin_frequency_hz"], rng.normal(0, 0.03, len(top["time_s"])))) for top in tops * 4]
-    squares = [
-        np.square(pulls(top, fit_spin_down(top["time_s"], y, 0.03))[1:]) for top, y in noisy
-    ]  # fmt: skip
+    squares = [np.square(pulls(top, fit_spin_down(top["time_s"], y, 0.03))[1:]) for top, y in noisy]
     # of N pulls that share few tops: their mean square is 1, and below 2 with certainty
     assert 0.3 < np.mean(squares) < 2
 
@@ -330,9 +330,8 @@ def odd(kind):
 @pytest.mark.parametrize("kind", ["jump", "touch", "rise"])
 def test_no_law_describes_a_top_that_something_happened_to(kind, u):
     rng = np.random.default_rng(9)
-    runs = [
-        fit_spin_down(np.arange(0, 200, 10.0), odd(kind) + rng.normal(0, 0.03, 20), u, tilt=False) for _ in range(5)
-    ]
+    t = np.arange(0, 200, 10.0)
+    runs = [fit_spin_down(t, odd(kind) + rng.normal(0, 0.03, 20), u, tilt=False) for _ in range(5)]
     assert not any(run.verdict.describes or run.verdict.decided for run in runs)
     assert not combine(runs).verdict.describes
     assert combine(runs).verdict.changed == (0, 1, 2, 3, 4)
@@ -341,11 +340,11 @@ def test_no_law_describes_a_top_that_something_happened_to(kind, u):
 
 def test_one_odd_run_is_named_and_condemns_no_others():
     rng, t = np.random.default_rng(10), np.arange(0, 200, 10.0)
-    sound = [
-        fit_spin_down(t, spin("disc", t, 40.0, 2.34e-4) + rng.normal(0, 0.03, 20), 0.03, laws=["disc"], tilt=False)
-        for _ in range(40)
-    ]
-    odd_run = fit_spin_down(t, odd("touch") + rng.normal(0, 0.03, 20), 0.03, laws=["disc"], tilt=False)
+    usual = spin("disc", t, 40.0, 2.34e-4)
+    *sound, odd_run = (
+        fit_spin_down(t, each + rng.normal(0, 0.03, 20), 0.03, laws=["disc"], tilt=False)
+        for each in (*[usual] * 40, odd("touch"))
+    )
     assert combine(sound).verdict.changed == ()
     together = combine([*sound[:25], odd_run, *sound[25:]])
     assert together.verdict.changed == (25,)
@@ -374,15 +373,32 @@ def test_a_wave_about_a_law_is_no_noise():
     assert not fit_spin_down(t, usual + 0.5 * np.sin(t / 12), 0.01, tilt=False).verdict.describes
 
 
-@pytest.mark.parametrize("seed", [4, 9, 10])
-def test_a_search_that_whole_steps_lead_astray_is_begun_again(seed):
-    """Readings by the disc law every 2 s until 0.3 Hz above the resonance: mixed follows them as well."""
-    q = np.array([1.2158, 0.3843, 5.4e-4, 0.757, 1.22e-3])  # of a driven top on the virtual bench
-    f = 27.95 * count_of(LAWS["disc"], np.linspace(0, 1, 62), q, THESIS_TOP)
-    f += np.random.default_rng(seed).normal(0, 0.0077, 62)
-    found = fit_spin_down(np.linspace(0, 122, 62), f, laws=("disc", "mixed"))
-    assert not [remark for fit in found.fits for remark in fit.remarks if remark.kind == "not converged"]
-    assert found.verdict.excluded == ()
+BADLY = [("newton", "disc", 200, 1e-3), ("disc", "mixed", 200, 1e-4), ("disc", "newton", 60, 1e-5)]
+
+
+@pytest.mark.parametrize(("truth", "law", "n", "u"), BADLY)
+def test_a_law_that_fits_badly_is_fitted_as_by_scipy_and_excluded(truth, law, n, u):
+    """Against scipy's least squares, with the noise at its mode: s² = (8 + Σr²)/(n − p + 8)."""
+    time, p = np.linspace(0, n, n), len(LAWS[law].parameters)
+    y = spin(truth, time, 40.0, {"disc": 2.34e-4, "newton": 1.6e-5}[truth]) + np.random.default_rng(1).normal(0, u, n)
+    readings = check_readings(time, y, u)
+    found = solution(LAWS[law], readings, tilt=True, rho=np.zeros(1))
+    expected, expected_u = found.counted.expected
+
+    def rest(q, s):
+        left = (readings.x - found.counted.spin(readings.tau, q)) * readings.weight / s
+        return np.append(left, (q[p:] - expected) / expected_u)
+
+    q = np.append(found.q[:p], expected)
+    for _ in range(5):
+        s = np.sqrt((8 + np.sum(rest(q, 1.0)[:n] ** 2)) / (n - p + 8))
+        q = least_squares(rest, q, x_scale="jac", args=(s,)).x
+    # the search ends within 0.05 u of the mode, and the mean that it returns lies beside it
+    assert (np.abs(found.q - q) < 0.15 * np.sqrt(np.diagonal(found.posterior.covariance))).all()
+    assert found.converged
+    verdict = fit_spin_down(time, y, u).verdict
+    assert (verdict.best, verdict.decided) == (truth, True)
+    assert law in verdict.excluded
 
 
 def test_a_reading_left_out_does_not_agree_with_the_fit_of_the_others():
