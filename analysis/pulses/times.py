@@ -35,6 +35,8 @@ FROM_ENDS = 8
 LEAST_LOST, STEPS = 1e-4, 2.5
 #: The place of a jump is looked for again with the fit that has one, until it stays: four times at most.
 TRIES = 4
+#: No hand spins a Levitron so fast [Hz]: there may be two equal marks, exactly opposite.
+FASTEST_BY_HAND_HZ = 60.0
 #: Pulses on each side that show a jump alone: to a quarter of its size and twice their uncertainty.
 BESIDE = 12
 #: Turns that may be lost or repeated at a jump besides, and the natural logarithm of the odds from which they are.
@@ -257,4 +259,6 @@ def findings_of_fit(fit: Fit, of: str, start: float = 0.0) -> tuple[Finding, ...
         notes.append(Finding("jump", values=(jump.lost, start + jump.at)))
     if fit.scatter.correlated_p < SELDOM:
         notes.append(Finding("correlated", of, (fit.scatter.inflation,)))
+    if (seen := fit.middle_frequency) > FASTEST_BY_HAND_HZ:
+        notes.append(Finding("fast", values=(seen, seen / 2)))
     return tuple(notes)

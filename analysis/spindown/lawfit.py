@@ -25,9 +25,8 @@ Array = NDArray[np.float64]
 _CLOSE, _CONVERGED = 0.05, 1.0
 _MOST_STEPS = 200  # a law that fits takes 5, one that fits badly up to 100
 _DAMPING = 1e-3  # of the first step, relative to the squares of the slopes
-#: With fewer readings beyond all parameters law and tilt together fit any noise, and s at its mode would fall to zero:
-#: it is held during each search, as if so many readings told it, and settles from the scatter about the law with the
-#: tilt that is expected.
+#: With fewer readings beyond all parameters law and tilt fit any noise, and s at its mode falls to zero: it is held
+#: in each search, as by _HELD readings, and settles from the scatter about the law with the tilt that is expected.
 _FEW, _HELD, _SEARCHES = 4, 1_000_000, 3
 #: Of more readings means over neighbours are fitted, for which a spin-down is straight within the noise.
 _MOST = 3000

@@ -132,14 +132,13 @@ _SENTENCES: Mapping[tuple[str, str], Callable[..., str]] = MappingProxyType({
         hertz=hertz,
     ),
     ("hum", ""): _hum,
-    ("clipped", ""): lambda: Text(
-        "the tops of the pulses are flat: the detector or the converter is saturated"
-    ),
+    ("clipped", ""): lambda: Text("the tops of the pulses are flat: the detector or the converter is saturated"),
     ("gap", ""): lambda seconds: Text("the signal is constant for {s:n} s in all", s=digits(seconds, 3)),
     ("not-finite", ""): lambda n: Text("{n} samples are no finite numbers and do not count", n=n),
     ("wander", ""): lambda size: Text("the baseline wanders by {size:n} and was taken off", size=digits(size)),
-    ("coarse", ""): lambda n: Text(
-        "a turn has {n:n} samples only: a faster top may look the same", n=digits(n, 2)
+    ("coarse", ""): lambda n: Text("a turn has {n:n} samples only: a faster top may look the same", n=digits(n, 2)),
+    ("fast", ""): lambda a, b: Text(
+        "{a:.4g} Hz is too fast for a hand: are there two marks? Then {b:.4g} Hz is right; cover one", a=a, b=b
     ),
     ("correlated", "pulses"): _correlated("pulses"),
     ("correlated", "turns"): _correlated("turns"),

@@ -10,6 +10,7 @@ import numpy as np
 from analysis.errors import AnalysisError, NotPositive, TimesNotIncreasing
 from analysis.numbers import digits
 from analysis.pulses import phases, track_of_times
+from analysis.pulses.times import FASTEST_BY_HAND_HZ
 from analysis.rotation import track_of_field
 from analysis.rotation.track import WINDOW_S as FIELD_WINDOW_S
 from analysis.spindown.fall import FALLS_BETWEEN_HZ
@@ -278,8 +279,6 @@ def _without_rest(table: Table, fewest: int) -> Table:
 #: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, seconds that
 #: pass for minutes 5e-5, times in ms 3e-6; a brake of eddy currents lies between.
 FASTEST_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 1e-4
-#: No hand spins a top so fast [Hz].
-FASTEST_BY_HAND_HZ = 60.0
 
 
 def _doubt(text: str) -> Note:

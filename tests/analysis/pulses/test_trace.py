@@ -110,10 +110,11 @@ def test_two_unlike_marks_are_no_double_frequency(method):
         assert "double" in names(beside)
 
 
-def test_what_runs_with_the_mains_is_named_and_hum_is_no_top():
+def test_what_runs_with_the_mains_or_too_fast_for_a_hand_is_named_and_hum_is_no_top():
     locked = spin_of_trace(light(50 * TIME) + noise(), RATE)
     assert locked.frequency.value == pytest.approx(50, abs=1e-4)
-    assert "mains" in names(locked)
+    assert names(locked) & {"mains", "fast"} == {"mains"}
+    assert "fast" in names(spin_of_trace(light(39.4 * TIME) + light(39.4 * TIME + 0.5) + noise(), RATE))
     with pytest.raises(OnlyHum, match="hum of the mains"):
         spin_of_trace(np.sin(2 * np.pi * 50 * TIME) + noise(), RATE)
 

@@ -22,7 +22,7 @@ fit_spin_down = functools.partial(spin_down_fit.fit_spin_down, tilt=False)
 T = np.arange(0, 200, 10.0)
 SIGMA = 0.03  # [Hz], the noise of PHYSICS.md §5
 CONSTANTS = {"stokes": (3.18e-3,), "newton": (1.73e-5,), "disc": (2.34e-4,), "mixed": (1.5e-3, 8e-6)}
-CONSTANTS |= {"power": (2.34e-4, 1.5)}
+CONSTANTS["power"] = (2.34e-4, 1.5)
 
 
 def readings(law="disc", sigma=SIGMA, seed=1, time=T):
