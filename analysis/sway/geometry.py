@@ -247,8 +247,8 @@ def choose_lines(windows: Sequence[Swings], spin_hz: Array, known: Known) -> lis
 def _judge(swings: Swings, spin: float, known: Known, part: float) -> tuple[float, float, float]:
     """Return misfit, Ω_g/ω₃ and the part of it by which it scatters; the misfit is infinite where no top swings so.
 
-    It has this base's vertical swing, of which this part counts, since it is alike in all windows, and improbable
-    amplitudes.
+    The vertical swing of this base, which is alike in all windows, counts by this part in each; weak swings are
+    improbable.
     """
     backward, forward = swings.frequency[:2].tolist()
     size = max(abs(swings.split) / spin, _SMALL)
@@ -258,8 +258,7 @@ def _judge(swings: Swings, spin: float, known: Known, part: float) -> tuple[floa
         return math.inf, size, _BENT
     off = swings.vertical.value - vertical_swing(backward, forward, slope, known.top.gravity)
     u = math.hypot(_VERTICAL_U_HZ, _VERTICAL_SHIFT_U * swings.size**2 / max(_away(swings), NEAREST_HZ))
-    alike = (off / u) ** 2 + 2 * math.log(u) + swings.improbable - swings.misfit
-    unlikely = COARSE * swings.misfit + part * alike
+    unlikely = COARSE * swings.misfit + part * ((off / u) ** 2 + 2 * math.log(u)) + swings.improbable - swings.misfit
     share = size * swings.split / _split(size, spin, swings.frequency[:2], known)[0]
     return unlikely, share, math.hypot(_BENT, _doubt(swings))
 
