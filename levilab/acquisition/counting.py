@@ -163,20 +163,12 @@ class FreeTop(Generic[S]):
         """
         last = self.last["time_s"] if self.last else 0.0
         if self.missed and self.missed[-1] is Missed.DARK:
-            signal = self.session.bench.counter.SIGNAL.name
-            return Text(
-                "no {signal} any more: the top fell between {last:.1f} s and {missed_by:.1f} s",
-                signal=signal,
-                last=last,
-                missed_by=self.missed_by,
-            )
+            said = "no {signal} any more: the top fell between {last:.1f} s and {missed_by:.1f} s"
+            return Text(said, signal=self.session.bench.counter.SIGNAL.name, last=last, missed_by=self.missed_by)
         seen = [why for why in self.missed if why in NO_TOP]
         if len(seen) >= _MOST_MISSED:
-            return Text(
-                "no steady pulses at {times} times in a row: the top fell after {last:.1f} s",
-                times=len(seen),
-                last=last,
-            )
+            said = "no steady pulses at {times} times in a row: the top fell after {last:.1f} s"
+            return Text(said, times=len(seen), last=last)
         return ""
 
     def _read_or_ask_again(self) -> Row | Missed:
@@ -208,12 +200,8 @@ class FreeTop(Generic[S]):
         seen, before = reading["spin_frequency_hz"], last["spin_frequency_hz"]
         if times is None:
             self._faster = reading
-            text = Text(
-                "{seen:.4g} Hz after {before:.4g} Hz: a top that coasts gains no spin; no reading",
-                seen=seen,
-                before=before,
-            )
-            self.session.event(RunEvent.NOT_TAKEN, text, **_spin_of(reading))
+            said = "{seen:.4g} Hz after {before:.4g} Hz: a top that coasts gains no spin; no reading"
+            self.session.event(RunEvent.NOT_TAKEN, Text(said, seen=seen, before=before), **_spin_of(reading))
             return Missed.FASTER
         if not self._warned:
             self._warned = True
@@ -238,10 +226,8 @@ class FreeTop(Generic[S]):
         if found is not None:
             time, u = found.time - (session.zero or 0.0), found.u
             if found.gaps:
-                text = Text(
-                    "the samples of this count have gaps of {gaps} s",
-                    gaps=", ".join(f"{gap:.2g}" for gap in found.gaps),
-                )
+                gaps = ", ".join(f"{gap:.2g}" for gap in found.gaps)
+                text = Text("the samples of this count have gaps of {gaps} s", gaps=gaps)
                 session.event(RunEvent.GAPS, text, gaps_s=list(found.gaps))
             if found.folds and not self._in_doubt:
                 self._in_doubt = True
@@ -258,6 +244,7 @@ class FreeTop(Generic[S]):
         """Return a count [Hz]; repeat one during which the computer stood still, twice at most."""
         session, counter = self.session, self.session.bench.counter
         usual = min(self._took, session.settings.gate_s + _SETTLED_S)
+        said = "a count took {took:.1f} s, {usual:.1f} s at most are usual: the computer stood still, counting again"
         for tries in range(3):
             asked = session.now()
             spin = counter.frequency()
@@ -265,11 +252,7 @@ class FreeTop(Generic[S]):
             self._least = self._least if spin is None else min(self._least, self._took)
             if spin is None or counter.last is not None or self._took < usual + _STALLED_S or tries == 2:
                 break
-            text = Text(
-                "a count took {took:.1f} s, {usual:.1f} s at most are usual: the computer stood still, counting again",
-                took=self._took,
-                usual=usual,
-            )
+            text = Text(said, took=self._took, usual=usual)
             session.event(RunEvent.LEFT_OUT, text, **_spin_of({"spin_frequency_hz": spin}))
         return spin
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from analysis.rotation import spin_of_field
+import numpy as np
+
+from analysis.errors import TooFewReadings
+from analysis.rotation import FieldSpin, spin_of_field
 from analysis.rotation.errors import NoLine
 from instruments.drivers import Instrument
 from instruments.drivers.counter.phyphox import FieldLine, Phyphox
@@ -172,6 +175,11 @@ def connect_driver(kind: Kind[I], wiring: Wiring, *, log: TrafficLog | None = No
     return instrument
 
 
+#: A top falls within a window whose last third has less than this of the line before (noise alone: in 1 of 200); the
+#: spin is that of the samples before then, since the whole window's would be up to 0.4 Hz too low.
+_LEAST_LEFT = 0.5
+
+
 def line_in_field(times: Array, field: Array, *, near: float | None) -> FieldLine | None:
     """Find the line of a turning moment; see `instruments.drivers.counter.phyphox.Estimator`.
 
@@ -185,10 +193,22 @@ def line_in_field(times: Array, field: Array, *, near: float | None) -> FieldLin
             if near is None:
                 raise
             found = spin_of_field(times, field, near=near, mains_hz=())
-    except NoLine:
+        early = 2 * times.size // 3
+        if _strength_left(times, field, found, early) < _LEAST_LEFT:
+            found = spin_of_field(times[:early], field[:early], near=found.frequency)
+    except (NoLine, TooFewReadings):
         return None
     folds = tuple(fold.frequency for fold in found.folds[1:]) if found.doubtful else ()
     return FieldLine(found.frequency, found.u_frequency, found.reference_time, folds)
+
+
+def _strength_left(times: Array, field: Array, found: FieldSpin, early: int) -> float:
+    """Return the amplitude of a line behind the early samples over that in them; 1 while the top is up."""
+    late = times - found.reference_time
+    wave = np.exp(-2j * np.pi * (found.frequency * late + found.chirp * late**2 / 2))[:, None]
+    parts = slice(early), slice(early, None)
+    before, after = (((field - field.mean(axis=0)) * wave)[part].mean(axis=0) for part in parts)
+    return float((before.conj() @ after).real / (before.conj() @ before).real)
 
 
 #: Driver → the analyses that it is given.

@@ -356,15 +356,11 @@ def _with_periods(header: Sequence[str]) -> list[Title]:
     found = {title.column for title in titles}
     other = next((name for name in ("flux_density_t", "precession_frequency_hz") if name in found), None)
     if other and "spin_frequency_hz" not in found:
-        bare = companion("spin_frequency_hz")
-        titles = [_of_another(title, other) if title.column == bare else title for title in titles]
+        for k, title in enumerate(titles):
+            if title.column == companion("spin_frequency_hz"):
+                name = "height_m" if unit_factor(title.unit or "", "length") else other
+                titles[k] = Title(companion(name), title.unit)
     return titles
-
-
-def _of_another(title: Title, other: str) -> Title:
-    """Return the title of a u that stands alone beside no spin: that of the height where its unit is a length."""
-    of_height = title.unit is not None and unit_factor(title.unit, "length") is not None
-    return Title(companion("height_m" if of_height else other), title.unit)
 
 
 def _of_the_period(text: str, title: Title) -> Title:

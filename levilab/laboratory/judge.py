@@ -124,7 +124,7 @@ def compare_spins(session: Session[Any], world: World, plan: Plan, first: int) -
     for row in rows:
         at = session.zero + row["time_s"]
         spin, _ = world.motion(np.linspace(at - gate / 2, at + gate / 2, 9))
-        truth = float(np.mean(spin)) / (2 * math.pi)
+        truth = float(np.sum(spin)) / max(int(np.count_nonzero(spin)), 1) / (2 * math.pi)  # up to a fall
         u = math.hypot(row.get("spin_frequency_u_hz", 0.0), math.sqrt(2) * plan.scene.jitter / gate)
         found.append(Compared(row, row["spin_frequency_hz"], truth, u))
     return found

@@ -214,18 +214,15 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_by: 
     times, spins = (np.array([row[name] for row in seen]) for name in ("time_s", "spin_frequency_hz"))
     if spins[-1] > spins[0]:  # a phone's samples may show the spin's image at their rate, which rises
         said = "the counts rise from {first:.2f} Hz to {last:.2f} Hz up to the fall: a top that coasts gains no spin"
-        raise DidNotFollow(Text(said, first=float(spins[0]), last=float(spins[-1])))
+        raise DidNotFollow(Text(said, first=spins[0], last=spins[-1]))
     between = (float(times[-1]) + settings.gate_s / 2, missed_by)
     u = [row["spin_frequency_u_hz"] for row in seen if "spin_frequency_u_hz" in row]
     limit = spin_at_fall(times, spins, float(np.sqrt(np.mean(np.square(u)))) if u else None, between)
     assert limit.value is not None
     assert limit.u is not None
     lowest = float(spins.min())
-    words = Text(
-        "a line through the last counts gives {limit:n}; the lowest count is {lowest:.2f} Hz",
-        limit=with_uncertainty(limit),
-        lowest=lowest,
-    )
+    said = "a line through the last counts gives {limit:n}; the lowest count is {lowest:.2f} Hz"
+    words = Text(said, limit=with_uncertainty(limit), lowest=lowest)
     if lowest < limit.value:  # not the bound that it seems to be
         words = Text("{line}, below the line by its scatter", line=words)
     session.event(RunEvent.FELL, Text("{text}; {words}", text=text, words=words), spin_frequency_hz=limit.value)
