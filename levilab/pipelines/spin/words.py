@@ -138,7 +138,7 @@ _SENTENCES: Mapping[tuple[str, str], Callable[..., str]] = MappingProxyType({
     ("wander", ""): lambda size: Text("the baseline wanders by {size:n} and was taken off", size=digits(size)),
     ("coarse", ""): lambda n: Text("a turn has {n:n} samples only: a faster top may look the same", n=digits(n, 2)),
     ("fast", ""): lambda a, b: Text(
-        "{a:.4g} Hz is too fast for a hand: are there two marks? Then {b:.4g} Hz is right; cover one", a=a, b=b
+        "{a:.4g} Hz is too fast for a hand: without a drive there are two marks at {b:.4g} Hz; cover one", a=a, b=b
     ),
     ("correlated", "pulses"): _correlated("pulses"),
     ("correlated", "turns"): _correlated("turns"),
