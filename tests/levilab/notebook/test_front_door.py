@@ -240,7 +240,7 @@ def test_what_a_dataframe_was_written_to_goes_with_the_result() -> None:
 
 def spin_down() -> pd.DataFrame:
     time = 10.0 * np.arange(8)
-    return pd.DataFrame({"time_s": time, "spin_frequency_hz": 40.0 * np.exp(-3.2e-3 * time)})
+    return pd.DataFrame({"time_s": time, "spin_frequency_hz": 40.0 * np.exp(-3.2e-3 * time) + 0.01 * np.cos(time)})
 
 
 def test_messages_about_a_dataframe_name_its_rows() -> None:
