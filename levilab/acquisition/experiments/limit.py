@@ -37,6 +37,7 @@ from levilab.texts.text import Text
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from analysis.limits import Array
     from levilab.acquisition.session import Row, Session
     from levilab.acquisition.triggering import Motor
     from levilab.bench.config import Limits
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
 _MOST_FALLS = 3
 #: Fewest counts that a line to the moment of a loss is drawn through.
 _FEWEST = 3
+#: Counts rise where the slope of a line is above 0 by more of its u; least u of a count that states none [Hz].
+_CLEAR, _LEAST_U_HZ = 3.0, 0.03
 #: A count below the drive by more standard deviations of the counts is that of a top that slips (2 % of all others).
 _NO_SLIP = 2.0
 #: Number of counts that compare the tape of a creeping top with the drive, and their distance below the limit [Hz]:
@@ -212,12 +215,13 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_by: 
             experiment=session.writer.record.experiment,
         )
     times, spins = (np.array([row[name] for row in seen]) for name in ("time_s", "spin_frequency_hz"))
-    if spins[-1] > spins[0]:  # a phone's samples may show the spin's image at their rate, which rises
+    u = [row["spin_frequency_u_hz"] for row in seen if "spin_frequency_u_hz" in row]
+    stated = float(np.sqrt(np.mean(np.square(u)))) if u else None
+    if _rises(times, spins, stated):  # a phone's samples may show the spin's image at their rate, which rises
         said = "the counts rise from {first:.2f} Hz to {last:.2f} Hz up to the fall: a top that coasts gains no spin"
         raise DidNotFollow(Text(said, first=spins[0], last=spins[-1]))
     between = (float(times[-1]) + settings.gate_s / 2, missed_by)
-    u = [row["spin_frequency_u_hz"] for row in seen if "spin_frequency_u_hz" in row]
-    limit = spin_at_fall(times, spins, float(np.sqrt(np.mean(np.square(u)))) if u else None, between)
+    limit = spin_at_fall(times, spins, stated, between)
     assert limit.value is not None
     assert limit.u is not None
     lowest = float(spins.min())
@@ -238,6 +242,14 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_by: 
         "drive_frequency_hz": settings.drive_frequency_hz,
         "drive_amplitude_v": settings.drive_amplitude_vpp / 2,
     }
+
+
+def _rises(times: Array, spins: Array, u: float | None) -> bool:
+    """Return whether the slope of a line through counts of this u [Hz] is above 0 by more than their scatter allows."""
+    off = times - times.mean()
+    slope = float(off @ spins / (off @ off))
+    scatter = u or max(_LEAST_U_HZ, float(np.std(spins - slope * off, ddof=2)))
+    return slope > _CLEAR * scatter / float(np.sqrt(off @ off))
 
 
 # --- upper ---

@@ -12,7 +12,7 @@ from instruments.errors import NoAnswer
 from instruments.virtual.generator.channel import Output, Triggered
 from levilab.acquisition.counting import FreeTop
 from levilab.acquisition.driving import held_spin
-from levilab.acquisition.experiments.limit import LimitSettings, _limit_of_loss
+from levilab.acquisition.experiments.limit import LimitSettings, _limit_of_loss, _rises
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NotHeld
@@ -114,6 +114,12 @@ def test_counts_that_scatter_move_no_upper_limit(slips_hz, most_u_hz):
     # four standard errors; of a top that slips, what its count is taken to be higher than it is, halved, too
     assert abs(np.mean(off)) < 4 * np.std(off) / 1000**0.5 + 0.5 * 2 * 0.08 * (slips_hz > 0)
     assert np.mean(u) < most_u_hz
+
+
+def test_counts_that_scatter_are_not_taken_to_rise():
+    times, noise = 2.0 * np.arange(3), np.random.default_rng(5).standard_normal((1000, 3))
+    assert not any(_rises(times, 22 - 0.06 * times + 0.1 * one, 0.1) for one in noise)
+    assert _rises(times, 78 + 0.06 * times, 0.03)  # an image of a spin
 
 
 def test_a_top_that_is_lost_as_the_creep_begins_has_no_limit(tmp_path, monkeypatch):
