@@ -186,16 +186,18 @@ def line_in_field(times: Array, field: Array, *, near: float | None) -> FieldLin
     A top that was seen shortly before is seen on a line of the mains, too, where a spin would be taken for the mains:
     at 40 Hz, for one, where 100 samples a second show a line of 60 Hz.
     """
+    without: dict[str, Any] = {}
     try:
         try:
             found = spin_of_field(times, field, near=near)
         except NoLine:
             if near is None:
                 raise
-            found = spin_of_field(times, field, near=near, mains_hz=())
+            without = {"mains_hz": ()}
+            found = spin_of_field(times, field, near=near, **without)
         early = 2 * times.size // 3
         if _strength_left(times, field, found, early) < _LEAST_LEFT:
-            found = spin_of_field(times[:early], field[:early], near=found.frequency)
+            found = spin_of_field(times[:early], field[:early], near=found.frequency, **without)
     except (NoLine, TooFewReadings):
         return None
     folds = tuple(fold.frequency for fold in found.folds[1:]) if found.doubtful else ()
