@@ -84,7 +84,8 @@ def explain_message(text: str) -> str:
         return KINDS.get(what, f"a {what} is expected")
     if limit := _LIMIT.fullmatch(what):
         return Text(LIMITS[limit[1]], limit=limit[2])
-    return Text("{what} is expected", what=what)
+    *some, what = re.split(", | or ", what)
+    return Text("{some:s} or {what:s} is expected" if some else "{what} is expected", some=", ".join(some), what=what)
 
 
 def _suggest_key(where: tuple[int | str, ...], of: type[BaseModel] | None) -> str:

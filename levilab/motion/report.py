@@ -193,7 +193,7 @@ def _lines(found: Mapping[str, Any]) -> Iterator[Block]:
     if not lines:
         because = found.get("no_lines_because")
         if because:
-            yield Note(Text("no lines of the axis: {why}", why=because))
+            yield Note(Text("No lines of the axis: {why}.", why=because))
         return
     heads = ("frequency [Hz]", "amplitude [mrad]", "identified as")
     rows = [

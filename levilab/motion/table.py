@@ -48,12 +48,12 @@ def print_motion(summary: Summary, console: Console | None = None) -> None:
 
 def headline(summary: Summary) -> str:
     """Return one line about the end of a motion."""
-    name = summary.motion.scene.name or "the scene"
+    name = summary.motion.scene.name or in_language("the scene")
     if summary.motion.scene.observed == "spin":
-        return Text("{name}: the spin alone, for {s:g} s", name=name, s=summary.duration)
+        return Text("{name:s}: the spin alone, for {s:g} s", name=name, s=summary.duration)
     if summary.motion.survived:
-        return Text("{name}: the top stayed up for all of {s:g} s", name=name, s=summary.duration)
-    return Text("{name}: the top {ending}", name=name, ending=summary.ending)
+        return Text("{name:s}: the top stayed up for all of {s:g} s", name=name, s=summary.duration)
+    return Text("{name:s}: the top {ending}", name=name, ending=summary.ending)
 
 
 def _motion_facts(summary: Summary) -> list[tuple[str, str]]:

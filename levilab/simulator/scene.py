@@ -58,7 +58,7 @@ class Scene(Part):
         for rule in RULES:
             if not rule.holds(self):
                 value = short_text(attrgetter(rule.key)(self))
-                expected = Text(rule.expected, limit=attrgetter(rule.of)(self))
+                expected = Text(rule.expected, limit=rule.of and str(attrgetter(rule.of)(self)))
                 raise SceneError("{key} = {value}: {expected}", key=rule.key, value=value, expected=expected)
         return self
 
@@ -103,13 +103,13 @@ class Rule(NamedTuple):
         key: of the value that the message shows.
         holds: whether the scene fulfils it.
         expected: what is allowed, a template in which limit is a value of the scene.
-        of: the key of that value.
+        of: the key of that value; None: there is none.
     """
 
     key: str
     holds: Callable[[Scene], bool]
     expected: str
-    of: str = "name"
+    of: str | None = None
 
 
 RULES: tuple[Rule, ...] = (
@@ -228,14 +228,14 @@ class Switch(NamedTuple):
         is_off: whether the scene has it switched off.
         keys: of the table, that have no effect then.
         why: the value that switches it off, and what switches it on; {value} is its value, {laws} are laws of drag.
-        of: the key of that value.
+        of: the key of that value; None: there is none.
     """
 
     table: str
     is_off: Callable[[Scene], bool]
     keys: tuple[str, ...]
     why: str
-    of: str = "name"
+    of: str | None = None
 
 
 SWITCHES: tuple[Switch, ...] = (
@@ -286,7 +286,7 @@ def _without_effect(scene: Scene, switch: Switch) -> str:
     keys = [key for key in switch.keys if getattr(part, key) != getattr(usual, key)]
     *first, last = [f"{switch.table}.{key} = {short_text(getattr(part, key))}" for key in keys] or [""]
     said = "{first:s} and {last:s} do nothing: {why}" if first else "{last:s} does nothing: {why}"
-    why = Text(switch.why, value=attrgetter(switch.of)(scene), laws=", ".join(LAWS))
+    why = Text(switch.why, value=switch.of and attrgetter(switch.of)(scene), laws=", ".join(LAWS))
     return Text(said, first=(*first,), last=last, why=why) if keys else ""
 
 

@@ -66,7 +66,7 @@ LEFT_OUT: tuple[tuple[Callable[[Scene], bool], str], ...] = (
 def print_stability(found: Stability, console: Console | None = None) -> None:
     """Print the windows, the equilibria, the spins; beside the thesis's figures for the thesis's device."""
     out = console or terminal()
-    title = Text("{name}: {headline}", name=found.scene.name or "the scene", headline=headline(found))
+    title = Text("{name:s}: {headline}", name=found.scene.name or in_language("the scene"), headline=headline(found))
     out.print(f"[bold]{escape(in_language(title))}[/bold]")
     out.print(draw(_windows_table(found)))
     if found.equilibria:
