@@ -59,7 +59,7 @@ class Scene(Part):
             if not rule.holds(self):
                 value = short_text(attrgetter(rule.key)(self))
                 expected = Text(rule.expected, limit=rule.of and str(attrgetter(rule.of)(self)))
-                raise SceneError("{key} = {value}: {expected}", key=rule.key, value=value, expected=expected)
+                raise SceneError("{key:s} = {value:s}: {expected}", key=rule.key, value=value, expected=expected)
         return self
 
     @property
@@ -141,7 +141,7 @@ RULES: tuple[Rule, ...] = (
     Rule(
         "drag.coefficient",
         lambda s: s.drag.law == "none" or len(s.drag.constants) == len(LAWS[s.drag.law].names),
-        "two numbers, [c1, c2], are expected with drag.law = mixed and one with every other law (here: {limit})",
+        "two numbers, [c1, c2], are expected with drag.law = mixed and one with every other law (here: {limit:s})",
         "drag.law",
     ),
     Rule(
@@ -249,14 +249,14 @@ SWITCHES: tuple[Switch, ...] = (
         "drive",
         lambda s: s.drive.waveform != "triggered",
         ("light_rad", "latency_s", "cycle_turns"),
-        "drive.waveform = {value}; triggered lets the tape set off bursts",
+        "drive.waveform = {value:s}; triggered lets the tape set off bursts",
         "drive.waveform",
     ),
     Switch(
         "drive",
         lambda s: s.drive.waveform == "triggered" and s.drive.cycle_turns > 0,
         ("frequency_hz",),
-        "drive.cycle_turns = {value:g} gives the bursts their length; 0 leaves it to the frequency",
+        "drive.cycle_turns = {value:s} gives the bursts their length; 0 leaves it to the frequency",
         "drive.cycle_turns",
     ),
     Switch(
@@ -286,7 +286,7 @@ def _without_effect(scene: Scene, switch: Switch) -> str:
     keys = [key for key in switch.keys if getattr(part, key) != getattr(usual, key)]
     *first, last = [f"{switch.table}.{key} = {short_text(getattr(part, key))}" for key in keys] or [""]
     said = "{first:s} and {last:s} do nothing: {why}" if first else "{last:s} does nothing: {why}"
-    why = Text(switch.why, value=switch.of and attrgetter(switch.of)(scene), laws=", ".join(LAWS))
+    why = Text(switch.why, value=switch.of and short_text(attrgetter(switch.of)(scene)), laws=", ".join(LAWS))
     return Text(said, first=(*first,), last=last, why=why) if keys else ""
 
 
