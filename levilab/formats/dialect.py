@@ -29,7 +29,7 @@ UNVALUED = "=?"
 #: A number with marks between its thousands: 2.394,0 and 2,394.0, of which 2.394 alone could be either; 2 394, 2'394.
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?P<mark>[.,'’ ])\d{3}(?:(?P=mark)\d{3})*(?P<decimals>[.,]\d+)?")
 #: A power of ten as people write it.
-_POWER = re.compile(r"\s?[×*·x]\s?10\s?\^?(?=[+-]?\d)")
+_POWER = re.compile(r"\s?[×*·x]\s?10\s?(?:\^\s?|(?=[+-]|[⁺⁻⁰¹²³⁴-⁹]))([+-]?\d+|[⁺⁻]?[⁰¹²³⁴-⁹]+)")
 _HALF = r"(?:\s?([AaPp])\.?\s?[Mm]\.?)?"
 #: What a stopwatch or a clock shows: minutes and seconds, hours before them; of half a day hours and minutes, too.
 CLOCK = re.compile(rf"(?:(\d{{1,3}}):)?(\d{{1,3}}):(\d\d(?:[.,]\d+)?){_HALF}")
@@ -108,7 +108,8 @@ class Dialect:
         """
         with contextlib.suppress(ValueError):
             return self._plain_number(text)
-        text = _POWER.sub("e", unicodedata.normalize("NFKC", text).replace("\N{MINUS SIGN}", "-"))
+        text = re.sub(r"[^\S\t]", " ", text).replace("\N{MINUS SIGN}", "-")
+        text = _POWER.sub(lambda m: "e" + unicodedata.normalize("NFKC", m[1]).replace("\N{MINUS SIGN}", "-"), text)
         if found := _THOUSANDS.fullmatch(text):
             mark, decimals = found["mark"], found["decimals"] or ""
             if decimals[:1] == self.decimal != mark or (not decimals and mark not in ".,"):

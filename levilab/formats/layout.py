@@ -61,24 +61,21 @@ class Layout:
     aligned: bool = False
     sample: tuple[tuple[str, ...], ...] = ()
 
-    def titles(self, path: Path) -> tuple[str, ...]:
-        """Return the titles, or numbers in their place, each with the unit below it.
-
-        Raises:
-            TableError: a title has another unit.
-        """
+    def titles(self) -> tuple[str, ...]:
+        """Return the titles, or numbers in their place, each with the unit below it if it has none."""
         given, units = [], [*self.units, *[""] * self.width]
         for title, unit in zip(self.header or map(str, range(1, self.width + 1)), units, strict=False):
-            own = "" if implied_unit(title) else read_title(title).unit or ""
-            if any(
-                unit_factor(unit, kind) not in {None, unit_factor(own, kind) or 0} for kind in UNITS if is_unit(own)
-            ):
-                what = (
-                    f"column '{shorten(title)}' has the unit '{shorten(unit)}' in the row beneath; correct one of them"
-                )
-                raise TableError(path, what)
+            own = "" if implied_unit(title) else read_title(title).unit
             given.append(f"{title} [{unit}]" if not own and (is_unit(unit) or unit == "%") else title)
         return tuple(given)
+
+    def must_have_one_unit(self, path: Path, index: int) -> None:
+        """Raise TableError for a column with another unit in its title than below it."""
+        title, unit = "".join(self.header[index : index + 1]), "".join(self.units[index : index + 1])
+        own = "" if implied_unit(title) else read_title(title).unit or ""
+        if any(unit_factor(unit, kind) not in {None, unit_factor(own, kind) or 0} for kind in UNITS if is_unit(own)):
+            what = f"column '{shorten(title)}' has the unit '{shorten(unit)}' in the row beneath; correct one of them"
+            raise TableError(path, what)
 
 
 def sniff(source: Text) -> Layout:

@@ -44,7 +44,7 @@ def set_upright(text: Text) -> Text:
 
 
 def tables_of(text: Text, layout: Layout) -> list[Text]:
-    """Return the tables of a text in which the titles stand again, below a blank line or a name; of others the text.
+    """Return the tables of a text whose titles stand again, below no row or above earlier times; of others the text.
 
     Raises OSError.
     """
@@ -52,19 +52,25 @@ def tables_of(text: Text, layout: Layout) -> list[Text]:
         return [text]
     with text.open() as stream:
         lines = lines_of(text.path, stream.read(), layout.encoding, whole=True)
-    names = ["", *(" ".join(filter(None, layout.dialect.split(line))) for line in lines)]
-    filled = [0, *(sum(map(bool, layout.dialect.split(line))) for line in lines)]
-    titles = [
-        k for k, line in enumerate(lines) if line.strip() == lines[layout.header_line - 1].strip() and filled[k] < 2
-    ]
-    starts = [k - filled[k] for k in titles] if titles[:1] == [layout.header_line - 1] else []
-    if len(starts) < 2:
+    titles = [k for k, line in enumerate(lines) if line.strip() == lines[layout.header_line - 1].strip()]
+    if len(titles) < 2 or titles[0] != layout.header_line - 1:
         return [text]
-    parts = [["\n"] * a + lines[a:b] for a, b in pairwise([*starts, len(lines)])]
-    return [
-        replace(text, path=text.path / (names[k].replace("/", "-") or f"table {n}"), content="".join(part).encode())
-        for n, (k, part) in enumerate(zip(titles, parts, strict=True), 1)
-    ]
+    names, starts = [], []
+    for k in titles:
+        above = [field for field in layout.dialect.split(lines[k - 1]) if field and k]
+        named = len(above) == 1 or "number" not in map(layout.dialect.kind, above)
+        if named or k == titles[0] or _times(lines[k - 1 : k], layout) >= _times(lines[k + 1 : k + 3], layout) > []:
+            names.append(" ".join(above).replace("/", "-") if named else "")
+            starts.append(k - bool(names[-1]))
+    parts = ["\n" * a + "".join(lines[a:b]) for a, b in pairwise([*starts, len(lines)])]
+    names = [name if name and names.count(name) == 1 else f"{name or 'table'} {n}" for n, name in enumerate(names, 1)]
+    return [replace(text, path=text.path / name, content=one.encode()) for name, one in zip(names, parts, strict=True)]
+
+
+def _times(lines: Sequence[str], layout: Layout) -> list[float]:
+    place = next((k for k, title in enumerate(layout.header) if read_title(title).column == "time_s"), 0)
+    fields = [field for line in lines for field in layout.dialect.split(line)[place : place + 1]]
+    return [layout.dialect.value(field) for field in fields if layout.dialect.kind(field) == "number"]
 
 
 def _lies(rows: Sequence[Line], dialect: Dialect) -> bool:

@@ -308,8 +308,9 @@ def _unanswered(path: Path, doubt: Doubt) -> NoSuchColumn:
 
 
 def _must_be_sure(plan: "Plan") -> "Plan":
-    """Return a plan; raise NoSuchColumn for a unit in doubt, TableError for a formula without its value."""
+    """Return a plan; raise NoSuchColumn for a unit in doubt, TableError for two, or for a formula without its value."""
     for column in plan.columns:
+        plan.layout.must_have_one_unit(plan.path, column.index)
         doubt = None if column.written else _unit_doubt(plan.layout, column, plan.columns)
         if doubt:
             raise _unanswered(plan.path, doubt)
@@ -485,7 +486,7 @@ def _looks_at(file: Path, text: Text, request: Request) -> Iterator[_Look]:
     text = set_upright(text)
     try:
         layout = sniff(text)
-        tables, titles = tables_of(text, layout), layout.titles(text.path)
+        tables, titles = tables_of(text, layout), layout.titles()
     except TableError as error:
         yield _Look(text.path, name, error=error)
         return
@@ -553,7 +554,8 @@ def _notes_on_u(path: Path, layout: Layout, chosen: Sequence[Column], *, wanted:
     name = shorten(str(path), 200)
     how = "u is half of 2σ or of U (k = 2), and a greatest error divided by √3: write it in a column u [Hz]"
     missing = wanted and {_SPIN, companion(_SPIN)} & {one.name for one in chosen} == {_SPIN}
-    expanded = [title for title in layout.header if missing and _EXPANDED.search(title)]
+    titles = zip(layout.header, layout.titles(), strict=False) if missing else ()
+    expanded = [title for title, full in titles if _EXPANDED.search(title) and _may_be_of_spin(read_title(full))]
     notes: list[str] = [
         of_file("expanded u", f"{name}: column '{shorten(title)}' is not read: {how}") for title in expanded
     ]
@@ -566,6 +568,12 @@ def _notes_on_u(path: Path, layout: Layout, chosen: Sequence[Column], *, wanted:
             text = Said(said, path=name, title=title, number=number, unit=unit, shown=100 * number)
             notes.append(of_file("percent", text))
     return notes
+
+
+def _may_be_of_spin(title: Title) -> bool:
+    """Return whether a title that is that of no quantity could be one of an uncertainty of the spin."""
+    unit = title.unit or "%"
+    return title.column is None and (unit == "%" or "σ" in unit or unit_factor(unit, "frequency") is not None)
 
 
 def _must_be_one_time(path: Path, layout: Layout, meant: Sequence[str]) -> None:

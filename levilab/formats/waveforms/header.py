@@ -315,27 +315,29 @@ def _recognise_stepped(head: Head, dialect: Dialect, rows: Sequence[Sequence[str
     first = 0 if place else _first_row(rows, 0, 0, dialect)
     keys = _keys(rows if place else rows[:first])
     step, start = _interval(head, keys, dialect), printed(_value(keys, "start", "t0"), dialect)
-    if (step is None or start is None) and "increment" in keys:
+    rigol = {"start", "increment"} <= {text.casefold() for text in rows[0]}
+    if (step is None or start is None) and rigol:
         raise TableError(head.path, "has no numbers below Start and Increment: export it again", line=2)
     if first is None or (step is None and "timebase" not in keys):
         return None
     width = filled_count(rows[first])
     fields = [row[place] for row in rows[first:] if place < len(row)] if width > 1 else []
     steps = [after - before for before, after in pairwise(dialect.value(f) for f in fields if _is_number(f, dialect))]
-    numbered = set(steps[:_FEW_STEPS]) == {1.0}
-    timed = bool(steps) and not numbered and (step is None or abs(sum(steps) / len(steps) / step.value - 1) < _NEARLY)
     above = dict(enumerate(rows[first - 1])) if first else {}
-    named = dict(enumerate(rows[0])) if {"increment", "tinc"} & keys.keys() else above if numbered or timed else {}
+    numbered = not place and (above.get(0, "").casefold() == "index" or set(steps[:_FEW_STEPS]) == {1.0})
+    nearly = bool(steps) and (step is None or abs(sum(steps) / len(steps) / step.value - 1) < _NEARLY)
+    timed = bool(place) or (nearly and not numbered)
+    named = dict(enumerate(rows[0])) if rigol or "tinc" in keys else above if numbered or timed else {}
     columns, begin = [], place + (numbered or timed)
     for k in range(begin, width):
-        title = named.get(k, "")
-        unit = above.get(k, "") if "increment" in keys else title.partition("(")[2].rstrip(")")
+        title = "" if "=" in named.get(k, "") else named.get(k, "")
+        unit = above.get(k, "") if rigol else title.partition("(")[2].rstrip(")")
         name = title.partition("(")[0].removesuffix("_Voltage") or (k == begin and _value(keys, "channel", "source"))
         of_unit = _unit(unit or _value(keys, *_UNIT_KEYS))
         columns.append(SampleColumn(_signal(name or f"CH{k - begin + 1}"), of_unit[0], k, of_unit[1]))
     kept, full = _with_samples(columns, rows, first, dialect)
     made = next((made for key, made in _MAKERS.items() if key in keys), "OWON CSV" if numbered else "CSV of a scope")
-    made = "Tektronix TDS CSV" if place else made + " of the screen" * ("increment" in keys and not numbered)
+    made = "Tektronix TDS CSV" if place else made + " of the screen" * (rigol and not numbered)
     return Header(
         made, dialect, (full if numbered or timed else first) + 1, kept, time=place if timed else None,
         time_factor=unit_factor(_value(keys, "horizontal units"), "time") or 1.0, sequence=0 if numbered else None,
@@ -403,7 +405,7 @@ def _keys(rows: Sequence[Sequence[str]]) -> dict[str, Sequence[str]]:
             value = value.strip(" ,;")
             found[key.strip().casefold()] = ([value] if mark and value else []) + cells
         found |= {key.casefold(): [value] for key, mark, value in (cell.partition("=") for cell in row[1:]) if mark}
-    if len(rows) > 1 and "Increment" in rows[0]:
+    if len(rows) > 1 and {"start", "increment"} <= {text.casefold() for text in rows[0]}:
         found |= {key.casefold(): [cell] for key, cell in zip(rows[0], [*rows[1], *rows[0]], strict=False) if key}
     return found
 
@@ -532,7 +534,8 @@ def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str]) -> int:
 
 
 def _time_factor(head: Head, layout: Layout, time: int) -> float:
-    unit = read_title(layout.titles(head.path)[time]).unit if layout.header else None
+    layout.must_have_one_unit(head.path, time)
+    unit = read_title(layout.titles()[time]).unit if layout.header else None
     factor = unit_factor(unit, "time") if unit else 1.0
     if factor is None:
         text = f"'{shorten(unit or '')}' is no unit of time: correct the title"

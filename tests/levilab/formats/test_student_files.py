@@ -95,7 +95,7 @@ def rows(form):
         ("t,f\n" + rows("{t},{f} ± 0.1 %"), [0.001 * f for f in SPINS]),
         (rows("{t} s   {f} Hz ± 0.1 %"), [0.001 * f for f in SPINS]),
         ("t;f\n" + rows("{t} s;{f} Hz ± 30 mHz"), 0.03),
-        ("Zeit [s]|Frequenz [Hz]\n" + rows("{t}|{f}"), None),
+        ("Zeit [s]|Frequenz [Hz]|z [mm]\ns|Hz|cm\n" + rows("{t}|{f}|2"), None),
         ("t   f\n[s]   [Hz]\n" + rows("{t}   {f}"), None),
         (rows("{t} s   {f} Hz"), None),
         ("Zeit Frequenz\n" + rows("{t} s {f} Hz"), None),
@@ -143,10 +143,10 @@ def test_a_u_whose_cells_may_show_percent_is_said(title, unit, tmp_path):
     assert f"column '{title}' holds 0.001, taken in {unit}; if it shows 0.1 %, write u in Hz" in note
 
 
-@pytest.mark.parametrize("name", ["Messung {}", "{}"])
-def test_tables_below_and_beside_one_another_are_runs(name, tmp_path):
-    names = [name.format(k) for k in (1, 2)]
-    (tmp_path / "below.csv").write_text("".join(f"{one}\nt [s],f [Hz]\n{rows('{t},{f}')}\n" for one in names))
+@pytest.mark.parametrize("head", ["\nMessung {}\n", "{}\n", "A\n", ""])
+def test_tables_below_and_beside_one_another_are_runs(head, tmp_path):
+    names = [head.strip("A\n").format(k) or str(k) for k in (1, 2)]
+    (tmp_path / "below.csv").write_text("".join(f"{head.format(k)}t [s],f [Hz]\n{rows('{t},{f}')}" for k in (1, 2)))
     with xlsxwriter.Workbook(tmp_path / "my.xlsx") as book:
         sheet, clock = book.add_worksheet(), book.add_format({"num_format": "h:mm"})
         book.add_worksheet().hide()
@@ -176,7 +176,7 @@ def test_a_column_in_which_some_rows_have_no_u_behind_the_number_says_so(count, 
 
 @pytest.mark.parametrize(
     ("cell", "do"),
-    [("38.5 Hz ± 30 ms", "write one unit in all rows"), ("38.5 ± 1 %?", "into a column of its own, with the title u")],
+    [("38.5 Hz ± 30 ms", "one unit in all"), ("38.5 ± 1 %?", "the title u"), ("10²", "number"), ("4x1000", "number")],
 )
 def test_a_number_behind_a_mark_that_cannot_be_used_is_quoted_as_it_stands(cell, do, tmp_path):
     path = tmp_path / "my.csv"
@@ -463,7 +463,7 @@ def test_a_title_with_a_unit_goes_before_a_column_without_one(tmp_path):
 @pytest.mark.parametrize("title", ["2σ [Hz]", "U (k=2) [Hz]", "max. Fehler [Hz]"])
 def test_an_expanded_uncertainty_is_named_and_not_read(tmp_path, title):
     path = tmp_path / "wide.csv"
-    path.write_text(f"t [s],f [Hz],{title}\n0,40,0.04\n10,38.5,0.04\n20,37,0.04\n", encoding="utf-8")
+    path.write_text(f"t [s],f [Hz],{title},T-Fehler [K]\n0,40,0.04,1\n10,38.5,0.04,1\n20,37,0.04,1\n", encoding="utf-8")
     (note,) = read_table(path, quantities=SPIN).warnings
     assert f"'{title}' is not read: u is half of 2σ" in note
 

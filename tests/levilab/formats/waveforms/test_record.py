@@ -94,11 +94,11 @@ def rows(n=20, first=0):
     ("text", "start", "step", "channels"),
     [
         ("X,CH1,Start,Increment,\nSequence,Volt,-1.4e-03,2e-06,\n" + rows(first=22), -1.356e-3, 2e-6, "CH1 V"),
-        ("X,CH1,CH2,Start,Increment\nSequence,mV,Volt,0,1e-3\n" + rows(), 0.0, 1e-3, "CH1 V"),  # CH2 was off
+        ("X,CH1,CH2,START,INCREMENT\nSequence,mV,Volt,0,1e-3\n" + rows(), 0.0, 1e-3, "CH1 V"),  # CH2 was off
         ("CH1,CH2,Start,Increment,\nVolt,Volt,-6e-02,1e-04\n" + "0.5,1.5,\n" * 20, -0.06, 1e-4, "CH1 V, CH2 V"),
         ("Source,CH3\nSecond,Volt\n" + "".join(f"{k / 1000:.11f},1\n" for k in range(20)), 0.0, 1e-3, "CH3 V"),
-        ('"Record Length",20,"Points",0.0,1\n"Sample Interval",1e-3,s,0.001,2\n'
-         + "".join(f",,,{k / 1000},1\n" for k in range(2, 20)), 0.0, 1e-3, "CH1 V"),
+        ('"Record Length",20,"Points",0.0,1\n"Sample Interval",1.1e-3,s,0.001,2\n'
+         + "".join(f",,,{k / 1000},1\n" for k in range(2, 20)), 0.0, 1.1e-3, "CH1 V"),
         ("#Model,MDO3014\n#Sample Interval,4e-09\n#Record Length,20\n#TIME,D1,D0\n"
          + "".join(f"{k * 4e-9:.7e},1,0\n" for k in range(20)), 0.0, 4e-9, "D1 V, D0 V"),
         ("x-axis,1,2\nsecond,Volt,Ampere\n" + "".join(f"{k}.0E-03,1,2\n" for k in range(20)),
@@ -122,6 +122,8 @@ def rows(n=20, first=0):
          + "".join(f"{k}\t{k % 5}.00\t3.00\n" for k in range(20)), 0.0, 2e-7, "CH1 V, CH2 V"),
         ("Source,CH2\nSampling Period,1e-4\nTime,23-Nov-26 14:05\nData,\n" + "5,\n7,\n" * 10, 0.0, 1e-4, "CH2 V"),
         ("XInc:,1.0E-04\nYUnits:,mV\nData:\n" + "5.5\n" * 20, 0.0, 1e-4, "CH1 V"),
+        ("Increment:,1e-4\n" + "0.5\n" * 20, 0.0, 1e-4, "CH1 V"),
+        ("#timebase=4000(ps)\n,#voltbase=10(uV)\n" + "".join(f"{k}e-3,1.5\n" for k in range(20)), 0.0, 1e-3, "CH1 V"),
         ("in s,C1 in V\n" + "".join(f"{k}E-03,1\n" for k in range(20)), 0.0, 1e-3, "C1 V"),
         ("CH1V,CH4V,t0=-1.0e-03,tInc=1e-6\n" + "0.5,1.5\n" * 20, -1e-3, 1e-6, "CH1 V, CH4 V"),
         ("Time(s),CH1V,CH2V\n" + "".join(f"{k / 1000},1,2\n" for k in range(20)), 0.0, 1e-3, "CH1 V, CH2 V"),
@@ -258,6 +260,7 @@ def test_a_torn_last_line_is_left_out_with_a_warning(write):
         (PLAIN.replace("0,0100;1000", "0,010;high"), "line 12: 'high' is no number with decimal comma"),
         ("X,CH1,Start,Increment\nSequence,Volt,x,y\n" + rows(), "no numbers below Start and Increment"),
         ("X,CH1,Start,Increment\nSequence,Volt,0,1e-3\n" + rows(20) + rows(20, 30), "1 is expected"),
+        ("Time interval :,1mS\nindex,CH1\n" + "".join(f"{2 * k},1.5\n" for k in range(20)), "1 is expected"),
         ("X,CH1,Start,Increment\nSequence,Volt,0,1e-3\n" + rows(5), "holds 5 samples, at least 16"),
     ],
 )
