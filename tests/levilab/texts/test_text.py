@@ -287,8 +287,8 @@ def test_a_wrong_setting_is_answered_in_german(given: str, said: str) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        "simulate tilted --duration 2 --explain", "simulate driven --duration 9 --set drive.cycle_turns=1.5", "stability sway",
-        "stability undriven --set top.mass_kg=1", "simulate undriven --set top.masse=3",
+        "simulate tilted --duration 2 --explain", "simulate driven --duration 9 --set drive.cycle_turns=1.5",
+        "stability sway", "stability undriven --set top.mass_kg=1", "simulate undriven --set top.masse=3",
         "simulate undriven --set base.outer_radius_m=0.01", "simulate undriven --set top.mass_kg=abc",
         "simulate undriven --duration abc", "simulate sway --set drag.law=foo", "tune --top 24 --temperature x",
         "tune --top 24.9 --temperature 21 --washers 0.06,0.1 --trial 0.1g,20C,sink --trial 0.06g,20C,seitlich",
