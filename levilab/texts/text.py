@@ -46,7 +46,7 @@ class Language:
 
 def languages() -> tuple[str, ...]:
     """Return the codes of the languages that there are, such as "de"."""
-    return tuple(sorted(path.stem for path in FOLDER.glob("*.toml")))
+    return tuple(sorted(path.stem for path in FOLDER.iterdir() if path.suffix == ".toml"))  # glob hides an OSError
 
 
 @cache
