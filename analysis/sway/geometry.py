@@ -258,7 +258,7 @@ def _judge(swings: Swings, spin: float, known: Known, part: float) -> tuple[floa
         return math.inf, size, _BENT
     off = swings.vertical.value - vertical_swing(backward, forward, slope, known.top.gravity)
     u = math.hypot(_VERTICAL_U_HZ, _VERTICAL_SHIFT_U * swings.size**2 / max(_away(swings), NEAREST_HZ))
-    unlikely = COARSE * swings.misfit + part * ((off / u) ** 2 + 2 * math.log(u)) + swings.improbable - swings.misfit
+    unlikely = COARSE * swings.misfit + part * ((off / u) ** 2 + 2 * math.log(u)) + swings.weakness
     share = size * swings.split / _split(size, spin, swings.frequency[:2], known)[0]
     return unlikely, share, math.hypot(_BENT, _doubt(swings))
 

@@ -99,9 +99,9 @@ class Swings:
     mistake: float = 0.0
 
     @property
-    def improbable(self) -> float:
-        """−2 log of the probability, but for a constant: a swing is likelier the stronger line."""
-        return self.misfit - 4 * float(np.sum(np.log(self.amplitude[:2])))
+    def weakness(self) -> float:
+        """−2 log of the amplitudes' probability, but for a constant: a swing is likelier the stronger line."""
+        return -4 * float(np.sum(np.log(self.amplitude[:2])))
 
     @property
     def size(self) -> float:
@@ -204,13 +204,17 @@ def swings_in_window(t: Array, s: Places, heights: Array | None = None, *, risin
 
 def _likeliest(fits: Sequence[_Fit]) -> list[_Fit]:
     """Return the likeliest of unlike fits, the likeliest first."""
+
+    def improbable(fit: _Fit) -> float:
+        return fit.swings.misfit + fit.swings.weakness
+
     kept: list[_Fit] = []
-    for one in sorted(fits, key=lambda one: one.swings.improbable):
+    for one in sorted(fits, key=improbable):
         apart = [np.abs(one.swings.frequency - other.swings.frequency)[:2].max() for other in kept]
         if not apart or min(apart) > one.swings.u[:2].max():
             kept.append(one)
-    least = kept[0].swings.improbable
-    return [one for one in kept if COARSE * (one.swings.improbable - least) < _FARTHEST][:_KEPT]
+    least = improbable(kept[0])
+    return [one for one in kept if COARSE * (improbable(one) - least) < _FARTHEST][:_KEPT]
 
 
 def _weak(t: Array, rest: Places) -> float:

@@ -110,7 +110,7 @@ class FreeTop(Generic[S]):
         session: the acquisition.
         before: the readings so far, of which the last ones count.
         missed: why there was no reading, each time since the last one.
-        missed_by: when the last of these counts would have ended, which may begin late: a fallen top was down [s].
+        missed_by: when the first of these without a top would have ended, which may begin late: it was down [s].
     """
 
     session: Session[S]
@@ -148,11 +148,13 @@ class FreeTop(Generic[S]):
             self.missed.append(reading)
             again, now = min(self._took, session.settings.gate_s + _SETTLED_S), session.now()
             stood_still = max(0.0, now - asked - self._took - again)  # the computer, in the first of the two counts
-            self.missed_by = min(asked + self._least + stood_still, now)
+            if reading in NO_TOP:  # a counter that was lost saw nothing of the top, which may have been up
+                self.missed_by = min(self.missed_by, asked + self._least + stood_still, now)
             if self.missed[-_MOST_MISSED:] == [Missed.FASTER] * _MOST_MISSED:
                 raise AnotherTop(self.before[-1], self._faster)
             return None
         self.missed.clear()
+        self.missed_by = math.inf
         self.before = [*self.before[1 - _KEPT :], reading]
         return reading
 

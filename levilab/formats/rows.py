@@ -197,7 +197,7 @@ def _read_lines(
     lines, values = array("q"), [array("d") for _ in chosen]
     time, path, notes = "", text.path, list[str]()
     layout = _with_order_of_dates(text, layout, chosen, notes)
-    refused, words = list[tuple[TableError, str]](), list[tuple[TableError, str]]()
+    refused, remarks = list[tuple[TableError, str]](), list[tuple[TableError, str]]()
     for number, line in _lines(text, layout, notes):
         if not line.endswith("\n"):
             row = None if drop_unended else _row_or_none(path, layout, chosen, number, line)
@@ -207,7 +207,7 @@ def _read_lines(
         try:
             row = _row(path, layout, chosen, number, line)
         except TableError as error:
-            (words if isinstance(error, _Words) else refused).append((error, line))
+            (remarks if isinstance(error, _Words) else refused).append((error, line))
             if len(refused) > _MOST_REFUSED and not skip_doubtful:
                 break
             continue
@@ -222,11 +222,11 @@ def _read_lines(
         else np.array(found, np.float64)
         for column, found in zip(chosen, values, strict=True)
     )
-    refused = refused if lines else [*words[:1], *refused]
+    refused = refused if lines else [*remarks[:1], *refused]
     notes += _notes_on_refused(refused, len(lines), skip=skip_doubtful, may_skip=not drop_unended)
-    notes += [_left_out(error.line or 0, line, "is no reading") for error, line in words[:_MOST_NAMED]]
-    if len(words) > _MOST_NAMED:
-        notes.append(Note("words", f"{len(words)} rows without a number are left out, these and others"))
+    notes += [_left_out(error.line or 0, line, "is no reading") for error, line in remarks[:_MOST_NAMED]]
+    if len(remarks) > _MOST_NAMED:
+        notes.append(Note("words", f"{len(remarks)} rows without a number are left out, these and others"))
     return Rows(numbers, np.array(lines, np.int64), (*notes, *_doubts_about(time)))
 
 

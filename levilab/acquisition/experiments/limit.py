@@ -11,7 +11,7 @@ from pydantic import Field, PositiveFloat, PositiveInt
 
 from analysis.limits import FEWEST_ON_PARABOLA, spin_at_fall, spin_at_loss
 from analysis.locked import Cause, cause_of_loss, lag_before_loss, slip_of
-from levilab.acquisition.counting import NO_TOP, AnotherTop, Missed, free_top, prepare_counter, spin_now
+from levilab.acquisition.counting import AnotherTop, Missed, free_top, prepare_counter, spin_now
 from levilab.acquisition.driving import (
     HELD_WITHIN_HZ,
     RAMP_STEP_S,
@@ -185,20 +185,14 @@ def _lower(session: Session[LimitSettings], keep: Callable[[Row], None]) -> bool
     drive_up_and_let_go(session)
     top = free_top(session)
     seen: list[Row] = []
-    missed_by = math.inf
     while not is_over(session):
         asked = session.now()
         if reading := top.read():
             seen.append(reading)
-            missed_by = math.inf
             session.progress(Text("free at {spin:.2f} Hz", spin=reading["spin_frequency_hz"]), 1.0)
-        else:
-            # a counter that was lost saw nothing of the top, which may have been up all that time
-            if top.missed[-1] in NO_TOP:
-                missed_by = min(missed_by, top.missed_by)
-            if end := top.fall():
-                keep(_limit_of_fall(session, seen, missed_by, end))
-                return True
+        elif end := top.fall():
+            keep(_limit_of_fall(session, seen, top.missed_by, end))
+            return True
         session.wait(settings.interval_s - (session.now() - asked))
     return False
 

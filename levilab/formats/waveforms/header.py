@@ -406,7 +406,7 @@ def _keys(rows: Sequence[Sequence[str]]) -> dict[str, Sequence[str]]:
             found[key.strip().casefold()] = ([value] if mark and value else []) + cells
         found |= {key.casefold(): [value] for key, mark, value in (cell.partition("=") for cell in row[1:]) if mark}
     if len(rows) > 1 and {"start", "increment"} <= {text.casefold() for text in rows[0]}:
-        found |= {key.casefold(): [cell] for key, cell in zip(rows[0], [*rows[1], *rows[0]], strict=False) if key}
+        found |= {key.casefold(): [cell] for key, cell in zip(rows[0], rows[1], strict=False) if key}
     return found
 
 
@@ -429,15 +429,8 @@ def _interval(head: Head, keys: Mapping[str, Sequence[str]], dialect: Dialect) -
 
 #: Keys of headers: of the sampling interval, of the number of samples, of their unit.
 _INTERVALS = (
-    "sample interval",
-    "sampling interval",
-    "sampling period",
-    "time interval",
-    "clock",
-    "xinc",
-    "increment",
-    "tinc",
-)
+    "sample interval", "sampling interval", "sampling period", "time interval", "clock", "xinc", "increment", "tinc"
+)  # fmt: skip
 _COUNT_KEYS = ("record length", "memory length", "size", "points")
 _UNIT_KEYS = ("units", "vertical units", "vertical unit", "yunits")
 #: Part by which printed times may differ from the header's interval.

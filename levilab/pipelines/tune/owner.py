@@ -105,8 +105,8 @@ class Owner:
 
     def _attempt(self, text: str) -> Attempt:
         *masses, temperature, did = (piece.strip() for piece in ("," * (2 - text.count(",")) + text).split(","))
-        words = [(one, in_language(one.value, code)) for code in {ENGLISH, spoken()} for one in Outcome]
-        outcomes = [*dict.fromkeys(one for one, word in words if did and word.startswith(did.casefold()))]
+        names = [(one, in_language(one.value, code)) for code in {ENGLISH, spoken()} for one in Outcome]
+        outcomes = [*dict.fromkeys(one for one, name in names if did and name.startswith(did.casefold()))]
         if len(outcomes) != 1 or not masses[0]:
             raise ValueError(Text(_TRIAL, names=tuple(one.value for one in Outcome)))
         typed, degrees = read_masses(",".join(masses)), read_temperature(temperature)
