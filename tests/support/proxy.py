@@ -1,11 +1,10 @@
 """A proxy between a program and the servers of the virtual bench, which does to the bytes what a wire may do.
 
-The far end is a TCP connection; the near end is one too, or a pseudo-terminal.  One thread moves all bytes, so the
-order in which they arrive does not depend on the machine's load: what belongs together is sent in one segment.
+One thread moves all bytes, so the order in which they arrive does not depend on the machine's load: what belongs
+together is sent in one segment.
 """
 
 import contextlib
-import os
 import re
 import selectors
 import socket
@@ -17,9 +16,7 @@ _MOST = 1 << 20
 
 
 class Lines:
-    """Bare sockets and serial lines: a line feed ends a message and an answer, or the length of a block does."""
-
-    header = 0
+    """Bare sockets: a line feed ends a message and an answer, or the length of a block does."""
 
     def __init__(self, wire):
         self.wire = wire
@@ -208,54 +205,21 @@ def _opaque(data):
 FRAMINGS = {"socket": Lines, "hislip": Hislip, "vxi11": Vxi11}
 
 
-class _Terminal:
-    """The near end of a pseudo-terminal, with what the proxy needs of a socket."""
-
-    def __init__(self):
-        import pty
-        import tty
-
-        self._master, self._slave = pty.openpty()
-        tty.setraw(self._slave)
-        self.name = os.ttyname(self._slave)
-
-    def fileno(self):
-        return self._master
-
-    def recv(self, most):
-        return os.read(self._master, most)
-
-    def sendall(self, data):
-        while data:
-            data = data[os.write(self._master, data) :]
-
-    def close(self):
-        os.close(self._master)
-        os.close(self._slave)
-
-
 class Proxy:
     """Stands before a server at a port of loopback, from ``with`` to its end.
 
-    wire: what happens to the bytes; framing: a name in FRAMINGS; terminal: the near end is a pseudo-terminal, whose
-    name is there then.  port: where programs connect.
+    wire: what happens to the bytes; framing: a name in FRAMINGS; port: where programs connect.
     """
 
-    def __init__(self, far_port, wire, framing, *, terminal=False):
+    def __init__(self, far_port, wire, framing):
         self._far_port, self._wire, self._framing = far_port, wire, FRAMINGS[framing]
         self._selector = selectors.DefaultSelector()
         self._pairs = {}
         self._woken, self._wake = socket.socketpair()
         self._selector.register(self._woken, selectors.EVENT_READ)
-        self._listening = None
-        self._terminal = _Terminal() if terminal else None
-        if self._terminal:
-            self.name = self._terminal.name
-            self._join(self._terminal)
-        else:
-            self._listening = socket.create_server((LOOPBACK, 0))
-            self.port = self._listening.getsockname()[1]
-            self._selector.register(self._listening, selectors.EVENT_READ)
+        self._listening = socket.create_server((LOOPBACK, 0))
+        self.port = self._listening.getsockname()[1]
+        self._selector.register(self._listening, selectors.EVENT_READ)
         self._thread = threading.Thread(target=self._run, name="proxy")
 
     def __enter__(self):
@@ -268,15 +232,13 @@ class Proxy:
         for end in list(self._pairs):
             self._part(end)
         for each in (self._listening, self._woken, self._wake):
-            if each:
-                each.close()
+            each.close()
         self._selector.close()
 
     def _join(self, near):
         far = socket.create_connection((LOOPBACK, self._far_port))
         for end in (near, far):
-            if isinstance(end, socket.socket):
-                end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
             self._selector.register(end, selectors.EVENT_READ)
         link = self._framing(self._wire)
         self._pairs[near], self._pairs[far] = (far, link.toward), (near, link.back)
@@ -312,7 +274,7 @@ class Proxy:
                 segment, ended = item if isinstance(item, tuple) else (item, False)
                 if segment:
                     other.sendall(segment)
-                if ended and other is not self._terminal:
+                if ended:
                     self._part(end)
                     return
         except OSError:

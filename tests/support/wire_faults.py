@@ -1,7 +1,7 @@
 """Faults of a wire, one scripted fault at a time: what becomes of the bytes between a program and an instrument.
 
 A :class:`Wire` decides, for each answer of the instrument and for each message to it, what arrives; it knows nothing of
-sockets.  :mod:`support.proxy` applies it to TCP connections and pseudo-terminals, :class:`FaultyBus` to the links
+sockets.  :mod:`support.proxy` applies it to TCP connections, :class:`FaultyBus` to the links
 within the process.
 """
 

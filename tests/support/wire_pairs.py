@@ -13,7 +13,7 @@ import numpy as np
 import pyvisa_py.protocols.hislip
 import pyvisa_py.protocols.rpc
 import pyvisa_py.tcpip
-import serial.urlhandler.protocol_socket
+import serial
 
 import instruments.virtual.servers.hislip
 from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
@@ -30,10 +30,9 @@ from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.servers.server import BenchServer
-from instruments.virtual.servers.streams import HAS_PSEUDO_TERMINALS
 from support import hostile
 from support.models import FAMILIES, KIND_OF, PREPARE, ROWS
-from support.proxy import LOOPBACK, Proxy
+from support.proxy import Proxy
 from support.waiting import HANG_GUARD_S
 from support.wire_faults import FaultyBench, Tapped, Wire
 
@@ -330,13 +329,11 @@ WAYS = {
     "socket": tuple(KINDS),
     "hislip": tuple(KINDS),
     "vxi11": tuple(KINDS),
-    "serial": ON_A_LINE,
-    **({"pty": ON_A_LINE} if HAS_PSEUDO_TERMINALS else {}),
 }
 WITHIN = ("messages", "stream", "line", "levilab")
 #: Those without frames: a line feed ends a message.
 FRAMED = ("hislip", "vxi11")
-STREAMS = ("stream", "line", "levilab", "socket", "serial", "pty")
+STREAMS = ("stream", "line", "levilab", "socket")
 #: Those that carry seven bits of a byte.
 SEVEN_BITS = ("line", "levilab")
 _bench_numbers = itertools.count()
@@ -350,11 +347,6 @@ class _Hasty(VisaTransport):
 
     def query_block(self, message, *, patience=0.0, form=PLAIN_BLOCK):
         return super().query_block(message, form=form)
-
-
-class _HastySerial(SerialTransport):
-    def query(self, message, *, patience=0.0):
-        return super().query(message)
 
 
 class _Bound:
@@ -378,7 +370,6 @@ def hasty_clients():
         mock.patch.object(pyvisa_py.protocols.rpc, "_recvrecord", receive_soon),
         mock.patch.object(pyvisa_py.protocols.hislip, "time", SimpleNamespace(sleep=lambda _: None)),
         mock.patch.object(pyvisa_py.tcpip.Vxi11CoreClient, "destroy_link", return_value=0),
-        mock.patch.object(serial.urlhandler.protocol_socket, "time", SimpleNamespace(sleep=lambda _: None)),
         mock.patch.object(serial, "protocol_handler_packages", ["serial.urlhandler", "instruments.virtual.bench"]),
         mock.patch.multiple(instruments.virtual.servers.hislip, FIRST_WORDS=AT_MOST, SECOND_CHANNEL=AT_MOST),
     ):
@@ -429,19 +420,13 @@ class Pair:
         return bench, VisaTransport(address, library=library_for(bench), line=line)
 
     def _proxied(self, device):
-        serial = self.way in {"serial", "pty"}
         self.tap = Tapped(device, self.wire.heard)
-        bench = VirtualBench({SERIAL if serial else NETWORK: self.tap})
+        bench = VirtualBench({NETWORK: self.tap})
         server = self._opened.enter_context(BenchServer(bench))
-        offer = server.endpoints[0].resources["socket" if serial else self.way]
+        offer = server.endpoints[0].resources[self.way]
         port = int(re.findall(r"(?<=[:,])\d+", offer)[-1])
-        framing = "socket" if serial else self.way
-        proxy = self._opened.enter_context(Proxy(port, self.wire, framing, terminal=self.way == "pty"))
-        if self.way == "pty":
-            return bench, _HastySerial(proxy.name, timeout=AT_MOST)
+        proxy = self._opened.enter_context(Proxy(port, self.wire, self.way))
         near = offer.replace(str(port), str(proxy.port))
-        if serial:
-            return bench, _HastySerial(f"socket://{LOOPBACK}:{proxy.port}", timeout=AT_MOST)
         return bench, _Hasty(near, library="@py", timeout=AT_MOST)
 
     # --- what the far end knows ---
@@ -513,23 +498,8 @@ class Pair:
             self.prepare()
 
     def _greet(self):
-        if self.way in {"serial", "pty"}:
-            self._come_into_step()
         self.driver.forget_errors()
         self.driver.identity()
-
-    def _come_into_step(self):
-        """A line has no clear; names that come after the wait for them has ended are recognised by their form."""
-        self.driver.transport.timeout = 10 * SHORT  # names that never come are waited for once so long
-        for _ in range(10):
-            try:
-                if self.driver.identity() == self.tap.device.identity and self.driver.probe() == self.side.probe():
-                    break
-            except NotConnected:
-                self.driver.transport.reopen()
-            except InstrumentError:
-                pass
-        self.driver.transport.timeout = AT_MOST
 
 
 def attempt(pair, operation):

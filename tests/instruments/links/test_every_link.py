@@ -75,7 +75,6 @@ def test_a_late_answer_never_reaches_the_next_question(link, clock, late, later)
 
 def test_an_answer_without_a_question_is_dropped_before_the_next_question(link, clock):
     link.write("LIST?")
-    link.clear()
     clock.sleep(1.0)
     assert link.query("*IDN?") == IDENTITY
 

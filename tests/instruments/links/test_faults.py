@@ -8,7 +8,7 @@ from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, NotConnected
 from instruments.links.visa import VisaTransport
 from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.faults import AWAY, FAULTS, LATE, Fault
+from instruments.virtual.bench.faults import FAULTS, LATE, Fault
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.rows import Ask, Number
@@ -161,17 +161,6 @@ def test_an_error_that_stood_in_the_queue_is_raised_with_a_reading(box):
     box.transport.write("NONSENSE")
     with pytest.raises(CommandRefused, match=r"READ.*Undefined header"):
         box.reading()
-    assert box.reading() == 25.0
-
-
-def test_an_instrument_that_is_away_is_refused_until_it_is_back(box):
-    box.bench.faults.append(Fault("away for 5 s", question=r"READ\?"))
-    with pytest.raises(NotConnected):
-        box.reading()
-    with pytest.raises(NotConnected, match="cannot be opened"):
-        box.transport.reopen()
-    box.clock.sleep(AWAY)
-    box.transport.reopen()
     assert box.reading() == 25.0
 
 

@@ -52,57 +52,6 @@ def bench(clock, monkeypatch):
     return bench
 
 
-@pytest.fixture
-def slow(bench):
-    with contextlib.closing(SerialTransport(SLOW)) as transport:
-        yield transport
-
-
-# --- messages ---
-
-
-def test_the_driver_reads_the_field_through_the_port(bench):
-    magnetometer = LakeShore425(SerialTransport(METER, **LINE))
-    assert magnetometer.identity() == "LSCI,MODEL425,VIRTUAL,1.0"
-    magnetometer.prepare(range_t=0.02)
-    assert magnetometer.flux_density() == pytest.approx(0.0123, rel=2e-4)
-    magnetometer.close()
-
-
-def test_silence_raises_with_advice(slow):
-    with pytest.raises(NoAnswer, match="parity"):
-        slow.query("FOO?")
-
-
-def test_a_late_identity_is_not_taken_for_the_one_that_was_asked_for_to_resynchronise(bench, clock):
-    device = bench.instruments["ASRLslow::INSTR"]
-    with contextlib.closing(SerialTransport(SLOW)) as transport:
-        device.busy_until(clock.now() + 3.0)
-        with pytest.raises(NoAnswer):
-            transport.query("*IDN?")
-        assert transport.query("LIST?") == "1,2,1,1,1"
-
-
-def test_an_instrument_that_was_off_is_found_when_it_is_on(bench, clock):
-    device = bench.instruments["ASRLslow::INSTR"]
-    steps, device.steps = device.steps, lambda _: iter(())
-    with contextlib.closing(SerialTransport(SLOW)) as transport:
-        for _ in range(3):
-            with pytest.raises(NoAnswer):
-                transport.query("*IDN?")
-        device.steps = steps
-        assert transport.query("LIST?") == "1,2,1,1,1"
-        before = clock.now()
-        transport.query("LIST?")
-        assert clock.now() - before < 0.1  # in step again
-
-
-def test_bytes_without_a_question_are_dropped_before_the_next_question(slow, clock):
-    slow.write("LIST?")
-    clock.sleep(1.0)
-    assert slow.query("*IDN?") == IDENTITY
-
-
 # --- faults ---
 
 
@@ -358,12 +307,6 @@ def test_a_read_that_would_wait_for_ever_raises(bench):
 def test_a_url_that_leads_nowhere(bench, url, words):
     with pytest.raises(serial.SerialException, match=words):
         serial.serial_for_url(url)
-
-
-def test_benches_have_names(bench, monkeypatch, clock):
-    monkeypatch.setitem(benches, "mine", lambda: VirtualBench({"ASRLslow::INSTR": Virtual425(clock, flux_density=abs)}))
-    with contextlib.closing(SerialTransport("levilab://slow?bench=mine", **LINE)) as transport:
-        assert "MODEL425" in transport.query("*IDN?")
 
 
 def test_a_port_that_is_closed_does_nothing(bench):
