@@ -9,17 +9,14 @@ Heflinger & Ridgway, Am. J. Phys. 65, 286 (1997) for the linear window.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError, NotFinite, NotPositive, TooFewReadings
 from analysis.uncertainty import ROUNDING, Estimate
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 Array = NDArray[np.float64]
 

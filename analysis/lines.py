@@ -13,16 +13,14 @@ products, and sums over lines and bins are written out or run over the first axi
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import NotFinite, TooFewReadings
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 Signal = NDArray[np.complex128]
 Array = NDArray[np.float64]

@@ -12,16 +12,13 @@ turn and runs away.  A top that leaves the window of its spin takes its lock alo
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.errors import TooFewReadings
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 #: A difference counts from this number of standard uncertainties on (by chance once in 10 000 runs), and of Hz:
 #: less is the beginning and the end of a swing about the drive, a third of a turn in 20 s.

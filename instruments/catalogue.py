@@ -7,26 +7,32 @@ driver prepares and reads it, its settings survive a round trip; test_fuzz.py se
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from instruments.drivers import Instrument
+from instruments.drivers.counter import Counter
 from instruments.drivers.counter.keysight_34461a import GATES, Keysight34461A
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.drivers.counter.phyphox import Phyphox
+from instruments.drivers.generator import Generator
 from instruments.drivers.generator.agilent_33220a import Agilent33220A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
 from instruments.drivers.generator.rigol_dg1000z import RigolDG1000Z
 from instruments.drivers.generator.siglent_sdg1000x import SiglentSDG1000X
+from instruments.drivers.magnetometer import Magnetometer
 from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.drivers.magnetometer.lakeshore_475 import LakeShore475
+from instruments.drivers.oscilloscope import Oscilloscope
 from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
 from instruments.drivers.oscilloscope.sound import SoundCard
 from instruments.drivers.oscilloscope.tektronix_tds2000 import TektronixTDS2000
+from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.counter.keysight_34461a import Virtual34461A
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
@@ -42,15 +48,6 @@ from instruments.virtual.oscilloscope.rigol_ds1000z import VirtualDS1000Z
 from instruments.virtual.oscilloscope.siglent_sds1000xe import VirtualSDS1000XE
 from instruments.virtual.oscilloscope.sound import VirtualSoundCard
 from instruments.virtual.oscilloscope.tektronix_tds2000 import VirtualTDS2000
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from instruments.drivers.counter import Counter
-    from instruments.drivers.generator import Generator
-    from instruments.drivers.magnetometer import Magnetometer
-    from instruments.drivers.oscilloscope import Oscilloscope
-    from instruments.virtual.core.device import VirtualInstrument
 
 I_co = TypeVar("I_co", bound=Instrument, covariant=True)
 

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING, Protocol
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from collections.abc import Callable
+from typing import Protocol
 
 #: Where a clock has something to do meanwhile, it does so after each such part of a wait, by the clock on the wall [s].
 PART_S = 0.05

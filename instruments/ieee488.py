@@ -9,12 +9,8 @@ from __future__ import annotations
 import functools
 import io
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 
 #: No instrument of a bench sends more at once [bytes]; a head that says so is noise on the line.
 LONGEST_BLOCK = 1 << 28

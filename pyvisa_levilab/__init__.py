@@ -7,16 +7,12 @@ their kind stand there, too: ``"CNT-91,DSOX1000@levilab"``, ``"realtime,CNT-91@l
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from instruments.catalogue import CATALOGUE
 from instruments.clock import WallClock
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import LevilabVisaLibrary
 from levilab.bench.config import ConfigError
 from levilab.world.bench import practice_world, virtual_bus
-
-if TYPE_CHECKING:
-    from instruments.virtual.bench.bench import VirtualBench
 
 #: What stands before the @ for a bench that is never faster than the wall clock, for programs that sleep between
 #: their questions.

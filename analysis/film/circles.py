@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.film.errors import NoTop
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+Array = NDArray[np.float64]
+Picture = NDArray[np.floating] | NDArray[np.uint8]
 
-    Array = NDArray[np.float64]
-    Picture = NDArray[np.floating] | NDArray[np.uint8]
 
 #: Steepest edges whose pixels vote, as a part of all pixels.
 _EDGES = 0.15

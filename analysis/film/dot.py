@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+from analysis.film.circles import Circle
 
-    from analysis.film.circles import Circle
+Picture = NDArray[np.floating] | NDArray[np.uint8]
 
-    Picture = NDArray[np.floating] | NDArray[np.uint8]
 
 #: How far from the rim's middle the dot is looked for, in radii of the rim: a mark begins beyond.
 _REACH = 0.32

@@ -7,15 +7,13 @@ best: both are found in turn.  Light that stands still is the median over the pi
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+Array = NDArray[np.float64]
+Waves = NDArray[np.complex128]
 
-    Array = NDArray[np.float64]
-    Waves = NDArray[np.complex128]
 
 #: Of one turn, where picture and pattern are compared; a parabola goes on from there.
 _FINE = 512

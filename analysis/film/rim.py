@@ -10,17 +10,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.film.circles import Circle
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+Array = NDArray[np.float64]
+Picture = NDArray[np.floating] | NDArray[np.uint8]
 
-    Array = NDArray[np.float64]
-    Picture = NDArray[np.floating] | NDArray[np.uint8]
 
 #: Directions of rays.
 RAYS = 128

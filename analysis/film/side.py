@@ -10,19 +10,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.film.circles import Circle, changing_part
 from analysis.film.errors import NoTop
 from analysis.film.rim import RAYS, Rim, fit_shifts, shifts_of
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
+Array = NDArray[np.float64]
+Picture = NDArray[np.floating] | NDArray[np.uint8]
 
-    Array = NDArray[np.float64]
-    Picture = NDArray[np.floating] | NDArray[np.uint8]
 
 #: Rays across each long and each short edge, and the part of the edge that they cover.
 _LONG, _SHORT, _COVERED = 44, 20, 0.95

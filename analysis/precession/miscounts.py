@@ -7,17 +7,14 @@ slopes between all pairs of points withstands up to 29 % of outliers.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.precession.gates import Gates, whole_counts
 from analysis.uncertainty import Estimate
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 Array = NDArray[np.float64]
 

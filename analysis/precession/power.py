@@ -8,12 +8,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from analysis.precession.line import CONFIDENCE, FEWEST
-
-if TYPE_CHECKING:
-    from analysis.precession.line import Line
+from analysis.precession.line import CONFIDENCE, FEWEST, Line
 
 #: The slope that was published without an uncertainty, and the wanted probability that the test detects it.
 OTHER_SLOPE, POWER = 1.05, 0.9

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-from analysis.pulses.jump import Jump  # noqa: TC001 - results are read by the types of their fields
+from analysis.pulses.jump import Jump
 from analysis.uncertainty import Estimate
 
 Method = Literal["edges", "matched", "likelihood", "line"]

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-if TYPE_CHECKING:
-    from analysis.rotation.record import Array
+from analysis.rotation.record import Array
 
 #: Amplitude of the line in each axis, relative.
 AXES = np.array([1.0, 0.5, 0.3])

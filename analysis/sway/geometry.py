@@ -12,7 +12,7 @@ Source: Berry, Proc. R. Soc. A 452, 1207 (1996).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping  # noqa: TC003 - the types of a result are read when it runs
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 

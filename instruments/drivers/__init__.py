@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from collections.abc import Mapping
+from typing import Any, ClassVar, Protocol
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from instruments.clock import Clock
-    from instruments.links.transport import Transport
+from instruments.clock import Clock
+from instruments.links.transport import Transport
 
 Value = bool | float | str
 

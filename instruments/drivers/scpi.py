@@ -10,19 +10,15 @@ import difflib
 import functools
 import math
 import re
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn, Self, cast
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, ClassVar, NoReturn, Self, cast
 
-from instruments.clock import WallClock
+from instruments.clock import Clock, WallClock
 from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange, WrongInstrument
 from instruments.ieee488 import IDENTITY_FIELDS, INFINITY, NOT_A_NUMBER, NUMERIC, Form, identity_fields
 from instruments.links.opening import open_link
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from instruments.clock import Clock
-    from instruments.links.transport import TrafficLog, Transport
+from instruments.links.transport import TrafficLog, Transport
 
 #: Error queues hold 20 to 32 entries: an instrument that still has one after this number never answers "No error".
 _LONGEST_ERROR_QUEUE = 64

@@ -6,14 +6,11 @@ import contextlib
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, NoReturn, Protocol, TypeVar, cast, overload
+from typing import Any, Generic, NoReturn, Protocol, TypeVar, cast, overload
 
 from instruments.errors import OutOfRange
-from instruments.ieee488 import NOT_A_NUMBER
-
-if TYPE_CHECKING:
-    from instruments.ieee488 import Form
-    from instruments.links.transport import Transport
+from instruments.ieee488 import NOT_A_NUMBER, Form
+from instruments.links.transport import Transport
 
 T = TypeVar("T", bound=bool | float | str)
 #: How instruments print a switch (SCPI-1999, vol. 1, 7.3).

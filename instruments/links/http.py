@@ -12,17 +12,14 @@ import re
 import socket
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 from urllib.parse import urlsplit
 
+from instruments.clock import Clock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected
-from instruments.ieee488 import PLAIN_BLOCK
+from instruments.ieee488 import PLAIN_BLOCK, BlockForm
 from instruments.links.advice import CLOSED, one_line
-
-if TYPE_CHECKING:
-    from instruments.clock import Clock
-    from instruments.ieee488 import BlockForm
-    from instruments.links.transport import TrafficLog
+from instruments.links.transport import TrafficLog
 
 #: Sends a request and returns the whole answer, in this time [s].  Raises OSError; TimeoutError where nothing came.
 Exchange = Callable[[bytes, float], bytes]

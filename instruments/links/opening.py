@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from instruments.clock import Clock
 from instruments.links.http import HttpTransport
 from instruments.links.serial_port import SerialTransport
 from instruments.links.sound import SoundLink
+from instruments.links.transport import TrafficLog, Transport
 from instruments.links.visa import VisaTransport
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from instruments.clock import Clock
-    from instruments.links.transport import TrafficLog, Transport
 
 #: Scheme of an address → the link to it, with the arguments of `open_link` but for `line`.
 LINKS: dict[str, Callable[..., Transport]] = {

@@ -7,19 +7,14 @@ import errno
 import re
 import socket
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from instruments.clock import WallClock
+from instruments.clock import Clock, WallClock
 from instruments.errors import NoAnswer, NotConnected, Occupied, OutOfRange, SilentLine
 from instruments.links.advice import one_line
-from instruments.links.transport import LONGEST_ANSWER, Failure, MessageLink, Resynchronising
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from instruments.clock import Clock
-    from instruments.links.transport import TrafficLog
+from instruments.links.transport import LONGEST_ANSWER, Failure, MessageLink, Resynchronising, TrafficLog
 
 #: pyserial's letters for the words of bench.toml.
 PARITIES = {"none": "N", "odd": "O", "even": "E", "mark": "M", "space": "S"}

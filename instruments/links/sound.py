@@ -9,23 +9,19 @@ from __future__ import annotations
 import contextlib
 import queue
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 from urllib.parse import parse_qsl, unquote
 
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.clock import WallClock
+from instruments.clock import Clock, WallClock
 from instruments.errors import NoAnswer, NotConnected, OutOfRange
+from instruments.ieee488 import BlockForm
 from instruments.links.advice import CLOSED, one_line
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from instruments.clock import Clock
-    from instruments.ieee488 import BlockForm
-    from instruments.links.transport import TrafficLog
+from instruments.links.transport import TrafficLog
 
 Samples = NDArray[np.int16]
 #: Samples that came together, shape (n, channels); when they came, on the clock of the bench [s]; and whether samples

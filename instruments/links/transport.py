@@ -5,20 +5,14 @@ from __future__ import annotations
 import contextlib
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from enum import Enum, auto
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
-from instruments.clock import WallClock
+from instruments.clock import Clock, WallClock
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied
-from instruments.ieee488 import PLAIN_BLOCK, BrokenBlock, block_of, read_block
+from instruments.ieee488 import PLAIN_BLOCK, BlockForm, BrokenBlock, block_of, read_block
 from instruments.links.advice import CLOSED, one_line
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from instruments.clock import Clock
-    from instruments.ieee488 import BlockForm
 
 #: Called with the address, ">" or "<", and the bytes that were sent or received.
 TrafficLog = Callable[[str, str, bytes], None]

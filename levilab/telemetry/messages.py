@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray  # noqa: TC002 - pydantic reads the annotations
+from numpy.typing import NDArray
 from pydantic import ConfigDict, PlainValidator, TypeAdapter
 
 from levilab.telemetry.codec import MalformedMessage, pack, unpack

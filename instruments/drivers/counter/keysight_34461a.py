@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from instruments.drivers.counter.reciprocal import ReciprocalCounter
 from instruments.drivers.setting import Setting
 from instruments.errors import OutOfRange
 from instruments.ieee488 import Form
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 #: Its gates [s]; the longest that may be asked for, as experiments vary theirs by a quarter; readings in one answer.
 GATES, _LONGEST, _AT_ONCE = (0.01, 0.1, 1.0), 2.0, 100

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from instruments.drivers.counter.reciprocal import IMPEDANCES, IMPEDANCES_OHM, READINGS_AT_ONCE, ReciprocalCounter
 from instruments.drivers.setting import Setting
 from instruments.ieee488 import INFINITY, Form
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 class Keysight53230A(ReciprocalCounter):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from instruments.drivers.counter.reciprocal import (
     IMPEDANCES,
@@ -16,9 +17,6 @@ from instruments.drivers.counter.reciprocal import (
 from instruments.drivers.setting import Setting
 from instruments.errors import OutOfRange
 from instruments.ieee488 import Form
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 
 class PendulumCNT91(ReciprocalCounter):

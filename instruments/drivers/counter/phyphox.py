@@ -7,23 +7,19 @@ import json
 import math
 import re
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.clock import WallClock
+from instruments.clock import Clock, WallClock
+from instruments.drivers import Value
 from instruments.drivers.counter import Count, Signal
 from instruments.errors import BadAnswer, CommandRefused, InstrumentError, OutOfRange, SettingsLost, WrongInstrument
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from instruments.clock import Clock
-    from instruments.drivers import Value
-    from instruments.links.transport import Transport
+from instruments.links.transport import Transport
 
 Array = NDArray[np.float64]
 

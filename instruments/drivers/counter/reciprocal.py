@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Iterator
+from typing import ClassVar
 
 import numpy as np
 
-from instruments.drivers.counter import LIGHT
+from instruments.drivers.counter import LIGHT, Count, Signal
 from instruments.drivers.scpi import ScpiInstrument, parse_reading
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, OutOfRange
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from instruments.drivers.counter import Count, Signal
 
 #: Readings that are fetched with one question: an answer of 25 kB, seconds apart at most.
 READINGS_AT_ONCE = 1000

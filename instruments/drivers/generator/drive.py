@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, cast
+from typing import Any, ClassVar, cast
 
+from instruments.clock import Clock
 from instruments.drivers.generator import NO_LIMITS, OPEN_V, Limits, check_peak
 from instruments.drivers.scpi import ScpiInstrument
 from instruments.drivers.setting import Owner, Setting
 from instruments.errors import CommandRefused, OutOfRange
 from instruments.ieee488 import INFINITY
-
-if TYPE_CHECKING:
-    from instruments.clock import Clock
-    from instruments.links.transport import Transport
+from instruments.links.transport import Transport
 
 
 @dataclass(eq=False)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from instruments.drivers.generator import OPEN_V
 from instruments.drivers.generator.drive import (
@@ -17,9 +18,6 @@ from instruments.drivers.generator.drive import (
 from instruments.drivers.setting import Setting
 from instruments.errors import CommandRefused
 from instruments.ieee488 import INFINITY, Form
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 #: "1000HZ", "4V", "-1.999V", "1e-06HZ": as the C language's %g, no zero that need not be (measured on an SDG2042X).
 _DIGITS = r"-?(0|[1-9]\d{0,11})(\.\d{0,14}[1-9])?(e[+-]\d{2})?"

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from instruments.drivers.scpi import ScpiInstrument
 from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, CommandRefused, OutOfRange
 from instruments.ieee488 import Form
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
 
 #: One of each unit in tesla.  A Hall probe sees B; oersted and A/m are B/μ₀ in air.
 _UNITS_T = {"GAUSS": 1e-4, "TESLA": 1.0, "OERSTED": 1e-4, "A/M": 4e-7 * math.pi}

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from instruments.drivers.magnetometer.lakeshore import ZERO_DONE, LakeShoreGaussmeter, ListedNumbers
 from instruments.errors import NoAnswer
 from instruments.ieee488 import Form
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 
 class LakeShore425(LakeShoreGaussmeter):

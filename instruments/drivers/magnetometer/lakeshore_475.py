@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from instruments.drivers.magnetometer.lakeshore import LakeShoreGaussmeter, ListedNumbers
 from instruments.ieee488 import Form
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 
 class LakeShore475(LakeShoreGaussmeter):

@@ -7,20 +7,18 @@ rigol_ds1000z.py and keysight_dsox.py.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from instruments.drivers import Instrument
 from instruments.errors import InstrumentError
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+Codes = NDArray[np.uint8] | NDArray[np.uint16]
 
-    from numpy.typing import NDArray
-
-    Codes = NDArray[np.uint8] | NDArray[np.uint16]
 
 #: No scope of these families has a longer record; a preamble that says so was misheard.
 _MOST_POINTS = 100_000_000

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Iterator, Mapping
+from typing import ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from instruments.drivers import Value
 from instruments.drivers.oscilloscope import Preamble
 from instruments.drivers.oscilloscope.scope import TRIGGER_MODES, TRIGGER_SOURCES, Scope
 from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup
 from instruments.drivers.setting import Setting
 from instruments.errors import OutOfRange
 from instruments.ieee488 import NR1, Form
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from instruments.drivers import Value
-
 
 #: Programmer's Guides, <NR3>: a sign, one to three digits, with or without a point, an exponent of two or three digits.
 _NUMBER = Form(r"[+-]\d{1,3}(\.\d{1,12})?E[+-]\d{2,3}", "+1.25000E-01")

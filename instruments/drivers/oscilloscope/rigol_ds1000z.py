@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
+from instruments.drivers import Value
 from instruments.drivers.oscilloscope import Preamble
 from instruments.drivers.oscilloscope.scope import TRIGGER_MODES, TRIGGER_SOURCES, Scope
 from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup, time_scales
 from instruments.drivers.setting import Setting
 from instruments.errors import OutOfRange
 from instruments.ieee488 import NR1, Form
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from instruments.drivers import Value
-
 
 #: Programming Guide, "scientific notation": six digits behind the point, two of exponent, a sign where it is negative.
 _NUMBER = Form(r"-?\d\.\d{6}[Ee][+-]\d{2}", "2.500000e-01")

@@ -11,26 +11,21 @@ import contextlib
 import functools
 import math
 import re
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from instruments.clock import Clock
+from instruments.drivers import Value
 from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired, Preamble, Trace
 from instruments.drivers.oscilloscope.setup import Channel, Setup
 from instruments.drivers.scpi import ScpiInstrument
+from instruments.drivers.setting import Setting
 from instruments.errors import InstrumentError, NoAnswer, OutOfRange, SettingsLost
-from instruments.ieee488 import PLAIN_BLOCK
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from instruments.clock import Clock
-    from instruments.drivers import Value
-    from instruments.drivers.setting import Setting
-    from instruments.ieee488 import BlockForm, Form
-    from instruments.links.transport import Transport
+from instruments.ieee488 import PLAIN_BLOCK, BlockForm, Form
+from instruments.links.transport import Transport
 
 #: Between two questions whether the record is complete [s].
 _POLL = 0.02

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NoReturn
+from typing import Any, ClassVar, NoReturn
 
 from instruments.drivers.scpi import ScpiInstrument
-
-if TYPE_CHECKING:
-    from instruments.drivers.setting import Setting
+from instruments.drivers.setting import Setting
 
 #: Scopes round settings by these fractions of a division and of the record, beside what all instruments do.
 _OF_A_DIVISION, _OF_THE_RECORD = 0.1, 0.01

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import struct
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from instruments.drivers import Value
 from instruments.drivers.oscilloscope import Preamble
 from instruments.drivers.oscilloscope.scope import Scope
 from instruments.drivers.oscilloscope.setup import SLOPES, Channel, Setup, time_scales
+from instruments.drivers.scpi import ScpiInstrument
 from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, OutOfRange
 from instruments.ieee488 import NR1, BlockForm, Form
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from numpy.typing import NDArray
-
-    from instruments.drivers import Value
-    from instruments.drivers.scpi import ScpiInstrument
-
 
 #: "1.00E+00V", "-6.00E-01V": as it was measured; other firmware may print more digits.
 _VOLTAGE, _TIME = (Form(r"-?\d\.\d{2,6}E[+-]\d{2}", f"5.00E-01{unit}", suffix=unit) for unit in "VS")

@@ -8,29 +8,23 @@ from __future__ import annotations
 import itertools
 import math
 import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
-from instruments.clock import WallClock
-from instruments.drivers.oscilloscope import NeverTriggered, NothingAcquired, Trace
+from instruments.clock import Clock, WallClock
+from instruments.drivers import Value
+from instruments.drivers.oscilloscope import Codes, NeverTriggered, NothingAcquired, Trace
 from instruments.drivers.oscilloscope.setup import Setup
 from instruments.errors import InstrumentError, NotConnected, OutOfRange, WrongInstrument
-from instruments.links.sound import SoundLink
+from instruments.links.sound import Block, Samples, SoundLink
+from instruments.links.transport import Transport
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+Times = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    from instruments.clock import Clock
-    from instruments.drivers import Value
-    from instruments.drivers.oscilloscope import Codes
-    from instruments.links.sound import Block, Samples
-    from instruments.links.transport import Transport
-
-    Times = NDArray[np.float64]
 
 #: Codes from 0 to full scale.
 FULL_SCALE = 1 << 15

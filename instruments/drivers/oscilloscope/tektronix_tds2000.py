@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Iterator, Mapping
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from instruments.drivers import Value
 from instruments.drivers.oscilloscope import Preamble
 from instruments.drivers.oscilloscope.scope import Scope
 from instruments.drivers.oscilloscope.setup import Channel, Setup, time_scales
 from instruments.drivers.setting import Setting
 from instruments.errors import CommandRefused, OutOfRange
 from instruments.ieee488 import NR1, Form
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from numpy.typing import NDArray
-
-    from instruments.drivers import Value
 
 #: "1.0E0", "2.5E-3", "-1.25E-8": no zero that need not be, in the exponent neither.
 _NUMBER = Form(r"-?\d\.\d{1,9}E-?\d{1,2}", "2.5E-3")

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+from instruments.virtual.bench.faults import Fault
 from instruments.virtual.bench.session import ClientLock, Session
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from instruments.virtual.bench.faults import Fault
-    from instruments.virtual.core.device import VirtualInstrument
+from instruments.virtual.core.device import VirtualInstrument
 
 
 @dataclass

@@ -7,21 +7,17 @@ onto the wire, so they are the same for the PyVISA backend, for a serial line an
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from instruments.ieee488 import NOT_A_NUMBER
+from instruments.virtual.bench.session import Session
+from instruments.virtual.core.device import Answer
 from instruments.virtual.core.parameters import nr3
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.status import POWER_ON
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.virtual.bench.session import Session
-    from instruments.virtual.core.device import Answer
-
-    Act = Callable[[Session, Answer], Answer | None]
+Act = Callable[[Session, Answer], Answer | None]
 
 
 @dataclass

@@ -10,21 +10,17 @@ from __future__ import annotations
 import contextlib
 import errno
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator
+from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException
 
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.serial_line import SerialLine, benches
-from instruments.virtual.bench.session import LinkLost
+from instruments.virtual.bench.session import LinkLost, Session
 from instruments.virtual.core.line import LineSettings
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from instruments.virtual.bench.bench import VirtualBench
-    from instruments.virtual.bench.session import Session
 
 #: Where pyserial looks for the module of a URL's scheme: the package that this one is in.
 _PACKAGE = __name__.rpartition(".")[0]

@@ -7,15 +7,11 @@ receiver samples the sender's bits at the wrong places, as a UART does, and gets
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
+from instruments.virtual.bench.bench import VirtualBench
+from instruments.virtual.bench.session import ClientLock, Session
 from instruments.virtual.core.line import LineSettings, receive
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.virtual.bench.bench import VirtualBench
-    from instruments.virtual.bench.session import ClientLock, Session
 
 #: Where the URL handler finds the benches: by the name in ``levilab://instrument?bench=name``, "" when there is none.
 benches: dict[str, Callable[[], VirtualBench]] = {}

@@ -5,21 +5,17 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from instruments.clock import WallClock
 from instruments.ieee488 import INFINITY
 from instruments.virtual.bench.exchange import MARKED, STREAM, Event, State
+from instruments.virtual.core.device import Answer, VirtualInstrument
 from instruments.virtual.core.message import Framer, Overrun
 from instruments.virtual.core.parser import LONGEST_ANSWER, ScpiError
-from instruments.virtual.core.steps import Work, run_to_end
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from instruments.virtual.core.device import Answer, VirtualInstrument
-    from instruments.virtual.core.steps import Steps
+from instruments.virtual.core.steps import Steps, Work, run_to_end
 
 _WALL = WallClock()
 #: Answers that may wait for the program to read them, at most.

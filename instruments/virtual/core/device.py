@@ -7,21 +7,15 @@ from __future__ import annotations
 
 import contextlib
 import functools
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, cast
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, ClassVar, NamedTuple, cast
 
+from instruments.clock import Clock
 from instruments.virtual.core.parameters import boolean, nr3, number, parameter
-from instruments.virtual.core.parser import Parser, ScpiError
-from instruments.virtual.core.rows import Ask, Do, Own, Table
+from instruments.virtual.core.parser import Parser, ScpiError, Value
+from instruments.virtual.core.rows import Ask, Do, Own, Row, Table
 from instruments.virtual.core.status import OPERATION_COMPLETE, Status
-from instruments.virtual.core.steps import run_to_end
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from instruments.clock import Clock
-    from instruments.virtual.core.parser import Value
-    from instruments.virtual.core.rows import Row
-    from instruments.virtual.core.steps import Steps, Work
+from instruments.virtual.core.steps import Steps, Work, run_to_end
 
 
 class Answer(NamedTuple):

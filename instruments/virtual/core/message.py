@@ -7,11 +7,8 @@ Source: SCPI-1999, volume 1, 6.2.4 (compound messages with path memory); IEEE 48
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 #: White space is every control character and the space (IEEE 488.2, 7.4.1.2), and no other character of Latin-1.
 _BLANK, _DIGITS = "".join(map(chr, range(0x21))), re.compile("[0-9]+")

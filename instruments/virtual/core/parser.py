@@ -10,13 +10,10 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from instruments.virtual.core.message import read_units
-from instruments.virtual.core.steps import run_to_end
-
-if TYPE_CHECKING:
-    from instruments.virtual.core.steps import Steps
+from instruments.virtual.core.steps import Steps, run_to_end
 
 ERRORS = {
     -102: "Syntax error",

@@ -11,9 +11,10 @@ function that depends on the channel takes its number as well.
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cache
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
 from instruments.virtual.core.parameters import (
     choice,
@@ -25,13 +26,8 @@ from instruments.virtual.core.parameters import (
     parameter,
     read_quoted,
 )
-from instruments.virtual.core.parser import ScpiError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
-
-    from instruments.virtual.core.parser import Action, Value
-    from instruments.virtual.core.steps import Steps
+from instruments.virtual.core.parser import Action, ScpiError, Value
+from instruments.virtual.core.steps import Steps
 
 _BOUNDS = {"MIN", "MAX", "DEF", "MINIMUM", "MAXIMUM", "DEFAULT"}
 #: A word of a printed header, what of it the short form leaves out, and the beginning of a word on the wire.

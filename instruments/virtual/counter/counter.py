@@ -4,30 +4,24 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from instruments.clock import Clock
 from instruments.ieee488 import INFINITY
-from instruments.virtual.core.device import VirtualInstrument, has_node
+from instruments.virtual.core.device import Answer, VirtualInstrument, has_node
 from instruments.virtual.core.parameters import boolean, limit, number, optional_parameter, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Do, Number, Own, Row, Switch, Word, header_pattern
-from instruments.virtual.core.signal import no_signal
+from instruments.virtual.core.signal import Array, Signal, no_signal
 from instruments.virtual.core.status import OPERATION_COMPLETE
-from instruments.virtual.core.steps import run_to_end
+from instruments.virtual.core.steps import Steps, run_to_end
+from instruments.virtual.counter.edges import TriggerInput
 from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement, measurement
 from instruments.virtual.counter.run import Memory, Run, statistics
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from instruments.clock import Clock
-    from instruments.virtual.core.device import Answer
-    from instruments.virtual.core.signal import Array, Signal
-    from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter.edges import TriggerInput
 
 #: When an answer is ready that never comes [s].
 NEVER = INFINITY

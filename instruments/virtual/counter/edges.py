@@ -8,17 +8,12 @@ the voltage shows them.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from instruments.virtual.core.signal import find_firings
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.virtual.core.signal import Array, Signal
+from instruments.virtual.core.signal import Array, Signal, find_firings
 
 #: Samples per second with which the models look at the light.  A pulse of 3 % of a turn at 60 Hz lasts
 #: 0.5 ms: ten samples; the crossing is interpolated between two of them.

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from instruments.clock import Clock
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.parameters import block_text, choice, limit, number, optional_parameter, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Word
+from instruments.virtual.core.signal import Array
+from instruments.virtual.core.steps import Steps
 from instruments.virtual.counter.counter import (
     AUTOMATIC,
     DARK,
@@ -27,11 +30,6 @@ from instruments.virtual.counter.counter import (
 from instruments.virtual.counter.edges import TriggerInput
 from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement
 from instruments.virtual.counter.run import Run
-
-if TYPE_CHECKING:
-    from instruments.clock import Clock
-    from instruments.virtual.core.signal import Array
-    from instruments.virtual.core.steps import Steps
 
 #: From the end of a measurement to the beginning of the next, but for gap-free ones [s] (estimated).
 _DEAD = 1e-3

@@ -9,13 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 from instruments.ieee488 import NOT_A_NUMBER
+from instruments.virtual.core.signal import Signal
 from instruments.virtual.counter.edges import Edge, EdgeFinder, TriggerInput
-
-if TYPE_CHECKING:
-    from instruments.virtual.core.signal import Signal
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Generator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.parameters import block_text, choice, number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Word
+from instruments.virtual.core.signal import Array
+from instruments.virtual.core.steps import Steps
 from instruments.virtual.counter.counter import (
     AUTOMATIC,
     DARK,
@@ -27,12 +30,6 @@ from instruments.virtual.counter.counter import (
 from instruments.virtual.counter.edges import TriggerInput
 from instruments.virtual.counter.measurements import GateTime, Inputs, Measurement, Wanted, first_edge
 from instruments.virtual.counter.run import Run
-
-if TYPE_CHECKING:
-    from collections.abc import Generator
-
-    from instruments.virtual.core.signal import Array
-    from instruments.virtual.core.steps import Steps
 
 #: From the end of a measurement to the beginning of the next, but for back-to-back ones [s] (handbook, 8-72: 4 µs
 #: and more; the calibration of the interpolators is 400 µs, estimated).

@@ -10,21 +10,18 @@ import io
 import json
 import math
 import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from http import HTTPStatus
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.clock import Clock
 from instruments.virtual.core.device import Answer, VirtualInstrument
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.clock import Clock
-    from instruments.virtual.core.steps import Steps
+from instruments.virtual.core.steps import Steps
 
 Array = NDArray[np.float64]
 

@@ -8,19 +8,15 @@ from __future__ import annotations
 
 import math
 from array import array
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from instruments.ieee488 import NOT_A_NUMBER
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.virtual.core.signal import Array
-    from instruments.virtual.core.steps import Steps
-    from instruments.virtual.counter.measurements import Inputs, Measurement, Reading
+from instruments.virtual.core.signal import Array
+from instruments.virtual.core.steps import Steps
+from instruments.virtual.counter.measurements import Inputs, Measurement, Reading
 
 #: How many readings the memory keeps; then it drops the oldest (53220A/53230A User's Guide: 1 000 000).
 CAPACITY = 1_000_000

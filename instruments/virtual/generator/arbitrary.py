@@ -6,20 +6,17 @@ Source: Keysight 33500 Series Operating and Service Guide, DATA subsystem; Agile
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from instruments.virtual.core.parameters import block_content
 from instruments.virtual.core.parser import ScpiError
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+Samples = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    Samples = NDArray[np.float64]
 
 #: Samples of a built-in waveform: 40 kSa/s after *RST make 160 Hz of it.
 _BUILT_IN_POINTS = 250

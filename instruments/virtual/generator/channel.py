@@ -9,22 +9,16 @@ of a public driver).  When a setting makes another one impossible, it changes th
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, MutableMapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from instruments.virtual.core.parameters import limit, number
-from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.parser import ScpiError, Value
 from instruments.virtual.generator.arbitrary import Memory, built_in_waveforms
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, MutableMapping
-
-    from numpy.typing import NDArray
-
-    from instruments.virtual.core.parser import Value
 
 #: The generator's own resistance [Ω], its greatest voltage without a load [V], and SCPI's infinity.
 SOURCE_OHM, OPEN_V, INFINITE = 50.0, 10.0, 9.9e37

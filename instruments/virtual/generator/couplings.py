@@ -6,12 +6,8 @@ Sources: see channel.py.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
-from instruments.virtual.generator.channel import INFINITE
-
-if TYPE_CHECKING:
-    from instruments.virtual.generator.channel import Channel
+from instruments.virtual.generator.channel import INFINITE, Channel
 
 #: Modes of which only one can be on.
 MODES = ("burst", "sweep", "am", "fm", "pm", "pwm", "fsk", "bpsk", "sum")

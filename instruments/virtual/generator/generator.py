@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
 
+from instruments.clock import Clock
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import choice, limit, nr3, optional_parameter, parameter, read_quoted
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.generator.arbitrary import DeviceError, attribute, plain_name, samples
-from instruments.virtual.generator.channel import INFINITE, Channel, Output, quantity_of
+from instruments.virtual.generator.channel import INFINITE, Channel, Family, Output, quantity_of
 from instruments.virtual.generator.couplings import MODES, resolve
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from instruments.clock import Clock
-    from instruments.virtual.generator.channel import Family
 
 #: How many characters of a text the display shows.
 _LONGEST_TEXT = 64

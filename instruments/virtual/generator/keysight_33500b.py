@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Callable
+from typing import ClassVar
 
+from instruments.clock import Clock
 from instruments.virtual.core.parameters import parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Own, Row, Switch, Word
 from instruments.virtual.generator.arbitrary import DeviceError, plain_name
-from instruments.virtual.generator.channel import Channel, Family, Waveform
+from instruments.virtual.generator.channel import Channel, Family, Output, Waveform
 from instruments.virtual.generator.generator import VirtualGenerator
 from instruments.virtual.generator.rows import CHANNEL, INNER, SHARED, Quantity, burst_cycles, pulses, waveforms
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.clock import Clock
-    from instruments.virtual.generator.channel import Output
 
 
 def _square_33500(frequency: float) -> tuple[float, float]:

@@ -10,16 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
-from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.parser import ScpiError, Value
 from instruments.virtual.core.rows import Both, Row, Switch, Word
 from instruments.virtual.generator.channel import INFINITE, Family, Waveform
 from instruments.virtual.generator.generator import VirtualGenerator
 from instruments.virtual.generator.rows import CHANNEL, Quantity, burst_cycles, pulses, waveforms
-
-if TYPE_CHECKING:
-    from instruments.virtual.core.parser import Value
 
 
 def _family(sine: float, square: float, ramp: float) -> Family:

@@ -6,17 +6,13 @@ Sources: Keysight 33500 Series Operating and Service Guide; Agilent 33220A User'
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+from instruments.virtual.core.parser import Value
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Word
 from instruments.virtual.generator.channel import INFINITE, Channel, Family, quantity_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.virtual.core.parser import Value
-    from instruments.virtual.generator.generator import VirtualGenerator
+from instruments.virtual.generator.generator import VirtualGenerator
 
 
 @dataclass(frozen=True)

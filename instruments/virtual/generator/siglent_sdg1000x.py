@@ -15,19 +15,16 @@ has it.  Modulation and sweep are always off, arbitrary waveforms are missing.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
+from instruments.clock import Clock
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import boolean, choice, number, optional_parameter, parameter
 from instruments.virtual.core.parser import ScpiError, Value
 from instruments.virtual.core.rows import Ask, Both, Own, Row, Switch, Word, short_header
 from instruments.virtual.generator.channel import INFINITE, OPEN_V, SOURCE_OHM, Burst, Output, Triggered
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.clock import Clock
 
 #: WVTP → the waveform as the other generators call it, its highest frequency [Hz], peak to peak over r.m.s.
 _WAVEFORMS = {

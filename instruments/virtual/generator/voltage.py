@@ -7,16 +7,13 @@ The phase of a waveform is counted in turns from its start: there sine, square a
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.virtual.generator.channel import Output
+from instruments.virtual.generator.channel import Output
 
 Array = NDArray[np.float64]
 

@@ -11,24 +11,20 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from instruments.virtual.core.device import VirtualInstrument
+from instruments.clock import Clock
+from instruments.virtual.core.device import Answer, VirtualInstrument
+from instruments.virtual.core.line import LineSettings
 from instruments.virtual.core.parameters import no_parameters, number
 from instruments.virtual.core.parser import ScpiError, Value
 from instruments.virtual.core.rows import Ask, Both, Do, Own, Row
+from instruments.virtual.core.steps import Steps
 from instruments.virtual.magnetometer.hall_probe import HallProbe, Reading
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.clock import Clock
-    from instruments.virtual.core.device import Answer
-    from instruments.virtual.core.line import LineSettings
-    from instruments.virtual.core.steps import Steps
 
 _MU0 = 4e-7 * math.pi
 

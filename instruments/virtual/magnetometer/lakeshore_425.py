@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from instruments.virtual.core.line import LineSettings
-from instruments.virtual.core.rows import Ask
+from instruments.virtual.core.rows import Ask, Row
 from instruments.virtual.magnetometer.lakeshore import FAMILY, Field, Fields, VirtualGaussmeter, field_text
-
-if TYPE_CHECKING:
-    from instruments.virtual.core.rows import Row
 
 _OWN: tuple[Row, ...] = (
     Fields("RDGMODE", (Field("mode", 1, 2, 1), Field("filter", 0, 1, 1), Field("band", 1, 2, 1))),

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from instruments.virtual.core.line import LineSettings
-from instruments.virtual.core.rows import Ask, Do
+from instruments.virtual.core.rows import Ask, Do, Row
+from instruments.virtual.magnetometer.hall_probe import Reading
 from instruments.virtual.magnetometer.lakeshore import FAMILY, Field, Fields, VirtualGaussmeter, field_text
-
-if TYPE_CHECKING:
-    from instruments.virtual.core.rows import Row
-    from instruments.virtual.magnetometer.hall_probe import Reading
-
 
 _COMMON: tuple[Row, ...] = (
     *VirtualGaussmeter.COMMON,

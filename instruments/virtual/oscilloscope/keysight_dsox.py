@@ -10,18 +10,16 @@ operation register; a single acquisition and a digitize begin with an empty memo
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from instruments.clock import Clock
 from instruments.virtual.core.parameters import choice, number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Text, Word, whole
+from instruments.virtual.oscilloscope.record import Record
 from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input, levels
-
-if TYPE_CHECKING:
-    from instruments.clock import Clock
-    from instruments.virtual.oscilloscope.record import Record
 
 #: The fastest rate [1/s].
 _FASTEST = 2e9

@@ -6,20 +6,17 @@ middle between them, with a hysteresis; rise and fall go from 10 % to 90 %.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from instruments.virtual.core.signal import crossings
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+Volts = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    Volts = NDArray[np.float64]
 
 #: A level of the histogram must hold this part of the samples, else the extreme itself is taken.
 _FLAT = 0.05

@@ -8,16 +8,13 @@ functions of time.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from instruments.virtual.core.signal import Signal
+from instruments.virtual.core.signal import Signal
 
 Codes = NDArray[np.uint8]
 

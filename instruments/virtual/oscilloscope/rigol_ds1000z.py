@@ -9,15 +9,13 @@ numbers within the limits that the guide of a sister series gives, with 12 divis
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from instruments.virtual.core.parameters import boolean, choice, limit, number, optional_parameter, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, whole
+from instruments.virtual.oscilloscope.record import Codes, Record
 from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input, levels, one_two_five
-
-if TYPE_CHECKING:
-    from instruments.virtual.oscilloscope.record import Codes, Record
 
 #: Points of the record for one channel shown; half of it for two, a quarter for more.
 _DEPTHS = (12_000, 120_000, 1_200_000, 12_000_000, 24_000_000)

@@ -7,28 +7,23 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from instruments.clock import Clock
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parameters import block_content, block_text, choice, number, parameter
-from instruments.virtual.core.parser import ScpiError
+from instruments.virtual.core.parser import ScpiError, Value
 from instruments.virtual.core.rows import Both, short_header
 from instruments.virtual.core.signal import Signal, crossings, no_signal
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD, Acquisition, Plan
 from instruments.virtual.oscilloscope.measure import Measured, measure
 from instruments.virtual.oscilloscope.record import COARSEST, Edge, Input, Record
 from instruments.virtual.oscilloscope.screenshot import draw, grey, picture_file
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from numpy.typing import NDArray
-
-    from instruments.clock import Clock
-    from instruments.virtual.core.parser import Value
 
 #: Below the level by this part of a division the trigger is armed again.
 _HYSTERESIS = 0.3

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+Picture = NDArray[np.uint8]
 
-    from numpy.typing import NDArray
-
-    Picture = NDArray[np.uint8]
 
 WIDTH, HEIGHT = 800, 480
 _GRID = (60, 60, 60)

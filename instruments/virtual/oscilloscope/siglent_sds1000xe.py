@@ -11,17 +11,14 @@ from __future__ import annotations
 
 import math
 import struct
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Mapping
+from typing import Any, ClassVar
 
 from instruments.virtual.core.parameters import choice, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Tell, Word, short_header
+from instruments.virtual.oscilloscope.record import Record
 from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, levels, one_two_five
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from instruments.virtual.oscilloscope.record import Record
 
 _COLUMNS = 14
 #: The fastest rate [1/s] and the points of the memory, where one channel of a pair is on; half of both with two.

@@ -6,19 +6,14 @@ It answers ``*IDN?`` as every instrument of the bench does; samples come from :m
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
+from instruments.clock import Clock
 from instruments.virtual.core.device import VirtualInstrument
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from numpy.typing import NDArray
-
-    from instruments.clock import Clock
-    from instruments.virtual.core.signal import Array, Signal
+from instruments.virtual.core.signal import Array, Signal
 
 #: Samples of a block, and time that a sound card keeps blocks that are not read [s].
 _BLOCK, _KEPT_S = 2400, 0.5

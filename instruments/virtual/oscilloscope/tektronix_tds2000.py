@@ -10,17 +10,15 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from instruments.virtual.core.device import COMMON
 from instruments.virtual.core.parameters import choice, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Number, Own, Row, Switch, Word, short_header, whole
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD
+from instruments.virtual.oscilloscope.record import Record
 from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, levels
-
-if TYPE_CHECKING:
-    from instruments.virtual.oscilloscope.record import Record
 
 _POINTS, _COLUMNS, _CODES = 2500, 10, 25
 _PROBES = (1.0, 10.0, 20.0, 50.0, 100.0, 500.0, 1000.0)

@@ -16,21 +16,16 @@ import contextlib
 import logging
 import socket
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine, Iterator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from instruments.ieee488 import INFINITY
-from instruments.virtual.bench.session import LinkLost
+from instruments.virtual.bench.bench import VirtualBench
+from instruments.virtual.bench.session import LinkLost, Session
+from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.parser import ScpiError
-
-if TYPE_CHECKING:
-    from collections.abc import Coroutine, Iterator
-
-    from instruments.virtual.bench.bench import VirtualBench
-    from instruments.virtual.bench.session import Session
-    from instruments.virtual.core.device import VirtualInstrument
-    from instruments.virtual.core.steps import Work
+from instruments.virtual.core.steps import Work
 
 log = logging.getLogger(__name__)
 

@@ -10,16 +10,20 @@ from __future__ import annotations
 import asyncio
 import itertools
 import struct
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum, auto
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from instruments.virtual.servers.clients import FIRST_WORDS, MOST_CLIENTS, Disconnected, Link, Listener, first_of
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
-
-    from instruments.virtual.servers.clients import ServedInstrument
+from instruments.virtual.servers.clients import (
+    FIRST_WORDS,
+    MOST_CLIENTS,
+    Disconnected,
+    Link,
+    Listener,
+    ServedInstrument,
+    first_of,
+)
 
 #: Prologue, message type, control code, message parameter, length of the payload (2.4).
 HEADER = struct.Struct("!2sBBIQ")

@@ -10,15 +10,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import socket
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
 
-from instruments.virtual.servers.clients import Disconnected, Listener
+from instruments.virtual.servers.clients import Disconnected, Listener, ServedInstrument
 from instruments.virtual.servers.rpc import Program, Reader, answer, pack, serve
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from instruments.virtual.servers.clients import ServedInstrument
 
 #: Program number, version and the port at which it listens (RFC 1833, section 3); protocol numbers of TCP and UDP.
 PROGRAM, VERSION, PORT = 100000, 2, 111

@@ -7,15 +7,11 @@ from __future__ import annotations
 
 import asyncio
 import struct
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import TYPE_CHECKING
 
 from instruments.virtual.servers.clients import Disconnected, first_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 #: How many calls of a connection may wait while one is carried out.
 MOST_CALLS = 4

@@ -6,21 +6,18 @@ import asyncio
 import contextlib
 import socket
 import threading
+from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import Future
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Self
+from types import TracebackType
+from typing import Self
 
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.servers.clients import Listener, ServedInstrument
 from instruments.virtual.servers.hislip import HislipServer
 from instruments.virtual.servers.port_mapper import PORT, TCP, PortMapper
 from instruments.virtual.servers.streams import HAS_PSEUDO_TERMINALS, PseudoTerminal, http_listener, socket_listener
 from instruments.virtual.servers.vxi11 import ABORT, CORE, PROGRAM_VERSION, Vxi11Server
-
-if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable, Iterator
-    from types import TracebackType
-
-    from instruments.virtual.bench.bench import VirtualBench
 
 LOOPBACK = "127.0.0.1"
 

@@ -10,10 +10,19 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
-from typing import TYPE_CHECKING
+from collections.abc import Awaitable, Callable
 
 from instruments.virtual.bench.session import LinkLost
-from instruments.virtual.servers.clients import CHUNK, FIRST_WORDS, Disconnected, Link, Listener, first_of, log
+from instruments.virtual.servers.clients import (
+    CHUNK,
+    FIRST_WORDS,
+    Disconnected,
+    Link,
+    Listener,
+    ServedInstrument,
+    first_of,
+    log,
+)
 
 try:
     import pty
@@ -22,11 +31,6 @@ except ImportError:  # Windows
     HAS_PSEUDO_TERMINALS = False
 else:
     HAS_PSEUDO_TERMINALS = True
-
-if TYPE_CHECKING:
-    from collections.abc import Awaitable, Callable
-
-    from instruments.virtual.servers.clients import ServedInstrument
 
 
 def socket_listener(instrument: ServedInstrument) -> Listener:

@@ -9,20 +9,14 @@ polls the status byte.
 
 from __future__ import annotations
 
+import asyncio
 import itertools
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
-from typing import TYPE_CHECKING
 
-from instruments.virtual.servers.clients import CHUNK, MOST_CLIENTS, Link, Listener
-from instruments.virtual.servers.rpc import Program, Reader, pack, serve
-
-if TYPE_CHECKING:
-    import asyncio
-    from collections.abc import Callable, Mapping
-
-    from instruments.virtual.servers.clients import ServedInstrument
-    from instruments.virtual.servers.rpc import Procedure
+from instruments.virtual.servers.clients import CHUNK, MOST_CLIENTS, Link, Listener, ServedInstrument
+from instruments.virtual.servers.rpc import Procedure, Program, Reader, pack, serve
 
 #: Program numbers of the core and the abort channel (B.6, B.7); both are of version 1.
 CORE, ABORT, PROGRAM_VERSION = 0x0607AF, 0x0607B0, 1

@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.held import HeldLaw, Hold, fit_held, hold_of
 from analysis.spindown.tilt import slowing_by_tilt
-from analysis.uncertainty import Estimate  # noqa: TC001 - pydantic reads it
+from analysis.uncertainty import Estimate
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.hold.readings import HoldReadings
 from levilab.pipelines.options import HoldOptions, SpinDownOptions

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray  # noqa: TC002 - pydantic reads it
+from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
 from analysis.numbers import digits

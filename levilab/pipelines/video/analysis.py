@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
-from analysis.film.circles import Circle  # noqa: TC001 - pydantic reads it
+from analysis.film.circles import Circle
 from analysis.film.errors import NoMark, SlowMotion
 from analysis.film.mark import phases_of, without_pull
 from analysis.film.turning import WINDOW_S, Turning, choices_of, spins_of_start, turning_of
