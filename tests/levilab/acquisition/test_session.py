@@ -6,6 +6,7 @@ import dataclasses
 import shutil
 import signal
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -142,6 +143,9 @@ def test_records_are_kept_raw_and_come_back_in_volts(request_of_a_scan):
     for one, mean in zip(stored, light, strict=True):
         assert one.trace.codes.dtype == np.uint8
         assert np.nanmean(one.trace.volts) == pytest.approx(mean, rel=1e-12)
+    package = (run.folder / "datapackage.json").read_text(encoding="utf-8")
+    assert "traces/000003.npy" in package
+    assert "traces.jsonl" in package
 
 
 def test_codes_that_were_changed_afterwards_are_refused(request_of_a_scan):
@@ -205,63 +209,35 @@ def test_a_clock_that_goes_back_is_no_reading(request_of_a_scan, monkeypatch):
 # --- readings at an interval ---
 
 
-def session_at(seconds, waited, step):
-    """A session whose waits are noted, and whose clock goes on by what a reading takes [s]."""
-
-    class Noting(Session[Any]):
-        clock = seconds
+@pytest.mark.parametrize(
+    ("longest", "second_takes", "lost", "expected"),
+    [
+        (35.0, 1.0, False, [0.0, 10.0, 20.0, 30.0, 40.0]),
+        (60.0, 25.0, True, [0.0, 10.0, 40.0, 50.0, 60.0]),  # what was missed while lost is not caught up with
+        (45.0, 25.0, False, [0.0, 10.0, 35.0, 36.0, 40.0, 50.0]),  # one that takes too long is followed at once
+    ],
+)
+def test_readings_come_at_whole_multiples_of_the_interval(longest, second_takes, lost, expected):
+    class Jumping(Session[Any]):
+        clock = 0.0
 
         def now(self):
             return self.clock
 
         def wait(self, duration):
-            waited.append(duration)
             self.clock += max(duration, 0.0)
-            step()
 
-        def event(self, kind, text, **data):
-            waited.append(-1.0)
+        def event(self, kind, text, **data): ...
 
-    session = Noting.__new__(Noting)
+    session = Jumping.__new__(Jumping)
     session.rows, session._lost, session.zero = [], False, 0.0
-    session.writer = type("Writer", (), {"record": type("Record", (), {"experiment": "scan"})})
-    return session
-
-
-def test_readings_come_at_whole_multiples_of_the_interval_until_the_longest_time():
-    session = session_at(0.0, [], lambda: None)
+    session.writer = SimpleNamespace(record=SimpleNamespace(experiment="scan"))
     seen = []
-    for time in session.readings_every(10.0, 35.0):
+    for time in session.readings_every(10.0, longest):
         seen.append(time)
-        session.clock += 1.0
-    assert seen == [0.0, 10.0, 20.0, 30.0, 40.0]
-
-
-def test_readings_missed_while_an_instrument_was_lost_are_not_caught_up_with():
-    session = session_at(0.0, [], lambda: None)
-    seen = []
-    for time in session.readings_every(10.0, 60.0):
-        seen.append(time)
-        session._lost = time == 10.0
-        session.clock += 25.0 if time == 10.0 else 1.0
-    assert seen == [0.0, 10.0, 40.0, 50.0, 60.0]
-
-
-def test_a_reading_that_takes_too_long_is_followed_at_once_by_the_next():
-    session = session_at(0.0, [], lambda: None)
-    seen = []
-    for time in session.readings_every(10.0, 45.0):
-        seen.append(time)
-        session.clock += 25.0 if time == 10.0 else 1.0
-    assert seen == [0.0, 10.0, 35.0, 36.0, 40.0, 50.0]
-
-
-def test_the_run_that_is_listed_has_its_traces_described(request_of_a_scan):
-    run = acquire(request_of_a_scan, Silent())
-    package = (run.folder / "datapackage.json").read_text(encoding="utf-8")
-    assert "traces/000003.npy" in package
-    assert "traces.jsonl" in package
-    assert Run.load(run.folder).count() == 3
+        session._lost = lost and time == 10.0
+        session.clock += second_takes if time == 10.0 else 1.0
+    assert seen == expected
 
 
 def test_a_run_whose_time_zero_is_not_known_is_not_called_empty(sample_data, tmp_path):

@@ -1,7 +1,6 @@
 """A drive that the top triggers, on the virtual bench: to a spin from any other, and every way out."""
 
 import math
-import signal
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -83,12 +82,6 @@ def test_the_top_is_driven_up_wherever_the_tape_is_and_spins_down_freely(tmp_pat
     assert world.is_off
 
 
-def test_a_top_that_is_too_fast_is_braked_by_the_opposite_phase(tmp_path):
-    request, _ = at(tmp_path, replace(SCENE, start_hz=38.0), TRIGGERED.model_copy(update={"hold_s": 30.0}))
-    run = acquire(request, Silent())
-    assert run.readings().column("spin_frequency_hz")[0] == pytest.approx(34.0, abs=0.5)
-
-
 @pytest.mark.parametrize("changed", [{"start_hz": 25.5}, {"jitter": 0.1}])  # 0.28 Hz a count of 0.5 s: 1 s is needed
 def test_a_slow_top_and_one_that_scatters_survive_the_search(tmp_path, changed):
     request, _ = at(tmp_path, replace(SCENE, **changed))
@@ -128,18 +121,6 @@ def test_a_top_taken_away_is_noticed_and_the_output_goes_off(tmp_path):
     with pytest.raises(DidNotFollow, match="no top seen under a drive"):
         acquire(request, Silent())
     assert world.is_off
-
-
-def test_ctrl_c_under_the_drive_leaves_the_output_off_and_the_run_whole(tmp_path):
-    class Impatient(Silent):
-        def preparing(self, text, share):
-            if text.startswith("held"):
-                signal.raise_signal(signal.SIGINT)
-
-    request, world = at(tmp_path)
-    run = acquire(request, Impatient())
-    assert (run.status, world.is_off) == ("interrupted", True)
-    assert run.record.instruments["generator"]["settings_end"]["output"] is False
 
 
 def test_a_generator_that_fails_under_the_drive_is_reached_again(tmp_path, monkeypatch):

@@ -71,15 +71,6 @@ def test_a_ramp_in_steps_of_a_fifth_of_a_hertz_is_followed():
         assert spin_hz(top, 2.95 + k) == pytest.approx(start + 0.2 * k, rel=1e-12)
 
 
-@pytest.mark.parametrize(("step", "followed"), [(0.95, True), (1.05, False), (-0.95, True), (-1.05, False)])
-def test_a_jump_is_followed_within_the_capture_range_only(step, followed):
-    top = world()
-    drive(top, 0.0, "SIN", 30.0, FIELD)
-    drive(top, 1.0, "SIN", 30.0 + step * CAPTURE, FIELD)
-    reached = spin_hz(top, 10.0) == pytest.approx(30.0 + step * CAPTURE, abs=1e-9)
-    assert reached is followed
-
-
 @pytest.mark.parametrize("step", [0.3, -0.3])
 def test_drag_holds_back_a_drive_that_pulls_up_and_helps_one_that_pulls_down(step):
     top = world()
@@ -108,31 +99,15 @@ def test_a_drive_that_is_weaker_than_drag_holds_nothing():
     assert spin_hz(weak, 20.0) < 29.0
 
 
-@pytest.mark.parametrize(("waveform", "fundamental"), [("SIN", 1.0), ("SQU", 4 / math.pi), ("TRI", 8 / math.pi**2)])
-def test_a_waveform_holds_with_its_first_harmonic(waveform, fundamental):
-    def half_period(phase):
-        return {"SIN": np.sin(phase), "SQU": np.ones_like(phase), "TRI": 1 - np.abs(1 - 2 * phase / math.pi)}[waveform]
-
-    # the Fourier coefficient, summed: 2/π ∫ f sin over half a period
-    phase = (np.arange(10_000) + 0.5) * math.pi / 10_000
-    assert fundamental == pytest.approx(2 * np.mean(half_period(phase) * np.sin(phase)), rel=1e-6)
-    reach = 2 * math.sqrt(fundamental * HOLD) / TURN
+@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("waveform", "harmonic"), [("SIN", 1.0), ("SQU", 4 / math.pi), ("TRI", 8 / math.pi**2)])
+def test_a_jump_is_followed_within_the_reach_of_the_first_harmonic_only(waveform, harmonic, sign):
+    reach = sign * 2 * math.sqrt(harmonic * HOLD) / TURN
     for step, followed in ((0.99, True), (1.01, False)):
         top = world()
         drive(top, 0.0, waveform, 30.0, FIELD)
         drive(top, 1.0, waveform, 30.0 + step * reach, FIELD)
         assert (abs(spin_hz(top, 10.0) - 30.0 - step * reach) < 1e-9) is followed
-
-
-def test_a_top_let_go_while_it_is_pulled_spins_down_from_there():
-    top = world()
-    drive(top, 0.0, "SIN", 30.0, FIELD)
-    drive(top, 1.0, "SIN", 30.4, FIELD)
-    off(top, 1.5)
-    let_go = spin_hz(top, 1.5)
-    assert 30.05 < let_go < 30.35
-    expected = float(DECAYS["disc"].after(TURN * let_go, 10.0, 2.34e-4)) / TURN
-    assert spin_hz(top, 11.5) == pytest.approx(expected, rel=1e-14)
 
 
 #: Seconds since the last change, waveform, how far from 30 Hz, amplitude as a part of the usual one.
@@ -190,15 +165,6 @@ def test_the_top_falls_at_its_lower_limit_and_stays_dark():
     assert np.all(after == QUIET.tape.dark)
 
 
-def test_no_drive_raises_a_top_that_has_fallen():
-    top = world()
-    for k in range(5):
-        drive(top, 200.0 + k, "SIN", 30.0 + k, FIELD)
-    assert spin_hz(top, 210.0) == 0.0
-    assert angle(top, 210.0) == angle(top, 200.0)
-    assert np.all(top.light(210.0, 1e-4, 10_000) == QUIET.tape.dark)
-
-
 def test_a_hand_takes_a_top_that_floats_and_spins_it_anew():
     clock = VirtualClock()
     top = SpinWorld(QUIET, clock)
@@ -208,11 +174,6 @@ def test_a_hand_takes_a_top_that_floats_and_spins_it_anew():
     top.float_top(1)
     assert spin_hz(top, 49.0) < QUIET.start_hz - 1.0
     assert spin_hz(top, 50.0) == pytest.approx(QUIET.start_hz)
-
-
-def test_a_top_that_was_never_spun_up_is_dark_from_the_start():
-    top = world(replace(QUIET, start_hz=20.0))
-    assert np.all(top.light(0.0, 1e-4, 10_000) == QUIET.tape.dark)
 
 
 # --- the light ---

@@ -107,10 +107,6 @@ def test_a_block_of_any_bytes_is_read_whole_in_chunks_of_any_size(blocks, chunk)
     assert answer == b"#525600" + ANY_BYTES + b"\n"
 
 
-def test_pyvisas_own_reader_of_blocks_gets_the_bytes(blocks):
-    assert bytes(blocks.query_binary_values("DATA?", datatype="B")) == ANY_BYTES
-
-
 def test_a_chunk_says_whether_more_is_to_come(blocks):
     blocks.write("*OPC?")
     with blocks.ignore_warning(StatusCode.success_max_count_read):
@@ -213,12 +209,6 @@ def test_a_question_before_the_last_answer_was_read_interrupts_it(blocks):
     blocks.write("*IDN?")
     assert blocks.query("*OPC?").strip() == "1"
     assert blocks.query("SYST:ERR?").startswith("-410")
-
-
-def test_a_read_without_a_question_queues_an_error(blocks):
-    with pytest.raises(pyvisa.VisaIOError):
-        blocks.read()
-    assert blocks.query("SYST:ERR?").startswith("-420")
 
 
 def test_a_shared_lock_is_for_those_who_know_its_key(blocks):

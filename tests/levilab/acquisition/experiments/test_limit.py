@@ -336,11 +336,13 @@ def test_a_series_ends_when_its_time_is_over(tmp_path):
         ("what=upper", "there is no such setting; levilab acquire limit --settings lists all"),
         ("spin.hold_s=1", "is a setting of levilab acquire spin, this is levilab acquire limit"),
         ("__init__.x=1", "limit.KEY=VALUE is expected"),
+        ("which=upper highest_hz=120", "limit.highest_hz = 120 is more than this bench allows"),
+        ("which=upper highest_hz=25", "limit.highest_hz = 25: more than limit.drive_frequency_hz = 30"),
     ],
 )
 def test_settings_on_the_command_line_that_cannot_be_are_refused(tmp_path, settings, says):
     with pytest.raises(UsageError) as caught:
-        mock(tmp_path, settings)
+        mock(tmp_path, *settings.split())
     assert caught.value.name == "settings"
     assert says in str(caught.value)
 
@@ -348,13 +350,6 @@ def test_settings_on_the_command_line_that_cannot_be_are_refused(tmp_path, setti
 def test_a_key_without_its_experiment_is_of_the_one_that_is_carried_out(tmp_path):
     bare, full = (mock(tmp_path, f"{table}which=upper", f"{table}hold_s=7").config for table in ("", "limit."))
     assert settings_of(bare, "limit") == settings_of(full, "limit")
-
-
-def test_a_drive_beyond_the_bench_is_refused_before_it_begins(tmp_path):
-    with pytest.raises(UsageError, match=r"limit\.highest_hz = 120 is more than this bench allows"):
-        mock(tmp_path, "limit.which=upper", "limit.highest_hz=120")
-    with pytest.raises(UsageError, match=r"limit\.highest_hz = 25: more than limit\.drive_frequency_hz = 30"):
-        mock(tmp_path, "limit.which=upper", "limit.highest_hz=25")
 
 
 def test_a_setting_that_the_bench_files_do_not_allow_is_wrong_usage(tmp_path):
