@@ -1,10 +1,7 @@
 """Acquisitions on the virtual bench, as tests make them."""
 
-from __future__ import annotations
-
 import signal
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
 
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiments.spin import SpinSettings
@@ -13,13 +10,7 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.table import Configuration, with_settings
 from levilab.present.progress import Display
 from levilab.world.bench import virtual_wiring
-from levilab.world.spin_world import SpinScene, SpinWorld
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from levilab.runs.run import Run
-    from levilab.world.spin_world import World
+from levilab.world.spin_world import SpinWorld
 
 #: Counts before the drive is off: the spin at first, 27 while the drive takes hold, every 10 s of 25 on the way up, and
 #: at the end of it.
@@ -36,62 +27,62 @@ QUICKLY = [word for setting in RAISED_QUICKLY for word in ("--set", setting)]
 class Silent(Display):
     """Shows nothing, remembers what it was to show."""
 
-    def __init__(self) -> None:
-        self.readings: list[str] = []
-        self.messages: list[str] = []
-        self.left: list[float] = []
+    def __init__(self):
+        self.readings = []
+        self.messages = []
+        self.left = []
         self.closed = False
-        self.after_close: list[str] = []
+        self.after_close = []
 
-    def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
+    def reading(self, text, elapsed, remaining):
         self.readings.append(text)
         self.left.append(remaining[1])
 
-    def message(self, text: str) -> None:
+    def message(self, text):
         self.messages.append(text)
         if self.closed:
             self.after_close.append(text)
 
-    def close(self) -> None:
+    def close(self):
         self.closed = True
 
 
 class Impatient(Silent):
     """Presses Ctrl-C, or sends another signal, after so many readings."""
 
-    def __init__(self, most: int, number: signal.Signals = signal.SIGINT) -> None:
+    def __init__(self, most, number=signal.SIGINT):
         super().__init__()
         self.most, self.number = most, number
 
-    def reading(self, text: str, elapsed: float, remaining: tuple[float, float]) -> None:
+    def reading(self, text, elapsed, remaining):
         super().reading(text, elapsed, remaining)
         if len(self.readings) == self.most:
             signal.raise_signal(self.number)
 
 
-def mock(out: Path, seed: int | None = 1, **changes: Any) -> AcquisitionRequest:
+def mock(out, seed=1, **changes):
     """A spin-down on the virtual bench, as the command line asks for it, but let go at once."""
     of_a_new_run = LET_GO_AT_ONCE if "scene" in changes else RAISED_QUICKLY
     settings = () if "resume" in changes else of_a_new_run
     return request_for("spin", AcquisitionOptions(mock=True, out=out, seed=seed, settings=settings, **changes))
 
 
-def kinds(run: Run) -> list[str]:
+def kinds(run):
     """The kinds of all events of a run."""
     return [event["kind"] for event in run.events()]
 
 
-def texts(run: Run, *kinds: str) -> list[str]:
+def texts(run, *kinds):
     """The texts of the events of these kinds."""
     return [event["text"] for event in run.events() if event["kind"] in kinds]
 
 
-def in_world(request: AcquisitionRequest, world: World) -> AcquisitionRequest:
+def in_world(request, world):
     """The same at the virtual bench of this world."""
     return replace(request, wiring=lambda: virtual_wiring(world, request.config.limits))
 
 
-def of_scene(out: Path, scene: SpinScene, settings: SpinSettings | None = None) -> AcquisitionRequest:
+def of_scene(out, scene, settings=None):
     """A spin-down of a top that only spins."""
     config = with_settings(Configuration(), "spin", settings or SpinSettings(hold_s=0))
     request = AcquisitionRequest("spin", config, wiring=NotImplemented, out=out, synthetic_how="a test")

@@ -18,23 +18,15 @@ on this machine.  A module may share a page in a fixture of its own:
 One browser serves all tests of a worker; it starts when the first of them asks for it.
 """
 
-from __future__ import annotations
-
 import asyncio
 import os
 import shutil
 import sys
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 import pytest
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator
-
-    from playwright.sync_api import Browser, Page
 
 #: Names an executable in place of those that are searched for.
 VARIABLE = "LEVILAB_TEST_BROWSER"
@@ -73,7 +65,7 @@ PHONE = {"width": 390, "height": 844}
 PATIENCE_MS = 60_000.0
 
 
-def executable() -> str | None:
+def executable():
     """The browser: as the variable names it, on the path, or where the system installs it."""
     if named := os.environ.get(VARIABLE):
         return named
@@ -87,17 +79,17 @@ def executable() -> str | None:
 
 
 #: Playwright's event loop, while there is one.
-_loops: list[asyncio.AbstractEventLoop] = []
+_loops = []
 
 
-def _enter_loop() -> None:
+def _enter_loop():
     """Mark Playwright's loop as the running one: what is closed late is closed after another's test, or after all."""
     if _loops:
         asyncio._set_running_loop(_loops[0])
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, bool | None, bool | None]:
+def pytest_runtest_protocol(item):
     """A test that has the browser among its fixtures runs in Playwright's event loop, other tests in their own.
 
     Between its calls Playwright leaves its loop marked as the running one, in which no other may be started.
@@ -111,7 +103,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, bool | None, b
 
 
 @pytest.fixture(scope="session")
-def browser() -> Iterator[Browser]:
+def browser():
     """A headless Chromium, Chrome or Edge; the test is skipped where there is none."""
     from playwright.sync_api import sync_playwright
 
@@ -131,7 +123,7 @@ def browser() -> Iterator[Browser]:
         asyncio._set_running_loop(None)
 
 
-def is_outside(url: str) -> bool:
+def is_outside(url):
     """Whether a request would leave this machine.
 
     >>> is_outside("http://127.0.0.1:8080/live"), is_outside("https://example.org/font.woff")
@@ -142,23 +134,23 @@ def is_outside(url: str) -> bool:
 
 
 @contextmanager
-def watch(browser: Browser, **options: Any) -> Iterator[Page]:
+def watch(browser, **options):
     """A page in a context of its own; raises AssertionError at its end for errors and for requests to elsewhere.
 
     Args:
         browser: the fixture.
         options: of Playwright's ``new_context``: viewport, color_scheme, reduced_motion, java_script_enabled, ...
     """
-    problems: list[str] = []
+    problems = []
     context = browser.new_context(**{"viewport": DESK, "locale": "en-GB", "reduced_motion": "reduce", **options})
     context.set_default_timeout(PATIENCE_MS)
     page = context.new_page()
 
-    def report(message: Any) -> None:
+    def report(message):
         if message.type in {"error", "assert"}:
             problems.append(f"console: {message.text} ({message.location.get('url')})")
 
-    def look(address: str) -> None:
+    def look(address):
         if is_outside(address):
             problems.append(f"a request to elsewhere: {address}")
 
@@ -175,14 +167,14 @@ def watch(browser: Browser, **options: Any) -> Iterator[Page]:
 
 
 @pytest.fixture
-def watched(browser: Browser) -> Iterator[Callable[..., Page]]:
+def watched(browser):
     """Opens pages as `watch` does, with its options, until the end of the test."""
     with ExitStack() as pages:
         yield lambda **options: pages.enter_context(watch(browser, **options))
 
 
 @pytest.fixture
-def page(browser: Browser) -> Iterator[Page]:
+def page(browser):
     """A page of 1280 × 800 in light colours."""
     with watch(browser) as page:
         yield page

@@ -7,13 +7,9 @@ import io
 import os
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from levilab.cli.main import main
 from levilab.texts.text import speak
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -25,7 +21,7 @@ class Ended:
     err: str
 
 
-def command(*words: str | Path, cwd: Path, encoding: str = "utf-8") -> Ended:
+def command(*words, cwd, encoding="utf-8"):
     """Run `levilab` with some words in a folder.  Raises what would be a traceback."""
     out, err = (io.TextIOWrapper(io.BytesIO(), encoding=encoding) for _ in range(2))
     argv, here = sys.argv, os.getcwd()  # noqa: PTH109 - also if it is gone

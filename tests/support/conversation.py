@@ -1,15 +1,10 @@
 """A transport with a script: driver tests as conversations, in the style of PyMeasure's ``expected_protocol``."""
 
-from __future__ import annotations
-
 import contextlib
 from collections import deque
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from instruments.errors import NoAnswer
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 D = TypeVar("D")
 
@@ -26,14 +21,14 @@ class Script:
     waited: the patience of every question [s].
     """
 
-    def __init__(self, lines: tuple[Line, ...]) -> None:
+    def __init__(self, lines):
         self.address, self.timeout = "SCRIPT::INSTR", 2.0
         self.left, self.waited, self.closed = deque(lines), list[float](), False
 
-    def write(self, message: str) -> None:
+    def write(self, message):
         assert self._next(message) is None, f"{message!r} was sent, but its answer not waited for"
 
-    def query(self, message: str, *, patience: float = 0.0) -> str:
+    def query(self, message, *, patience=0.0):
         answer = self._next(message)
         assert answer is not None, f"{message!r} is a command, but an answer was waited for"
         self.waited.append(patience)
@@ -41,7 +36,7 @@ class Script:
             raise NoAnswer(self.address, message, self.timeout + patience)
         return answer
 
-    def query_block(self, message: str, *, patience: float = 0.0, form: object = None) -> bytes | str | None:
+    def query_block(self, message, *, patience=0.0, form=None):
         answer = self._next(message)
         self.waited.append(patience)
         if answer == SILENCE:
@@ -49,26 +44,26 @@ class Script:
         assert isinstance(answer, bytes), f"{message!r} is not answered with a block"
         return answer
 
-    def clear(self) -> None:
+    def clear(self):
         self._next(CLEAR)
 
-    def close(self) -> None:
+    def close(self):
         self.closed = True
 
-    def _next(self, message: str) -> str | None:
+    def _next(self, message):
         assert self.left, f"{message!r} was sent after the end of the script"
         expected, answer = self.left.popleft()
         assert message == expected
         return answer
 
 
-def accepted(*commands: str) -> list[Line]:
+def accepted(*commands):
     """The lines of commands that the instrument takes without an error."""
     return [line for command in commands for line in ((command, None), NO_ERROR)]
 
 
 @contextlib.contextmanager
-def conversation(driver: Callable[[Script], D], *lines: Line) -> Iterator[D]:
+def conversation(driver, *lines):
     """A driver whose instrument says these lines; all of them must have been said in the end."""
     script = Script(lines)
     yield driver(script)

@@ -1,16 +1,10 @@
 """A Dask cluster on this machine: a scheduler and workers, each a process that a test may kill."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Self
-
-if TYPE_CHECKING:
-    from types import TracebackType
 
 ON_LOOPBACK = ("--host", "127.0.0.1", "--no-dashboard")
 
@@ -18,24 +12,24 @@ ON_LOOPBACK = ("--host", "127.0.0.1", "--no-dashboard")
 class DaskCluster:
     """Processes that run until the context ends."""
 
-    def __init__(self, workers: int, *, threads: int = 1) -> None:
+    def __init__(self, workers, *, threads=1):
         self._count, self._threads = workers, threads
-        self.processes: list[subprocess.Popen[str]] = []
+        self.processes = []
         self._readers = ThreadPoolExecutor(workers + 10)
         self.address = ""
 
-    def __enter__(self) -> Self:
+    def __enter__(self):
         self.scheduler, self.address = self._start("scheduler", "--port", "0", says=r"Scheduler at:\s*(tcp://\S+)")
         for _ in range(self._count):
             self.add_worker()
         return self
 
-    def add_worker(self) -> None:
+    def add_worker(self):
         """Start a worker and wait until the scheduler knows it."""
         words = ("worker", self.address, "--nthreads", str(self._threads), "--no-nanny")
         self._start(*words, says=r"Registered to:\s*(tcp://\S+)")
 
-    def _start(self, *words: str, says: str) -> tuple[subprocess.Popen[str], str]:
+    def _start(self, *words, says):
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
         process = subprocess.Popen(
             [sys.executable, "-m", "dask", *words, *ON_LOOPBACK],
@@ -51,9 +45,7 @@ class DaskCluster:
                 return process, match[1]
         raise AssertionError(seen)
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, kind, error, traceback):
         for process in self.processes:
             process.kill()
         self._readers.shutdown()

@@ -1,9 +1,5 @@
 """Documents with every kind of block."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
-
 from levilab.present.document.blocks import (
     Banner,
     Bullets,
@@ -25,11 +21,8 @@ from levilab.present.document.blocks import (
 )
 from levilab.present.tables import Row, table
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
-
-def drawn() -> Figure:
+def drawn():
     """A figure with one line of two points."""
     from matplotlib.figure import Figure
 
@@ -38,7 +31,7 @@ def drawn() -> Figure:
     return figure
 
 
-def all_blocks(text: str) -> tuple[Any, ...]:
+def all_blocks(text):
     """Every kind of block, with a text wherever one can stand."""
     shown = table(text, (text, "n"), [Row((text, "1"), "best"), Row((f"{text}\n{text}", "2"))], numbers=["n"])
     picture = Picture("figure", text, text, text, drawn, (Points("readings-0", (text, text)),))
@@ -51,7 +44,7 @@ def all_blocks(text: str) -> tuple[Any, ...]:
     )  # fmt: skip
 
 
-def of_all_blocks(text: str, *, sections: int = 1, **more: Any) -> Document:
+def of_all_blocks(text, *, sections=1, **more):
     """A document with every kind of block, all texts of which are this one."""
     found = tuple(Section(text, all_blocks(text), "result", text) for _ in range(sections))
     return Document(text, text, found, Banner(text, text), **more)

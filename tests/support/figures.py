@@ -1,7 +1,5 @@
 """Figures that no test looks at, and what is wrong with those that tests look at."""
 
-from __future__ import annotations
-
 import base64
 import contextlib
 from typing import TYPE_CHECKING
@@ -17,10 +15,6 @@ from matplotlib.transforms import Bbox
 from levilab.present.style import as_png, as_svg
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from matplotlib.axes import Axes
-    from matplotlib.lines import Line2D
     from numpy.typing import NDArray
 
     Array = NDArray[np.float64]
@@ -38,21 +32,21 @@ ONE_PIXEL = base64.b64decode(
 
 
 @contextlib.contextmanager
-def without_drawing() -> Iterator[None]:
+def without_drawing():
     """Figures are made, but matplotlib does not draw them: that is most of what a result or a page costs."""
     with _drawing_by(lambda *_, **__: ONE_PIXEL, lambda *_, **__: "<svg/>"):
         yield
 
 
 @contextlib.contextmanager
-def with_drawing() -> Iterator[None]:
+def with_drawing():
     """Figures are drawn, as without these tests; for those that look at what matplotlib makes of them."""
     with _drawing_by(as_png, as_svg):
         yield
 
 
 @contextlib.contextmanager
-def _drawing_by(png: Callable[..., bytes], svg: Callable[..., str]) -> Iterator[None]:
+def _drawing_by(png, svg):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("levilab.present.style.as_png", png)
         patch.setattr("levilab.present.style.as_svg", svg)
@@ -60,14 +54,14 @@ def _drawing_by(png: Callable[..., bytes], svg: Callable[..., str]) -> Iterator[
 
 
 @contextlib.contextmanager
-def without_figures() -> Iterator[None]:
+def without_figures():
     """Figures of analyses are empty: for texts of a page whose figure other tests make from the same runs."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("levilab.pipelines.document.Analysis.figure", lambda *_, **__: Figure())
         yield
 
 
-def faults(figure: Figure) -> list[str]:
+def faults(figure):
     """Texts that lie over each other, over a line or a marker, or beyond the figure; each in words."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
@@ -86,7 +80,7 @@ def faults(figure: Figure) -> list[str]:
     return found
 
 
-def _texts(figure: Figure) -> list[Text]:
+def _texts(figure):
     """All that can be read: with anything written, visible, and inside of a visible panel."""
     hidden = {id(text) for axes in figure.axes if not axes.get_visible() for text in axes.findobj(Text)}
     ticks = {id(text) for axes in figure.axes for text in _idle_ticks(axes)}
@@ -97,7 +91,7 @@ def _texts(figure: Figure) -> list[Text]:
     ]
 
 
-def _idle_ticks(axes: Axes) -> Iterator[Text]:
+def _idle_ticks(axes):
     """Labels of ticks that are not drawn: those beyond the limits."""
     for axis in (axes.xaxis, axes.yaxis):
         shown = {id(text) for tick in axis._update_ticks() for text in (tick.label1, tick.label2)}
@@ -106,24 +100,24 @@ def _idle_ticks(axes: Axes) -> Iterator[Text]:
             yield from axis.findobj(Text)
 
 
-def _box(text: Text) -> Bbox:
+def _box(text):
     box = text.get_window_extent()
     return Bbox.from_extents(box.x0 + _EDGE, box.y0 + _EDGE, box.x1 - _EDGE, box.y1 - _EDGE)
 
 
-def _named(text: Text) -> str:
+def _named(text):
     return repr(" ".join(text.get_text().split())[:40])
 
 
-def _inside(box: Bbox, whole: Bbox) -> bool:
+def _inside(box, whole):
     return bool(box.x0 >= whole.x0 and box.y0 >= whole.y0 and box.x1 <= whole.x1 and box.y1 <= whole.y1)
 
 
-def _overlap(one: Bbox, other: Bbox) -> bool:
+def _overlap(one, other):
     return bool(one.x0 <= other.x1 and other.x0 <= one.x1 and one.y0 <= other.y1 and other.y0 <= one.y1)
 
 
-def _drawn(axes: Axes) -> Iterator[tuple[str, Array]]:
+def _drawn(axes):
     """Of each line and each bar of a panel, its name and points a pixel apart, in pixels."""
     inside = axes.get_window_extent()
     for line in axes.get_lines():
@@ -138,7 +132,7 @@ def _drawn(axes: Axes) -> Iterator[tuple[str, Array]]:
                 yield "a bar", _clipped(_between(starts, ends), inside)
 
 
-def _line(line: Line2D) -> Array:
+def _line(line):
     path = line.get_transform().transform_path(line.get_path())
     points = np.asarray(path.vertices, dtype=np.float64)
     points = points[np.isfinite(points).all(axis=1)]
@@ -147,12 +141,12 @@ def _line(line: Line2D) -> Array:
     return points if line.get_marker() not in {"None", "none", "", " "} else points[:0]
 
 
-def _dense(points: Array) -> Array:
+def _dense(points):
     """The line through some points as points at most a pixel apart."""
     return _between(points[_STARTS], points[_ENDS])
 
 
-def _between(starts: Array, ends: Array) -> Array:
+def _between(starts, ends):
     """Straight pieces as points at most a pixel apart, with both ends; no more than can matter."""
     starts, ends = (np.clip(points, -1e4, 1e4) for points in (starts, ends))
     steps = np.maximum(np.ceil(np.hypot(*(ends - starts).T)).astype(int), 1)
@@ -163,13 +157,13 @@ def _between(starts: Array, ends: Array) -> Array:
     return np.concatenate([np.repeat(starts, steps, axis=0) + number[:, None] * step, ends])
 
 
-def _clipped(points: Array, box: Bbox | None) -> Array:
+def _clipped(points, box):
     if box is None or not len(points):
         return points
     inside = (points >= [box.x0 - 1, box.y0 - 1]) & (points <= [box.x1 + 1, box.y1 + 1])
     return points[inside.all(axis=1)]
 
 
-def _hits(points: Array, box: Bbox) -> bool:
+def _hits(points, box):
     inside = (points > [box.x0, box.y0]) & (points < [box.x1, box.y1])
     return bool(inside.all(axis=1).any())

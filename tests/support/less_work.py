@@ -1,34 +1,26 @@
 """Work that few tests look at: drawing, trials of a report, a second fit of readings that another test has fitted."""
 
-from __future__ import annotations
-
 import contextlib
 import pickle
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
 import pytest
 
 from levilab.crosscheck.own.study import FEWEST, trials_of_report
 from support.figures import without_drawing
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from levilab.crosscheck.own.model import Own
-
 #: Functions of readings and options alone, by room: many tests give them the sample data.
 FITS = {"field": "fit_scan", "spindown": "fit_spin_down", "sway": "swings_of"}
 
 
 @contextlib.contextmanager
-def with_less_work() -> Iterator[None]:
+def with_less_work():
     """Make the fewest trials that a report shows, 2 s for each analysis otherwise; fit the same readings once.
 
     Figures are made and not drawn, which is half a second for each; see `with_drawing`.
     """
 
-    def count(subject: Own) -> int:
+    def count(subject):
         return min(trials_of_report(subject), FEWEST)
 
     with without_drawing(), pytest.MonkeyPatch.context() as patch:
@@ -39,11 +31,11 @@ def with_less_work() -> Iterator[None]:
         yield
 
 
-def _once(fit: Callable[..., Any]) -> Callable[..., Any]:
+def _once(fit):
     """Remember what a fit gave; an error is raised again each time."""
-    known: dict[bytes, Any] = {}
+    known = {}
 
-    def call(*readings: Any, **options: Any) -> Any:
+    def call(*readings, **options):
         key = pickle.dumps((readings, sorted(options.items())))
         if key not in known:
             known[key] = fit(*readings, **options)

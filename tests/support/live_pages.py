@@ -1,7 +1,5 @@
 """The live view for tests: a server in a thread, and run folders that grow as a bench writes them."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import http.client
@@ -9,22 +7,11 @@ import json
 import socket
 import threading
 import time
-from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 from levilab.live.doors import Doors, doors_for_guests
 from levilab.live.serve import configuration
 from levilab.live.server import Hall
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-    from pathlib import Path
-
-    from playwright.sync_api import Page
-
-    from levilab.live.desk import Desk
-    from levilab.live.watch import Watch
-    from levilab.telemetry.messages import Message
 
 #: A page is waited for so long; one that works is not waited for [s].
 PATIENCE_S = 90.0
@@ -32,7 +19,7 @@ CHANNELS = (("time_s", "s"), ("spin_frequency_hz", "Hz"), ("spin_frequency_u_hz"
 
 
 @contextlib.contextmanager
-def serving(root: Path, shown: str = "", desk: Desk | None = None) -> Iterator[Hall]:
+def serving(root, shown="", desk=None):
     """A server of the runs in a folder, at two free ports, one for guests, in a thread of its own."""
     import uvicorn
 
@@ -52,20 +39,18 @@ def serving(root: Path, shown: str = "", desk: Desk | None = None) -> Iterator[H
             hall.analyses.end()
 
 
-def address(hall: Hall, run: str = "", *, token: bool = False) -> str:
+def address(hall, run="", *, token=False):
     """Where a page of the server is."""
     return f"http://127.0.0.1:{hall.doors.port}/" + (f"?run={run}" if run else "") + (f"#{hall.doors.token}" * token)
 
 
-def address_for_guests(hall: Hall) -> str:
+def address_for_guests(hall):
     """Where a guest's page of the server is."""
     assert hall.guests
     return f"http://127.0.0.1:{hall.guests.port}/{hall.guests.token}/"
 
 
-def request(
-    there: str, path: str, body: bytes | None = None, *, method: str = "", headers: Mapping[str, str] | None = None
-) -> tuple[int, str]:
+def request(there, path, body=None, *, method="", headers=None):
     """Status and text of the answer to a request as it stands, at the server of an address; a body is posted."""
     connection = http.client.HTTPConnection(urlsplit(there).netloc, timeout=PATIENCE_S)
     with contextlib.closing(connection):
@@ -74,7 +59,7 @@ def request(
         return answer.status, answer.read().decode("utf-8", "replace")
 
 
-def until(page: Page, expression: str) -> Any:
+def until(page, expression):
     """Wait for something in a page.  The page's policy forbids Playwright's own way, which evaluates text."""
     end = time.monotonic() + PATIENCE_S
     while not (found := page.evaluate(expression)):
@@ -83,7 +68,7 @@ def until(page: Page, expression: str) -> Any:
     return found
 
 
-def wait_for(condition: Callable[[], object]) -> None:
+def wait_for(condition):
     """Wait for something in this process."""
     end = time.monotonic() + PATIENCE_S
     while not condition():
@@ -91,7 +76,7 @@ def wait_for(condition: Callable[[], object]) -> None:
         time.sleep(0.01)
 
 
-def publish(watch: Watch, *messages: Message) -> None:
+def publish(watch, *messages):
     """Let a watch take in messages without a bench."""
     for message in messages:
         watch._take(message)
@@ -100,10 +85,10 @@ def publish(watch: Watch, *messages: Message) -> None:
 class GrowingRun:
     """A run folder as a bench writes it, without a bench."""
 
-    def __init__(self, root: Path, name: str = "20261122T100000Z-spin-0000", **record: Any) -> None:
+    def __init__(self, root, name="20261122T100000Z-spin-0000", **record):
         self.folder = root / name
         self.folder.mkdir(parents=True)
-        self.record: dict[str, Any] = {
+        self.record = {
             "schema": "levilab-run/1",
             "experiment": "spin",
             "status": "finished",
@@ -115,34 +100,34 @@ class GrowingRun:
         self.say()
         self.add(",".join(name for name, _ in CHANNELS) + "\n")
 
-    def say(self, **changes: Any) -> None:
+    def say(self, **changes):
         """Change the record."""
         self.record |= changes
         (self.folder / "run.json").write_text(json.dumps(self.record), encoding="utf-8")
 
-    def add(self, text: str) -> None:
+    def add(self, text):
         """Append to readings.csv."""
         with (self.folder / "readings.csv").open("a", encoding="utf-8", newline="") as file:
             file.write(text)
 
-    def readings(self, rows: Sequence[Sequence[float]]) -> None:
+    def readings(self, rows):
         """Append readings."""
         self.add("".join(",".join(map(repr, row)) + "\n" for row in rows))
 
     def event(
         self,
-        text: str,
-        kind: str = "said",
-        time_s: float | None = None,
-        utc: str = "2026-11-22T09:00:05.123456Z",
-        **more: Any,
-    ) -> None:
+        text,
+        kind="said",
+        time_s=None,
+        utc="2026-11-22T09:00:05.123456Z",
+        **more,
+    ):
         """Append an event."""
         with (self.folder / "events.jsonl").open("a", encoding="utf-8") as file:
             file.write(json.dumps({"utc": utc, "time_s": time_s, "kind": kind, "text": text} | more) + "\n")
 
     @contextlib.contextmanager
-    def running(self) -> Iterator[None]:
+    def running(self):
         """Hold the lock of a process that writes."""
         from levilab.runs.run import lock_of
 
@@ -151,7 +136,7 @@ class GrowingRun:
             yield
 
 
-def spin_down(count: int, step_s: float = 10.0, first: int = 0) -> list[tuple[float, float, float]]:
+def spin_down(count, step_s=10.0, first=0):
     """Readings of a top under the drag of a disc, from 40 Hz."""
     times = [step_s * k for k in range(first, first + count)]
     return [(t, (40.0**-0.5 + 2.93e-4 * t) ** -2 + 0.01 * (-1) ** k, 0.03) for k, t in enumerate(times)]

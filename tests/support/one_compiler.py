@@ -1,21 +1,12 @@
 """Two processes of tests that want the same kernel: one compiles it, the other waits and reads it from the disk."""
 
-from __future__ import annotations
-
 import hashlib
 import sys
-from typing import TYPE_CHECKING, Any
 
 from filelock import FileLock
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
 
-    import pytest
-
-
-def compile_each_kernel_once(locks: Path, patch: pytest.MonkeyPatch) -> None:
+def compile_each_kernel_once(locks, patch):
     """Let numba look for machine code on the disk again once no other process is at work on it.
 
     Without it each process of a fresh clone compiles what the other compiles at that moment, for some seconds a kernel.
@@ -30,9 +21,9 @@ def compile_each_kernel_once(locks: Path, patch: pytest.MonkeyPatch) -> None:
     from numba.core.compiler_lock import global_compiler_lock
     from numba.core.dispatcher import Dispatcher
 
-    alone: Callable[[Any, Any], Any] = Dispatcher.compile
+    alone = Dispatcher.compile
 
-    def compile_or_wait(self: Any, sig: Any) -> Any:
+    def compile_or_wait(self, sig):
         # one that is compiled inside of another is waited for with that
         if isinstance(self._cache, NullCache) or global_compiler_lock.is_locked():
             return alone(self, sig)

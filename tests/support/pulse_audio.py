@@ -1,7 +1,5 @@
 """A PulseAudio server of a test's own, with a null sink: what is played there can be recorded from its monitor."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess
@@ -11,24 +9,17 @@ import time
 import wave
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
 from support.waiting import HANG_GUARD_S
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    import numpy as np
-    from numpy.typing import NDArray
 
 RATE = 48_000
 _COMMANDS = ("pulseaudio", "paplay")
 
 
 @contextmanager
-def null_sink() -> Iterator[dict[str, str]]:
+def null_sink():
     """Run a server whose default input is the monitor of a null sink; gives the environment of its clients.
 
     Skips the test where PulseAudio, PortAudio, or the plugin that joins them is missing.
@@ -51,7 +42,7 @@ def null_sink() -> Iterator[dict[str, str]]:
                 server.terminate()
 
 
-def _wait_for(socket: Path, server: subprocess.Popen[bytes]) -> None:
+def _wait_for(socket, server):
     end = time.monotonic() + HANG_GUARD_S
     while not socket.exists():
         if server.poll() is not None:
@@ -60,7 +51,7 @@ def _wait_for(socket: Path, server: subprocess.Popen[bytes]) -> None:
         time.sleep(0.01)
 
 
-def _skip_without_inputs(environment: dict[str, str]) -> None:
+def _skip_without_inputs(environment):
     ask = "from instruments.links.sound import inputs; print(inputs())"
     found = subprocess.run([sys.executable, "-c", ask], env=environment, capture_output=True, text=True, check=False)
     if found.stdout.strip() in {"", "()"}:
@@ -69,7 +60,7 @@ def _skip_without_inputs(environment: dict[str, str]) -> None:
 
 
 @contextmanager
-def playing(samples: NDArray[np.int16], path: Path, environment: dict[str, str]) -> Iterator[None]:
+def playing(samples, path, environment):
     """Play samples, shape (n,), from a WAV file into the null sink, until the end of the block at most."""
     with wave.open(str(path), "wb") as file:
         file.setnchannels(1)

@@ -1,22 +1,15 @@
 """The sources of the house, as syntax trees."""
 
-from __future__ import annotations
-
 import ast
 import gc
 from functools import cache
-from typing import TYPE_CHECKING
 
 from support.paths import ROOT
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 PACKAGES = ("levilab", "instruments", "analysis", "pyvisa_levilab")
 
 
-def modules() -> Iterator[tuple[str, Path]]:
+def modules():
     for package in PACKAGES:
         for path in sorted((ROOT / package).rglob("*.py")):
             parts = path.relative_to(ROOT).with_suffix("").parts
@@ -24,7 +17,7 @@ def modules() -> Iterator[tuple[str, Path]]:
 
 
 @cache
-def sources() -> dict[str, ast.Module]:
+def sources():
     gc.disable()  # millions of nodes that stay: looking for garbage among them takes longer than making them
     try:
         return {name: ast.parse(path.read_text(encoding="utf-8")) for name, path in modules()}

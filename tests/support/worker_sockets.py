@@ -1,13 +1,7 @@
 """Worker processes that speak to their test over a socket, and are waited for with a deadline that fails the test."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 #: What a test of workers waits for takes a second or two: the start of a process, or its end [s].
 DEADLINE_S = 180.0
@@ -15,7 +9,7 @@ Address = tuple[str, int]
 
 
 @contextlib.contextmanager
-def listening() -> Iterator[socket.socket]:
+def listening():
     """Yield a socket to which workers speak; `accept` raises TimeoutError where none comes."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         server.settimeout(DEADLINE_S)
@@ -23,7 +17,7 @@ def listening() -> Iterator[socket.socket]:
 
 
 @contextlib.contextmanager
-def worker_at_work(server: socket.socket) -> Iterator[socket.socket]:
+def worker_at_work(server):
     """Yield the conversation with the next worker that has begun its task.  Raises TimeoutError."""
     conversation, _ = server.accept()
     with conversation:
@@ -32,13 +26,13 @@ def worker_at_work(server: socket.socket) -> Iterator[socket.socket]:
         yield conversation
 
 
-def assert_dead(conversation: socket.socket) -> None:
+def assert_dead(conversation):
     """Fail unless the process at the other end has ended: the operating system closes its conversations then."""
     with contextlib.suppress(ConnectionError):
         assert conversation.recv(1) == b""
 
 
-def say_and_wait(address: Address) -> None:
+def say_and_wait(address):
     """Say that this process is at work, and wait until the other side ends the conversation."""
     with contextlib.suppress(ConnectionError), socket.create_connection(address) as conversation:
         conversation.sendall(b"!")

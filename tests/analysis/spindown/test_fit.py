@@ -228,13 +228,6 @@ def kinds(thing):
     return [remark.kind for remark in thing.remarks]
 
 
-def test_rough_readings_cannot_tell():
-    verdict = fit_spin_down(T, readings(sigma=3.0), 3.0).verdict
-    assert verdict.excluded == ()
-    assert {"stokes", "newton", "disc"} <= {*verdict.indistinguishable, *verdict.weak}
-    assert not verdict.decided
-
-
 def test_a_fall_by_one_per_cent_cannot_tell_the_laws_apart():
     time = np.linspace(0, 3, 20)
     run = fit_spin_down(time, readings(time=time), SIGMA)

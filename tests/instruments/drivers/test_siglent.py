@@ -17,6 +17,7 @@ from instruments.ieee488 import BlockForm, BrokenBlock, block_of
 from instruments.virtual.generator.siglent_sdg1000x import VirtualSDG1000X
 from instruments.virtual.oscilloscope.siglent_sds1000xe import VirtualSDS1000XE
 from support.conversation import CLEAR, conversation
+from support.exchanges import carry_out, exchanges
 from support.scopes import pulses
 from support.talks import connected
 from support.wire import ask, errors, received, send
@@ -29,14 +30,6 @@ def scope(*messages, signal=pulses):
     for message in messages:
         send(device, message.encode() + b"\n")
     return device
-
-
-def test_a_generator_answers_after_a_reset_as_a_real_one_did():
-    device = VirtualSDG1000X(VirtualClock())
-    assert ask(device, "C1:BSWV?") == AFTER_RESET
-    assert ask(device, "C2:OUTP?") == "C2:OUTP OFF,LOAD,HZ,PLRT,NOR"
-    send(device, b"C1:OUTP LOAD,50\n")
-    assert "AMP,2V" in ask(device, "C1:BSWV?")  # at the load half of the open voltage
 
 
 def test_a_field_is_read_by_its_name_and_the_state_by_its_place():
@@ -71,55 +64,86 @@ def test_an_amplitude_that_the_generator_clips_is_refused():
         generator.amplitude = 12.0
 
 
-def test_a_generator_prints_six_digits_and_ten_of_a_frequency():
-    device = VirtualSDG1000X(VirtualClock())
-    send(device, b"C1:BSWV FRQ,12345678.123456,AMP,1.23456789\nC1:OUTP LOAD,1234.5\nC1:OUTP LOAD,HZ\n")
-    assert "FRQ,12345678.12HZ,PERI,8.1e-08S,AMP,1.23457V,AMPVRMS,0.43642Vrms," in ask(device, "C1:BSWV?")
-    send(device, b"C1:OUTP LOAD,1234.5\nC1:BSWV FRQ,1e-6\n")
-    assert ask(device, "C1:OUTP?") == "C1:OUTP OFF,LOAD,1234,PLRT,NOR"
-    assert "FRQ,1e-06HZ,PERI,1e+06S" in ask(device, "C1:BSWV?")
+def shows(question, *parts):
+    """These parts stand in the answer to a question."""
+    return lambda device: all(part in ask(device, question) for part in parts)
 
 
-FIELDS = [  # the waveform that has it, the field, two values, what is there after a reset
-    ("SINE", "FRQ", ("25HZ", "1e-06HZ"), "1000HZ"),
-    ("SINE", "PERI", ("0.04S", "1000S"), "0.001S"),
-    ("SINE", "AMP", ("3V", "0.002V"), "4V"),
-    ("SINE", "OFST", ("-1.5V", "8V"), "0V"),
-    ("SINE", "PHSE", ("90", "360"), "0"),
-    ("SQUARE", "DUTY", ("20", "99"), "50"),
-    ("RAMP", "SYM", ("0", "100"), "50"),
-]
+GENERATOR = (VirtualSDG1000X,)
+EXCHANGES = {
+    "the answers after a reset are those of a real one": (
+        *(GENERATOR, ("C1:BSWV?", AFTER_RESET), ("C2:OUTP?", "C2:OUTP OFF,LOAD,HZ,PLRT,NOR")),
+        *("C1:OUTP LOAD,50", shows("C1:BSWV?", "AMP,2V")),  # at the load half of the open voltage
+    ),
+    "six digits are printed, and ten of a frequency": (
+        *(GENERATOR, "C1:BSWV FRQ,12345678.123456,AMP,1.23456789", "C1:OUTP LOAD,1234.5", "C1:OUTP LOAD,HZ"),
+        shows("C1:BSWV?", "FRQ,12345678.12HZ,PERI,8.1e-08S,AMP,1.23457V,AMPVRMS,0.43642Vrms,"),
+        *("C1:OUTP LOAD,1234.5", "C1:BSWV FRQ,1e-6", ("C1:OUTP?", "C1:OUTP OFF,LOAD,1234,PLRT,NOR")),
+        shows("C1:BSWV?", "FRQ,1e-06HZ,PERI,1e+06S"),
+    ),
+    **{
+        f"{name} of C{n} is set, asked and reset": (  # two values, and what is there after a reset
+            GENERATOR,
+            *(f"C{n}:BSWV WVTP,{waveform},{name},{first}", shows(f"C{n}:BSWV?", f",{name},{first}")),
+            *(f"C{n}:BSWV WVTP,{waveform},{name},{value}", shows(f"C{n}:BSWV?", f",{name},{value}")),
+            lambda device, n=3 - n, waveform=waveform, field=f",{name},{value}": (
+                field not in ask(device, f"C{n}:BSWV WVTP,{waveform};C{n}:BSWV?")
+            ),
+            *("*RST", shows(f"C{n}:BSWV WVTP,{waveform};C{n}:BSWV?", f",{name},{default}")),
+        )
+        for waveform, name, first, value, default in (
+            ("SINE", "FRQ", "25HZ", "1e-06HZ", "1000HZ"),
+            ("SINE", "PERI", "0.04S", "1000S", "0.001S"),
+            ("SINE", "AMP", "3V", "0.002V", "4V"),
+            ("SINE", "OFST", "-1.5V", "8V", "0V"),
+            ("SINE", "PHSE", "90", "360", "0"),
+            ("SQUARE", "DUTY", "20", "99", "50"),
+            ("RAMP", "SYM", "0", "100", "50"),
+        )
+        for n in (1, 2)
+    },
+    **{
+        f"the voltages set by {sent}": (
+            *(GENERATOR, f"C1:BSWV {sent}", shows("C1:BSWV?", f",AMP,{amplitude}V,", f",OFST,{offset}V,")),
+        )
+        for sent, amplitude, offset in (
+            ("HLEV,4", 6, 1),  # the low level stays
+            ("LLEV,0", 2, 1),
+            ("HLEV,4,LLEV,1", 3, 2.5),
+            ("AMPVRMS,1", 2.82885, 0),  # six digits of 1/0.3535
+            ("MAX_OUTPUT_AMP,3", 3, 0),
+            ("MAX_OUTPUT_AMP,3,AMP,9", 3, 0),
+        )
+    },
+    "the buzzer is switched and asked for": (
+        *((VirtualSDG1000X, lambda _: scope()), ("BUZZ OFF;BUZZ?", "BUZZ OFF"), shows("CHDR?", "SHORT")),
+    ),
+    **{
+        f"{header}, which it lacks, is off": (
+            *(GENERATOR, (f"C1:{header} STATE,OFF;C1:{header}?", f"C1:{header} STATE,OFF")),
+            *(f"C1:{header} STATE,ON", [-224]),
+        )
+        for header in ("MDWV", "SWWV")
+    },
+    # Programming Guide, STL? and ARWV?: places and names; the third is selected after a reset
+    "the waveforms that it is made with are listed": (
+        *(GENERATOR, shows("STL?", "STL M0, Sine, M1, Noise, M2, StairUp, "), ("STL? USER", "STL ")),
+        ("C1:ARWV?", "C1:ARWV INDEX,2,NAME,StairUp"),
+    ),
+    "an inverted output is one of inverted polarity": (
+        *(GENERATOR, shows("C1:INVT ON;C1:OUTP?", "PLRT,INVT"), ("C1:OUTP PLRT,NOR;C1:INVT?", "C1:INVT OFF")),
+        ("C2:SYNC ON;C2:SYNC?", "C2:SYNC ON"),
+    ),
+    **{
+        f"{question} has parameters, which no question has": (GENERATOR, (question, None), [-108])
+        for question in ("C1:BSWV? FRQ", "C1:OUTP? (@1)")
+    },
+}
 
 
-@pytest.mark.parametrize(("waveform", "name", "values", "default"), FIELDS)
-def test_a_field_of_each_channel_is_set_asked_and_reset(waveform, name, values, default):
-    device = VirtualSDG1000X(VirtualClock())
-    for n, other in ((1, 2), (2, 1)):
-        for value in values:
-            send(device, f"C{n}:BSWV WVTP,{waveform},{name},{value}\n".encode())
-            assert f",{name},{value}" in ask(device, f"C{n}:BSWV?")
-        assert f",{name},{value}" not in ask(device, f"C{other}:BSWV WVTP,{waveform};C{other}:BSWV?")
-        send(device, b"*RST\n")
-        assert f",{name},{default}" in ask(device, f"C{n}:BSWV WVTP,{waveform};C{n}:BSWV?")
-
-
-@pytest.mark.parametrize(
-    ("sent", "amplitude", "offset"),
-    [
-        ("HLEV,4", 6, 1),  # the low level stays
-        ("LLEV,0", 2, 1),
-        ("HLEV,4,LLEV,1", 3, 2.5),
-        ("AMPVRMS,1", 2.82885, 0),  # six digits of 1/0.3535
-        ("MAX_OUTPUT_AMP,3", 3, 0),
-        ("MAX_OUTPUT_AMP,3,AMP,9", 3, 0),
-    ],
-)
-def test_the_voltages_are_set_in_each_way(sent, amplitude, offset):
-    device = VirtualSDG1000X(VirtualClock())
-    send(device, f"C1:BSWV {sent}\n".encode())
-    answer = ask(device, "C1:BSWV?")
-    assert f",AMP,{amplitude}V," in answer
-    assert f",OFST,{offset}V," in answer
+@exchanges(EXCHANGES)
+def test_an_exchange_goes_as_users_wrote_it_down(make, steps):
+    carry_out(make, steps)
 
 
 def test_a_power_is_one_of_a_load():
@@ -131,28 +155,6 @@ def test_a_power_is_one_of_a_load():
     assert volts**2 / 50 == pytest.approx(10e-3, rel=1e-5)  # six digits
 
 
-@pytest.mark.parametrize("device", [VirtualSDG1000X(VirtualClock()), scope()], ids=["generator", "scope"])
-def test_the_buzzer_is_switched_and_asked_for(device):
-    assert ask(device, "BUZZ OFF;BUZZ?") == "BUZZ OFF"
-    assert "SHORT" in ask(device, "CHDR?")
-
-
-@pytest.mark.parametrize("header", ["MDWV", "SWWV"])
-def test_what_a_generator_lacks_is_off(header):
-    device = VirtualSDG1000X(VirtualClock())
-    assert ask(device, f"C1:{header} STATE,OFF;C1:{header}?") == f"C1:{header} STATE,OFF"
-    send(device, f"C1:{header} STATE,ON\n".encode())
-    assert errors(device) == [-224]
-
-
-def test_the_waveforms_that_a_generator_is_made_with_are_listed():
-    # Programming Guide, STL? and ARWV?: places and names; the third is selected after a reset
-    device = VirtualSDG1000X(VirtualClock())
-    assert ask(device, "STL?").startswith("STL M0, Sine, M1, Noise, M2, StairUp, ")
-    assert ask(device, "STL? USER") == "STL "
-    assert ask(device, "C1:ARWV?") == "C1:ARWV INDEX,2,NAME,StairUp"
-
-
 def test_a_generator_answers_without_headers_where_a_program_wants_none():
     device = VirtualSDG1000X(VirtualClock())
     send(device, b"CHDR OFF\n")
@@ -161,13 +163,6 @@ def test_a_generator_answers_without_headers_where_a_program_wants_none():
     driver = connected(SiglentSDG1000X, device)
     driver.off()  # it asks for headers again
     assert driver.frequency == 1000.0
-
-
-def test_an_inverted_output_is_one_of_inverted_polarity():
-    device = VirtualSDG1000X(VirtualClock())
-    assert ask(device, "C1:INVT ON;C1:OUTP?").endswith("PLRT,INVT")
-    assert ask(device, "C1:OUTP PLRT,NOR;C1:INVT?") == "C1:INVT OFF"
-    assert ask(device, "C2:SYNC ON;C2:SYNC?") == "C2:SYNC ON"
 
 
 def test_a_screen_dump_is_a_command_that_is_answered():
@@ -184,13 +179,6 @@ def test_what_is_shown_is_put_out_where_a_field_is_wrong(wrong):
     assert len(errors(device)) == 1
     assert "WVTP,SINE,FRQ,1000HZ," in ask(device, "C1:BSWV?")
     assert (put_out[-1].waveform, put_out[-1].frequency) == ("SIN", 1000.0)
-
-
-@pytest.mark.parametrize("question", ["C1:BSWV? FRQ", "C1:OUTP? (@1)"])
-def test_a_generator_is_asked_without_parameters(question):
-    device = VirtualSDG1000X(VirtualClock())
-    assert ask(device, question) is None
-    assert errors(device) == [-108]
 
 
 def test_a_switch_that_did_not_move_is_refused():

@@ -15,7 +15,6 @@ from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from instruments.clock import VirtualClock
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.generator.keysight_33500b import Keysight33500B
-from instruments.errors import InstrumentError
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from levilab.acquisition.counting import is_plausible
@@ -25,7 +24,6 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration
 from levilab.bench.bench import OutputMayBeOn
-from levilab.bench.config import InstrumentSettings
 from levilab.bench.wiring import Wiring
 from levilab.computer import Computer, at_another_computer
 from levilab.files import CannotWrite
@@ -429,27 +427,6 @@ def test_the_practice_benchs_top_falls_within_the_time_left_that_is_shown(tmp_pa
     for earliest, latest in between[len(between) // 2 :]:
         assert earliest < fell < latest
         assert latest - earliest > 30.0
-
-
-def test_a_resume_that_fails_keeps_the_run_and_its_readings(tmp_path):
-    """A run without instruments in its record, as other programs write it, whose bench does not answer any more."""
-    half = acquire(mock(tmp_path, 3), Impatient(8))
-    before = half.readings().frame
-    record = half.record.model_copy(update={"instruments": {}, "seed": None, "synthetic_how": None})
-    nowhere = InstrumentSettings(model="53230A", address="TCPIP0::127.0.0.1::1::SOCKET", timeout_s=0.1)
-    config = Configuration(counter=nowhere, generator=nowhere.model_copy(update={"model": "33500B"}))
-    request = AcquisitionRequest(
-        "spin",
-        config,
-        lambda: Wiring(config.instruments(), config.limits, "@levilab", VirtualClock()),
-        out=tmp_path,
-        resume=dataclasses.replace(half, record=record),
-    )
-    with pytest.raises(InstrumentError):
-        acquire(request, Silent())
-    kept = Run.load(half.folder)
-    assert kept.status == "failed"
-    assert kept.readings().frame.equals(before)
 
 
 def test_what_a_resumed_virtual_run_goes_through_again_is_not_shown(tmp_path):

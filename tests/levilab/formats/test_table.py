@@ -111,7 +111,6 @@ TABLES = {
     ),
     "day first": ("t,f\n31/12/2025 23:59:59,61.5\n1/1/2026 0:00:00,61.25\n1/1/2026 0:00:01,61\n", SECONDS),
     "Arduino's greeting": ("= Start =\nt=0 f=61.5\nt=0.5 f=61.25\nt=1 f=61\n", PLAIN),
-    "no end of the last line": ("t,f\n0,61.5\n0.5,61.25\n1,61", PLAIN),
     "labels with =": ("t=0.0 f=61.5\nt=0.5 f=61.25\nt=1 f=61\n", PLAIN),
     "labels without marks": ("Time 0, Freq 61.5\nTime .5, Freq 61.25\nTime 1, Freq 61\n", PLAIN),
     "a stopwatch": ("t [mm:ss],f [Hz]\n0:00,61.5\n0:00.5,61.25\n0:01,61\n", PLAIN),

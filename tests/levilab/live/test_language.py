@@ -1,10 +1,7 @@
 """The live view in other languages: nothing stands outside of the table, and a choice stays."""
 
-from __future__ import annotations
-
 import json
 import re
-from typing import TYPE_CHECKING
 
 import pytest
 
@@ -14,15 +11,6 @@ from levilab.texts import text
 from levilab.texts.text import Text
 from support.browser import DESK, PHONE
 from support.live_pages import GrowingRun, address, publish, request, serving, spin_down, until
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from playwright.sync_api import Page
-
-    from levilab.live.practice.commands import PracticeEvent
-    from levilab.live.server import Hall
 
 NAME = "20261122T100000Z-spin-0000"
 #: What a person reads of a page: texts of elements, and of attributes.
@@ -39,21 +27,21 @@ class Silent:
     address = None
     may_record = False
 
-    def events(self) -> list[PracticeEvent]:
+    def events(self):
         return []
 
 
 @pytest.fixture
-def hall(tmp_path: Path) -> Iterator[Hall]:
+def hall(tmp_path):
     run = GrowingRun(tmp_path / "runs", NAME, note="note of a person")
     run.readings(spin_down(19))
     run.event("x", says=Text("the top follows the drive at {drive:.2f} Hz", drive=30.5).as_table())
     run.event("the top follows the drive up")
-    with serving(tmp_path / "runs", desk=Desk(Silent())) as hall:  # type: ignore[arg-type]
+    with serving(tmp_path / "runs", desk=Desk(Silent())) as hall:
         yield hall
 
 
-def measure(hall: Hall, run: str = "") -> None:
+def measure(hall, run=""):
     import numpy as np
 
     said = Text("the drive has lost the top: {again}", again="switch it off, match the spin, and go up more slowly")
@@ -67,7 +55,7 @@ def measure(hall: Hall, run: str = "") -> None:
 
 
 @pytest.fixture
-def made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def made_up(tmp_path, monkeypatch):
     """A language that is a file and nothing else: each text stands in brackets."""
     folder = tmp_path / "texts"
     folder.mkdir()
@@ -85,7 +73,7 @@ def made_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     text.language_of.cache_clear()
 
 
-def outside(page: Page) -> list[str]:
+def outside(page):
     """What a page says outside of brackets, with three letters or more."""
     found = []
     for one in page.evaluate(READ):
@@ -97,7 +85,7 @@ def outside(page: Page) -> list[str]:
 
 
 @pytest.mark.usefixtures("made_up")
-def test_a_language_that_is_a_new_file_says_everything_of_a_page(hall: Hall, watched: Callable[..., Page]) -> None:
+def test_a_language_that_is_a_new_file_says_everything_of_a_page(hall, watched):
     page = watched()
     page.goto(f"{address(hall)}?language=xx#{hall.doors.token}")
     until(page, "document.body.dataset.state === 'setup' && levilab.frames > 0")
@@ -122,9 +110,7 @@ def test_a_language_that_is_a_new_file_says_everything_of_a_page(hall: Hall, wat
 
 
 @pytest.mark.parametrize("viewport", [DESK, PHONE], ids=["desk", "phone"])
-def test_a_page_in_german_stays_german_and_nothing_is_cut(
-    viewport: dict[str, int], hall: Hall, watched: Callable[..., Page]
-) -> None:
+def test_a_page_in_german_stays_german_and_nothing_is_cut(viewport, hall, watched):
     page = watched(viewport=viewport)
     page.goto(address(hall, token=True))
     until(page, "levilab.frames > 0")
@@ -147,7 +133,7 @@ def test_a_page_in_german_stays_german_and_nothing_is_cut(
     assert page.evaluate(f"{wide}.map((one) => one.textContent)") == []
 
 
-def test_the_server_answers_in_the_language_of_the_page_that_asks(hall: Hall) -> None:
+def test_the_server_answers_in_the_language_of_the_page_that_asks(hall):
     head = {"Content-Type": "application/json"}
     said = [request(address(hall), f"/do?language={code}", b"{}", headers=head)[1] for code in ("en", "de", "zz")]
     assert [json.loads(one)["error"] for one in said] == [

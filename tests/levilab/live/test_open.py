@@ -1,13 +1,10 @@
 """A data file in the browser: dropped, corrected, kept, analyzed; and what the server takes and refuses."""
 
-from __future__ import annotations
-
 import json
 import math
 import shutil
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -18,13 +15,6 @@ from levilab.pipelines.correction import read_correction
 from levilab.texts.text import Text, as_tables
 from support.browser import PHONE
 from support.live_pages import PATIENCE_S, address, request, serving, until, wait_for
-
-if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable, Iterator
-
-    from playwright.sync_api import Page
-
-    from levilab.live.server import Hall
 
 TIME = 10.0 * np.arange(19)
 #: A spin-down by the disc law, from 38 Hz.
@@ -45,13 +35,13 @@ DROP = """([name, text]) => {
 
 
 @pytest.fixture(scope="module")
-def hall(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Hall]:
+def hall(tmp_path_factory):
     with serving(tmp_path_factory.mktemp("lab") / "runs") as hall:
         yield hall
 
 
 @pytest.mark.slow
-def test_a_file_is_dropped_corrected_kept_and_analyzed(hall: Hall, watched: Callable[..., Page]) -> None:
+def test_a_file_is_dropped_corrected_kept_and_analyzed(hall, watched):
     page = watched()
     page.goto(address(hall, token=True))
     until(page, "!document.getElementById('open').hidden")
@@ -90,7 +80,7 @@ def test_a_file_is_dropped_corrected_kept_and_analyzed(hall: Hall, watched: Call
         ("a sound", "sound.wav", "scope-files/recording.wav"),
     ],
 )
-def test_who_has_no_file_tries_one(hall: Hall, watched: Callable[..., Page], name: str, file: str, same: str) -> None:
+def test_who_has_no_file_tries_one(hall, watched, name, file, same):
     page = watched()
     page.goto(f"{address(hall)}open#{hall.doors.token}")
     until(page, "document.getElementById('kept-in').textContent")
@@ -108,13 +98,11 @@ ANSWER = """(() => {
 })()"""
 
 
-def test_an_answer_is_shown_in_one_order_and_nothing_before_it_is_whole(
-    hall: Hall, watched: Callable[..., Page], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_answer_is_shown_in_one_order_and_nothing_before_it_is_whole(hall, watched, monkeypatch):
     page, file, go_on = watched(), hall.root.parent / "steps.csv", {"analyze": Event(), "report": Event()}
     file.write_text("t [s],f [Hz]\n" + "".join(f"{t},{f}\n" for t, f in zip(TIME, SPIN, strict=True)))
 
-    def carry_out(words: list[str]) -> tuple[int, str]:
+    def carry_out(words):
         """Write first, and end later: what is there is not all yet."""
         if words[0] == "analyze":
             value = Text("C = {value:n}.", value="2.34(1)")
@@ -147,7 +135,7 @@ def test_an_answer_is_shown_in_one_order_and_nothing_before_it_is_whole(
     assert not page.locator("#progress").is_visible()
 
 
-def test_a_choice_in_the_table_changes_how_it_is_read(hall: Hall, watched: Callable[..., Page]) -> None:
+def test_a_choice_in_the_table_changes_how_it_is_read(hall, watched):
     page = watched(viewport=PHONE, color_scheme="dark")
     file = hall.root.parent / "three.csv"
     file.write_text(
@@ -174,7 +162,7 @@ def test_a_choice_in_the_table_changes_how_it_is_read(hall: Hall, watched: Calla
     assert page.evaluate(nameless) == []
 
 
-def test_nothing_that_a_file_contains_becomes_markup(hall: Hall, watched: Callable[..., Page]) -> None:
+def test_nothing_that_a_file_contains_becomes_markup(hall, watched):
     page = watched()
     hostile = '<img src=x onerror="window.hacked=1">'
     file = hall.root.parent / "hostile.csv"
@@ -185,7 +173,7 @@ def test_nothing_that_a_file_contains_becomes_markup(hall: Hall, watched: Callab
     assert page.evaluate("[window.hacked, document.images.length]") == [None, 0]
 
 
-def test_a_page_without_the_token_opens_nothing(hall: Hall, watched: Callable[..., Page]) -> None:
+def test_a_page_without_the_token_opens_nothing(hall, watched):
     page = watched()
     page.goto(f"{address(hall)}open")
     until(page, "document.getElementById('said').textContent.startsWith('This page may only look')")
@@ -194,13 +182,13 @@ def test_a_page_without_the_token_opens_nothing(hall: Hall, watched: Callable[..
 # --- the server ---
 
 
-def post(hall: Hall, path: str, body: bytes, **headers: str) -> tuple[int, dict[str, Any]]:
+def post(hall, path, body, **headers):
     """Status and answer to a page that has the token."""
     status, text = request(address(hall), path, body, headers={"X-Levilab-Token": hall.doors.token, **headers})
     return status, json.loads(text)
 
 
-def test_a_file_needs_the_token_and_a_page_of_this_server(hall: Hall) -> None:
+def test_a_file_needs_the_token_and_a_page_of_this_server(hall):
     before, name = dict(hall.opened.files), {"X-Levilab-Name": "a.csv"}
     for wrong in ({"X-Levilab-Token": "guess"}, {"X-Levilab-Token": "", "Origin": "http://evil.example"}):
         assert post(hall, "/file", b"t,f\n", **name, **wrong)[0] == 403
@@ -209,7 +197,7 @@ def test_a_file_needs_the_token_and_a_page_of_this_server(hall: Hall) -> None:
     assert hall.opened.files == before
 
 
-def test_a_file_that_breaks_off_on_its_way_leaves_nothing(hall: Hall) -> None:
+def test_a_file_that_breaks_off_on_its_way_leaves_nothing(hall):
     import socket
 
     head = f"POST /file HTTP/1.1\r\nHost: 127.0.0.1:{hall.doors.port}\r\nX-Levilab-Token: {hall.doors.token}\r\n"
@@ -220,14 +208,14 @@ def test_a_file_that_breaks_off_on_its_way_leaves_nothing(hall: Hall) -> None:
     assert not (hall.opened.folder / "torn.csv").exists()
 
 
-def test_a_file_replaces_a_link_and_is_not_written_through_it(hall: Hall, tmp_path: Path) -> None:
+def test_a_file_replaces_a_link_and_is_not_written_through_it(hall, tmp_path):
     hall.opened.folder.mkdir(parents=True, exist_ok=True)
     (hall.opened.folder / "link.csv").symlink_to(tmp_path / "elsewhere.csv")
     assert post(hall, "/file", b"t,f\n", **{"X-Levilab-Name": "link.csv"})[0] == 200
     assert not (tmp_path / "elsewhere.csv").exists()
 
 
-def test_a_file_that_is_too_large_leaves_nothing(hall: Hall, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_is_too_large_leaves_nothing(hall, monkeypatch):
     monkeypatch.setattr("levilab.live.opened.MOST_BYTES", 1000)
     status, answer = post(hall, "/file", 1001 * b"x", **{"X-Levilab-Name": "large.csv"})
     assert (status, "large.csv: is larger than" in answer["error"]) == (400, True)
@@ -243,28 +231,28 @@ def test_a_file_that_is_too_large_leaves_nothing(hall: Hall, monkeypatch: pytest
      {"do": "look at a file", "file": "KEY", "options": {"rate": "1; rm"}},
      {"do": "keep", "file": "KEY"}],
 )  # fmt: skip
-def test_what_is_no_command_for_a_file_is_refused_in_words(hall: Hall, tmp_path: Path, wanted: dict[str, Any]) -> None:
+def test_what_is_no_command_for_a_file_is_refused_in_words(hall, tmp_path, wanted):
     key = hall.opened.add(tmp_path / "my.csv")
     given = {name: key if value == "KEY" else value for name, value in wanted.items()}
     status, answer = post(hall, "/do", json.dumps(given).encode())
     assert (status, bool(answer["error"])) == (400, True)
 
 
-async def _pieces(*pieces: bytes) -> AsyncIterator[bytes]:
+async def _pieces(*pieces):
     for piece in pieces:
         yield piece
 
 
-async def _keep(opened: Opened, name: str, content: bytes) -> str:
+async def _keep(opened, name, content):
     return opened.files[await opened.receive(name, _pieces(content))].path.name
 
 
-def test_a_dropped_file_replaces_no_other(tmp_path: Path) -> None:
+def test_a_dropped_file_replaces_no_other(tmp_path):
     import asyncio
 
     opened = Opened(tmp_path)
 
-    async def drop() -> list[str]:
+    async def drop():
         return [await _keep(opened, "my.csv", content) for content in (b"one", b"two", b"one", b"two")]
 
     assert asyncio.run(drop()) == ["my.csv", "my (2).csv", "my.csv", "my (2).csv"]
@@ -276,21 +264,21 @@ def test_a_dropped_file_replaces_no_other(tmp_path: Path) -> None:
     "name",
     ["../x.csv", "/etc/passwd", "..", "", "a\x00b.csv", "con", 500 * "ü" + ".csv", 200 * "Ж", 99 * "😀" + ".txt"],
 )
-def test_a_dropped_file_stays_in_its_folder(tmp_path: Path, name: str) -> None:
+def test_a_dropped_file_stays_in_its_folder(tmp_path, name):
     plain = plain_name(name)
     assert (tmp_path / plain).resolve().parent == tmp_path.resolve()
     assert 0 < len(plain.encode()) <= LONGEST_NAME
     assert plain_name(plain) == plain
 
 
-def test_the_oldest_file_is_closed_when_many_are_open(tmp_path: Path) -> None:
+def test_the_oldest_file_is_closed_when_many_are_open(tmp_path):
     opened = Opened(tmp_path)
     keys = [opened.add(tmp_path / f"{k}.csv") for k in range(MOST_FILES + 3)]
     assert list(opened.files) == keys[3:]
 
 
 @pytest.mark.slow
-def test_a_film_is_followed_in_its_pictures_once_its_scale_is_known(hall: Hall, watched: Callable[..., Page]) -> None:
+def test_a_film_is_followed_in_its_pictures_once_its_scale_is_known(hall, watched):
     film = shutil.copy(SAMPLES / "video" / "top.mp4", hall.root.parent / "top.mp4")
     key = hall.opened.add(film)
     page = watched()
@@ -314,6 +302,6 @@ def test_a_film_is_followed_in_its_pictures_once_its_scale_is_known(hall: Hall, 
         hall.opened.look(key, {"rim_mm": "wide"})
 
 
-def test_the_words_of_a_file_are_options_of_the_command_line(tmp_path: Path) -> None:
+def test_the_words_of_a_file_are_options_of_the_command_line(tmp_path):
     one = OpenedFile(tmp_path, {"columns": {"t": "1", "f": "2 [rpm]"}, "rate": 100.0})
     assert one.words == ["--columns", "t=1,f=2 [rpm]", "--rate", "100.0"]

@@ -1,11 +1,8 @@
 """The live view in a browser: it loads, updates, survives, and takes what a run contains for text."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -14,14 +11,6 @@ from levilab.telemetry.messages import Count, Counting, Drive, Poses, Record, St
 from support.browser import DESK, PHONE, watch
 from support.live_pages import GrowingRun, address, publish, serving, spin_down, until
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from playwright.sync_api import Browser, Page
-
-    from levilab.live.server import Hall
-
 HOSTILE = '<img src=x onerror="window.hacked=1"><script>window.hacked=1</script>&lt;b&gt;'
 NAME = "20261122T090000Z-spin-0bad"
 #: What is said of the oscilloscope's screen to those who do not see it.
@@ -29,8 +18,8 @@ SAID = "document.getElementById('trace').getAttribute('aria-label')"
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    root: Path = tmp_path_factory.mktemp("runs")
+def runs(tmp_path_factory):
+    root = tmp_path_factory.mktemp("runs")
     hostile = GrowingRun(
         root, NAME, note=HOSTILE, instruments={"counter": {"identity": f"Maker,{HOSTILE},1,2", "driver": HOSTILE}}
     )
@@ -42,13 +31,13 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def hall(runs: Path) -> Iterator[Hall]:
+def hall(runs):
     with serving(runs) as hall:
         yield hall
 
 
 @pytest.fixture(scope="module")
-def shown(browser: Browser, hall: Hall) -> Iterator[Page]:
+def shown(browser, hall):
     """A page that shows a finished run whose texts are hostile."""
     with watch(browser, timezone_id="Asia/Kolkata") as page:
         page.goto(address(hall, NAME))
@@ -56,7 +45,7 @@ def shown(browser: Browser, hall: Hall) -> Iterator[Page]:
         yield page
 
 
-def test_a_finished_run_stands_there_with_its_fit(shown: Page) -> None:
+def test_a_finished_run_stands_there_with_its_fit(shown):
     assert shown.inner_text("#state-word") == "finished"
     assert shown.inner_text("#count") == "19"
     assert shown.inner_text("#fit-head").startswith("disc law   ω̇")  # no "so far", and nothing dashed beyond the last
@@ -65,7 +54,7 @@ def test_a_finished_run_stands_there_with_its_fit(shown: Page) -> None:
     assert shown.inner_text("#spin-value") == f"{spin_down(19)[-1][1]:.4f}"
 
 
-def test_nothing_that_a_run_contains_becomes_markup(shown: Page) -> None:
+def test_nothing_that_a_run_contains_becomes_markup(shown):
     made = "[window.hacked, document.images.length, document.querySelectorAll('main script').length]"
     assert shown.evaluate(made) == [None, 0, 0]
     assert HOSTILE in shown.inner_text("#event-list")
@@ -73,13 +62,13 @@ def test_nothing_that_a_run_contains_becomes_markup(shown: Page) -> None:
     assert HOSTILE in shown.text_content("#counter-model")
 
 
-def test_events_have_the_time_of_the_clock_on_the_wall_and_that_of_the_run(shown: Page) -> None:
+def test_events_have_the_time_of_the_clock_on_the_wall_and_that_of_the_run(shown):
     times = shown.evaluate("[...document.querySelectorAll('#event-list time')].map((one) => one.textContent)")
     assert times == ["14:33:00 (2:10)", "14:30:05", "13:30:00"]  # the latest first, also where it came before
     assert shown.inner_text("#events-key") == "in brackets: time of the run"
 
 
-def test_on_a_desk_nothing_scrolls(shown: Page) -> None:
+def test_on_a_desk_nothing_scrolls(shown):
     root = "document.documentElement"
     assert shown.evaluate(f"[{root}.scrollWidth, {root}.scrollHeight]") == [DESK["width"], DESK["height"]]
     cut_off = """[document.getElementById("state-text")].map((one) => {
@@ -92,7 +81,7 @@ def test_on_a_desk_nothing_scrolls(shown: Page) -> None:
     assert not shown.evaluate(cut_off)
 
 
-def test_every_control_has_a_name_and_every_part_a_heading(shown: Page) -> None:
+def test_every_control_has_a_name_and_every_part_a_heading(shown):
     nameless = """[...document.querySelectorAll("button, select, input, a[href], canvas, [tabindex='0'], output")]
         .filter((one) => !(one.getAttribute("aria-label") || one.textContent.trim()
                            || one.labels?.[0]?.textContent.trim()))
@@ -106,7 +95,7 @@ def test_every_control_has_a_name_and_every_part_a_heading(shown: Page) -> None:
     assert len(ids) == len(set(ids))
 
 
-def test_texts_stand_out_from_their_ground_by_day_and_by_night(shown: Page) -> None:
+def test_texts_stand_out_from_their_ground_by_day_and_by_night(shown):
     contrasts = """() => {
         const parts = (colour) => colour.match(/[\\d.]+/g).slice(0, 3).map((v) => v / 255)
             .map((v) => v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
@@ -126,7 +115,7 @@ def test_texts_stand_out_from_their_ground_by_day_and_by_night(shown: Page) -> N
         assert shown.evaluate(contrasts) == []
 
 
-def test_the_keys_go_from_reading_to_reading_and_pause(shown: Page) -> None:
+def test_the_keys_go_from_reading_to_reading_and_pause(shown):
     shown.focus("#plot")
     shown.keyboard.press("End")
     until(shown, "document.getElementById('pointer').textContent.includes('180 s')")
@@ -145,7 +134,7 @@ def test_the_keys_go_from_reading_to_reading_and_pause(shown: Page) -> None:
         shown.keyboard.press("Escape")
 
 
-def test_a_phone_scrolls_down_and_not_sideways(watched: Callable[..., Page], hall: Hall) -> None:
+def test_a_phone_scrolls_down_and_not_sideways(watched, hall):
     page = watched(viewport=PHONE, color_scheme="dark")
     page.goto(address(hall, NAME))
     until(page, "levilab.drawn > 0")
@@ -153,13 +142,13 @@ def test_a_phone_scrolls_down_and_not_sideways(watched: Callable[..., Page], hal
 
 
 @pytest.fixture
-def served(tmp_path: Path) -> Iterator[Hall]:
+def served(tmp_path):
     """A server of its own.  Before `page` among a test's fixtures, so that the page is closed first."""
     with serving(tmp_path) as hall:
         yield hall
 
 
-def test_a_run_grows_is_torn_reloaded_and_ends(served: Hall, page: Page, tmp_path: Path) -> None:
+def test_a_run_grows_is_torn_reloaded_and_ends(served, page, tmp_path):
     page.goto(address(served))
     until(page, "document.body.dataset.state === 'none'")
     run = GrowingRun(tmp_path, group="Group 7")
@@ -191,9 +180,7 @@ def test_a_run_grows_is_torn_reloaded_and_ends(served: Hall, page: Page, tmp_pat
     until(page, f"/^Group 7, spin-down, [-0-9/.,:APM ]+$/.test({chosen}) && document.body.dataset.state === 'finished'")
 
 
-def test_two_views_of_a_run_one_closed_and_opened_again_and_the_folder_deleted(
-    served: Hall, watched: Callable[..., Page], tmp_path: Path
-) -> None:
+def test_two_views_of_a_run_one_closed_and_opened_again_and_the_folder_deleted(served, watched, tmp_path):
     run = GrowingRun(tmp_path)
     one, two = watched(), watched()
     with run.running():
@@ -213,7 +200,7 @@ def test_two_views_of_a_run_one_closed_and_opened_again_and_the_folder_deleted(
         assert page.evaluate("levilab.data.count") == 5  # what was read stays
 
 
-def test_while_the_server_is_gone_the_list_of_runs_stays(served: Hall, page: Page, tmp_path: Path) -> None:
+def test_while_the_server_is_gone_the_list_of_runs_stays(served, page, tmp_path):
     """And no promise is rejected without a handler: Firefox reports one of a page that is left, too."""
     GrowingRun(tmp_path)
     page.goto(address(served))
@@ -224,7 +211,7 @@ def test_while_the_server_is_gone_the_list_of_runs_stays(served: Hall, page: Pag
     assert page.locator("#run option").count() == 1
 
 
-def test_what_the_bench_publishes_is_drawn(served: Hall, page: Page, tmp_path: Path) -> None:
+def test_what_the_bench_publishes_is_drawn(served, page, tmp_path):
     run = GrowingRun(tmp_path)
     page.goto(address(served, run.folder.name))
     until(page, "levilab.frames > 0")
@@ -277,7 +264,7 @@ WRITTEN = """(frames) => new Promise((done) => {
 })"""
 
 
-def test_who_hears_the_page_hears_events_and_not_each_number(served: Hall, page: Page, tmp_path: Path) -> None:
+def test_who_hears_the_page_hears_events_and_not_each_number(served, page, tmp_path):
     run = GrowingRun(tmp_path)
     watch = served.watches
     with run.running():
@@ -301,9 +288,7 @@ def test_who_hears_the_page_hears_events_and_not_each_number(served: Hall, page:
     assert page.evaluate("[...document.querySelectorAll('output')].every((one) => one.ariaLive === 'off')")
 
 
-def test_the_last_minutes_of_the_bench_are_drawn_before_the_first_reading(
-    served: Hall, page: Page, tmp_path: Path
-) -> None:
+def test_the_last_minutes_of_the_bench_are_drawn_before_the_first_reading(served, page, tmp_path):
     """Without a drive, with one, without light pulses; then only where a person wants them."""
     run = GrowingRun(tmp_path)
     watch = served.watches
@@ -330,7 +315,7 @@ def test_the_last_minutes_of_the_bench_are_drawn_before_the_first_reading(
         until(page, "document.getElementById('plot').getAttribute('aria-label').startsWith('the last ')")
 
 
-def test_a_count_that_is_old_is_marked_as_old(served: Hall, page: Page, tmp_path: Path) -> None:
+def test_a_count_that_is_old_is_marked_as_old(served, page, tmp_path):
     """As on the ramp of a run, where nothing is counted: the drive goes on, and the top is not said to lag behind."""
     run = GrowingRun(tmp_path)
     with run.running():
@@ -347,9 +332,7 @@ def test_a_count_that_is_old_is_marked_as_old(served: Hall, page: Page, tmp_path
         assert page.inner_text("#lock") == "not counted now"
 
 
-def test_a_fall_is_replayed_and_what_is_drawn_is_saved(
-    served: Hall, watched: Callable[..., Page], tmp_path: Path
-) -> None:
+def test_a_fall_is_replayed_and_what_is_drawn_is_saved(served, watched, tmp_path):
     """Where less motion is wanted the page shows a picture a second, a replay too."""
     run = GrowingRun(tmp_path)
     page = watched()
@@ -410,7 +393,7 @@ FLASHES = """async () => {
 }"""
 
 
-def test_the_strobe_lamp_flashes_once_in_each_period_of_the_drive(shown: Page) -> None:
+def test_the_strobe_lamp_flashes_once_in_each_period_of_the_drive(shown):
     found = shown.evaluate(FLASHES)
     # 30.3 turns by 2.01 s: turn 31 comes 0.7/40 s later, and turn 50 at 2.5025 s
     ramp = [2.01 - 0.3 / 40, 2.01 + (49 - 30.3) / 40]
@@ -437,7 +420,7 @@ RAMP = """async () => {
 }"""
 
 
-def test_a_count_is_compared_with_the_drive_of_its_own_time(shown: Page) -> None:
+def test_a_count_is_compared_with_the_drive_of_its_own_time(shown):
     """On a ramp a count that is kept would fall behind a drive that the top follows."""
     counts, latest = shown.evaluate(RAMP)
     *of_ramp, gap, low, jump, high = counts  # 28.3 and 29.95 Hz are two tops, and no line joins them
@@ -466,7 +449,7 @@ TRIGGERED = """async (source) => {
 }"""
 
 
-def test_the_page_triggers_what_a_virtual_bench_draws(shown: Page) -> None:
+def test_the_page_triggers_what_a_virtual_bench_draws(shown):
     """A wave stands still wherever its record begins; a drive that is off leaves the trigger to the tape."""
     for tape, drive, said in shown.evaluate(TRIGGERED, "drive"):
         rise = (0.5 - (2e-3 * np.log(2)) ** 0.5) / 30
@@ -476,7 +459,7 @@ def test_the_page_triggers_what_a_virtual_bench_draws(shown: Page) -> None:
     assert [said for *_, said in shown.evaluate(TRIGGERED, "off")] == 3 * ["triggered by the tape"]
 
 
-def test_a_million_readings_are_drawn_from_a_few_thousand_numbers(served: Hall, page: Page, tmp_path: Path) -> None:
+def test_a_million_readings_are_drawn_from_a_few_thousand_numbers(served, page, tmp_path):
     run = GrowingRun(tmp_path)
     n = 1_000_000
     rows = np.stack([np.arange(n) * 0.04, 30 + np.sin(np.arange(n) / 1e5), np.full(n, 0.03)], axis=1)
@@ -489,10 +472,3 @@ def test_a_million_readings_are_drawn_from_a_few_thousand_numbers(served: Hall, 
     until(page, f"levilab.data.count === {n + 1}")
     assert page.evaluate("[levilab.data.readings.x.length < 2000, levilab.data.readings.single]") == [True, False]
     assert len(followed.readings.groups()) <= 8192
-
-
-def test_three_js_and_its_controls_come_out_of_nicegui(page: Page, hall: Hall) -> None:
-    page.goto(address(hall))
-    found = page.evaluate("import('/page/three.js').then((m) => [m.THREE.REVISION, typeof m.OrbitControls])")
-    assert int(found[0]) >= 160
-    assert found[1] == "function"

@@ -1,12 +1,9 @@
 """The whole experiment in the browser, as a student without an instrument does it, at the bench's fastest speed."""
 
-from __future__ import annotations
-
 import json
 import threading
 import time
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -23,28 +20,18 @@ from levilab.telemetry.messages import Count, Drive, Poses, State
 from support.browser import PHONE
 from support.live_pages import PATIENCE_S, GrowingRun, address, publish, serving, spin_down, until
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-    from pathlib import Path
-
-    from playwright.sync_api import Page, Route
-
-    from levilab.live.practice.commands import PracticeEvent
-    from levilab.live.server import Hall
-
-
 OLDER = "20251122T100000Z-spin-0000"
 
 
 @pytest.fixture(scope="module")
-def older(tmp_path_factory: pytest.TempPathFactory) -> GrowingRun:
+def older(tmp_path_factory):
     run = GrowingRun(tmp_path_factory.mktemp("runs"), OLDER)
     run.readings(spin_down(19))
     return run
 
 
 @pytest.fixture(scope="module")
-def served(older: GrowingRun) -> Iterator[Hall]:
+def served(older):
     out = older.folder.parent
     with PracticeBench(out) as bench, serving(out, desk=Desk(bench)) as hall:
         yield hall
@@ -61,7 +48,7 @@ NEEDED = "document.querySelector('.needed')?.id"
 DONE = "[...document.querySelectorAll('#guide .done')].map((one) => one.dataset.step).join()"
 
 
-def see_another_program_record(page: Page, served: Hall, older: GrowingRun) -> None:
+def see_another_program_record(page, served, older):
     """The bench of that program is shown, and the controls, which are of the one for practice, are off meanwhile."""
     scene = preset("practice").as_table()
     scene["base"] |= {"outer_radius_m": 0.07}
@@ -89,23 +76,11 @@ def see_another_program_record(page: Page, served: Hall, older: GrowingRun) -> N
     until(page, f"levilab.space.parts.base.outer === {outer}")  # and those of the bench for practice
 
 
-def turn_by_itself(page: Page, served: Hall, older: GrowingRun) -> None:
-    """A page that chose no run turns to that of another program, with the top of that program."""
-    assert page.evaluate("levilab.space.parts.base.outer") != 0.07
-    with older.running():
-        served.watches[""].turn_to(older.folder)  # as the server does within two seconds
-        until(page, f"levilab.seen.run === '{OLDER}' && levilab.seen.source === 1")
-        publish(served.watches[""], State(9.0, folder=str(older.folder)), POSE)
-        until(page, "levilab.space.parts.base.outer === 0.07")
-        assert page.evaluate("!document.getElementById('own').hidden")
-    older.say(status="finished")
-
-
-def record_some_readings(page: Page) -> None:
+def record_some_readings(page):
     """Meanwhile the oscilloscope, which the run does not read, shows the simulated signals."""
     own = page.get_by_role("button", name="To the practice bench")
     assert own.is_visible()  # an older run is shown
-    listings: list[Route] = []
+    listings = []
     page.route("**/runs", lambda route: listings.append(route))  # noqa: PLW0108 - Playwright takes no method of a list
     page.click("#back")  # it may be down by now
     page.click("#record")
@@ -126,7 +101,7 @@ def record_some_readings(page: Page) -> None:
     page.click("#record")
 
 
-def type_into_the_fields(page: Page) -> None:
+def type_into_the_fields(page):
     """Numbers with a comma and with a point are taken; what is no number, or none that is allowed, is refused."""
     for field, typed, said in (
         ("frequency", "333", "from 1 to 100, not 333"),
@@ -150,7 +125,7 @@ def type_into_the_fields(page: Page) -> None:
     page.keyboard.press("Tab")
 
 
-def change_what_if(page: Page) -> None:
+def change_what_if(page):
     """A slider has its effect at once; the task under way stands in the place of the guide."""
     slider = "document.querySelector('#quantities input')"
     assert page.locator("#quantities input").count() == len(WHAT_IF)
@@ -167,7 +142,7 @@ def change_what_if(page: Page) -> None:
     page.get_by_role("tab", name="Measure").click()
 
 
-def ask_which_washers(page: Page) -> None:
+def ask_which_washers(page):
     """The questions of levilab tune, with its advice: the washers are put on at the bench."""
     page.evaluate("document.getElementById('washers-open').click()")
     page.fill("#tune-top", "24.1 stones")
@@ -201,16 +176,14 @@ ANOTHER_TOP = """() => {
 }"""
 
 
-def record_quickly(route: Route) -> None:
+def record_quickly(route):
     """Give a run that a page asks for the settings of a test."""
     wanted = json.loads(route.request.post_data or "{}")
     more = {"settings": QUICK} if wanted["do"] == "record a run" else {}
     route.continue_(post_data=json.dumps(wanted | more))
 
 
-def test_a_student_drives_records_and_analyzes(
-    served: Hall, older: GrowingRun, page: Page, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_student_drives_records_and_analyzes(served, older, page, monkeypatch):
     page.route("**/do?*", record_quickly)
     page.goto(address(served, token=True))
     until(page, "levilab.data.bench?.last.spin_frequency_hz && levilab.space?.frames && levilab.space.state")
@@ -260,7 +233,6 @@ def test_a_student_drives_records_and_analyzes(
     until(page, f"{DONE} === 'drive,tune,record,analyze'")  # the run tuned the drive up
     assert sorted(path.name for path in served.root.iterdir()) == [OLDER, name]
     assert (served.root / name / "result.json").exists()
-    turn_by_itself(page, served, older)
 
 
 class Starting:
@@ -269,17 +241,17 @@ class Starting:
     address = None
     may_record = False
 
-    def events(self) -> list[PracticeEvent]:
+    def events(self):
         return []
 
 
 @pytest.fixture
-def starting(tmp_path: Path) -> Iterator[Hall]:
-    with serving(tmp_path, desk=Desk(Starting())) as hall:  # type: ignore[arg-type]
+def starting(tmp_path):
+    with serving(tmp_path, desk=Desk(Starting())) as hall:
         yield hall
 
 
-def test_nothing_can_be_pressed_before_the_bench_is_there(starting: Hall, watched: Callable[..., Page]) -> None:
+def test_nothing_can_be_pressed_before_the_bench_is_there(starting, watched):
     page = watched(viewport=PHONE)
     page.goto(address(starting, token=True))
     until(page, "document.body.dataset.state === 'setup' && levilab.frames > 0")
@@ -310,7 +282,7 @@ def test_nothing_can_be_pressed_before_the_bench_is_there(starting: Hall, watche
     until(page, "document.body.dataset.state === 'slow'")  # and not silent: it has not ended
 
 
-def test_a_task_opens_the_control_that_it_needs_and_leads_to_the_next(starting: Hall, page: Page) -> None:
+def test_a_task_opens_the_control_that_it_needs_and_leads_to_the_next(starting, page):
     page.goto(address(starting, token=True))
     until(page, "levilab.frames > 0")
     here = State(2.0, last={"spin_frequency_hz": 30.0}, drive=Drive("SQU", 30.0, 10.0), count=Count(30.0, 1.8, 0.5))
@@ -330,7 +302,7 @@ def test_a_task_opens_the_control_that_it_needs_and_leads_to_the_next(starting: 
     assert page.inner_text("#tasks-done") == "2/6"
 
 
-def test_after_a_run_the_last_minutes_show_what_a_person_does(starting: Hall, page: Page, tmp_path: Path) -> None:
+def test_after_a_run_the_last_minutes_show_what_a_person_does(starting, page, tmp_path):
     run = GrowingRun(tmp_path, OLDER)
     run.readings(spin_down(19))
     page.goto(address(starting, token=True))
@@ -355,13 +327,11 @@ def test_after_a_run_the_last_minutes_show_what_a_person_does(starting: Hall, pa
     until(page, f"{is_of_minutes} && document.body.dataset.state === 'idle'")
 
 
-def test_a_result_that_was_closed_early_is_opened_again(
-    starting: Hall, page: Page, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_result_that_was_closed_early_is_opened_again(starting, page, tmp_path, monkeypatch):
     run, closed, asked = GrowingRun(tmp_path, OLDER), threading.Event(), []
     run.readings(spin_down(19))
 
-    def answer(words: Sequence[str]) -> tuple[int, str]:
+    def answer(words):
         asked.append(words[0])
         if words[0] == "analyze":
             (run.folder / "result.json").write_text('{"sentences": ["The disc law."]}', encoding="utf-8")
@@ -406,7 +376,7 @@ STAYS_IN_VIEW = """() => {
 }"""
 
 
-def show_a_top(starting: Hall, page: Page) -> None:
+def show_a_top(starting, page):
     """A top that stands still, on a bench that takes commands."""
     page.goto(address(starting, token=True))
     until(page, "levilab.frames > 0")
@@ -418,9 +388,7 @@ def show_a_top(starting: Hall, page: Page) -> None:
 @pytest.mark.parametrize(
     ("width", "height", "whole"), [(1280, 800, True), (1024, 768, True), (390, 844, True), (640, 400, False)]
 )
-def test_controls_and_top_are_seen_together(
-    starting: Hall, watched: Callable[..., Page], width: int, height: int, whole: bool
-) -> None:
+def test_controls_and_top_are_seen_together(starting, watched, width, height, whole):
     """640 × 400 is a window of 1280 × 800 at a zoom of 200 %: there the controls scroll beside the top."""
     page = watched(viewport={"width": width, "height": height})
     show_a_top(starting, page)
@@ -441,9 +409,7 @@ FOCUSED = """() => {
 
 
 @pytest.mark.parametrize(("width", "height"), [(390, 844), (640, 400)])
-def test_the_keyboard_comes_to_each_control_in_order_and_sees_it(
-    starting: Hall, watched: Callable[..., Page], width: int, height: int
-) -> None:
+def test_the_keyboard_comes_to_each_control_in_order_and_sees_it(starting, watched, width, height):
     """Nothing that stays in view covers what has the focus."""
     page = watched(viewport={"width": width, "height": height})
     show_a_top(starting, page)
@@ -462,7 +428,7 @@ def test_the_keyboard_comes_to_each_control_in_order_and_sees_it(
     assert not page.locator("#keys").is_visible()
 
 
-def test_fingers_turn_the_top_come_nearer_and_scroll(starting: Hall, watched: Callable[..., Page]) -> None:
+def test_fingers_turn_the_top_come_nearer_and_scroll(starting, watched):
     """A phone: one finger from side to side, two apart, and one upwards."""
     page = watched(viewport=PHONE, has_touch=True)
     show_a_top(starting, page)
@@ -470,7 +436,7 @@ def test_fingers_turn_the_top_come_nearer_and_scroll(starting: Hall, watched: Ca
     assert box
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
-    def draw(*paths: tuple[float, float]) -> bytes:
+    def draw(*paths):
         """Move a finger for each path, and return the picture then."""
         frames = page.evaluate("levilab.space.frames")
         for k in range(9):
@@ -487,7 +453,7 @@ def test_fingers_turn_the_top_come_nearer_and_scroll(starting: Hall, watched: Ca
     until(page, "scrollY > 40")
 
 
-def test_an_axis_has_two_numbers_at_least(starting: Hall, page: Page) -> None:
+def test_an_axis_has_two_numbers_at_least(starting, page):
     page.goto(address(starting))
     for low, high in ((29.1, 31.5), (29.6, 30.4), (20.0, 35.0), (0.0, 1e-3)):
         found = page.evaluate(f"import('/page/plot.js').then(({{ticks}}) => ticks({low}, {high}, 2))")
@@ -495,7 +461,7 @@ def test_an_axis_has_two_numbers_at_least(starting: Hall, page: Page) -> None:
         assert low - 1e-9 < found[0] < found[-1] < high + 1e-9  # rounding
 
 
-def test_a_page_without_the_token_may_only_look(served: Hall, page: Page) -> None:
+def test_a_page_without_the_token_may_only_look(served, page):
     page.goto(address(served))
     until(page, "document.getElementById('controls').disabled")
     assert "only look" in page.inner_text("#said")

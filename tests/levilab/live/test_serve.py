@@ -1,7 +1,5 @@
 """The command: its port, its ends, and what it needs."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal
@@ -10,7 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 from queue import Queue
-from typing import TYPE_CHECKING, Any, Self
 
 import pytest
 
@@ -22,15 +19,12 @@ from levilab.live.serve import LiveOptions, ViewServer, farewell, serve_live
 from support.commands import command
 from support.live_pages import GrowingRun
 
-if TYPE_CHECKING:
-    from levilab.live.practice.commands import PracticeEvent
-
 #: Long enough for a machine that is busy [s]; a test that passes waits less.
 PATIENCE_S = 60.0
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 
 
-def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:
+def test_a_port_that_is_taken_is_named(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         ended = command("live", "--no-open", "--port", str(port), cwd=tmp_path)
@@ -39,19 +33,19 @@ def test_a_port_that_is_taken_is_named(tmp_path: Path) -> None:
     assert "--port" in ended.err
 
 
-def test_a_run_that_is_not_there_is_named(tmp_path: Path) -> None:
+def test_a_run_that_is_not_there_is_named(tmp_path):
     ended = command("live", "nothere", "--no-open", "--port", "0", cwd=tmp_path)
     assert ended.status == 1
     assert "nothere: there is no such run" in ended.err
 
 
-def test_a_run_and_a_bench_for_practice_exclude_each_other(tmp_path: Path) -> None:
+def test_a_run_and_a_bench_for_practice_exclude_each_other(tmp_path):
     GrowingRun(tmp_path, "one")
     ended = command("live", "one", "--mock", "--no-open", "--port", "0", cwd=tmp_path)
     assert (ended.status, "--mock" in ended.err) == (2, True)
 
 
-def test_without_the_extra_the_message_names_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_the_extra_the_message_names_it(monkeypatch, tmp_path):
     monkeypatch.setattr("levilab.animation.three.find_spec", lambda _: None)
     with pytest.raises(MissingThree, match=r'pip install "\.\[live\]"'):
         three_js("the live view")
@@ -59,7 +53,7 @@ def test_without_the_extra_the_message_names_it(monkeypatch: pytest.MonkeyPatch,
     assert (ended.status, ".[live]" in ended.err) == (1, True)
 
 
-def test_the_help_loads_no_server() -> None:
+def test_the_help_loads_no_server():
     code = (
         "import sys\nfrom levilab.cli.main import app\n"
         "try: app(['live', '--help'])\nexcept SystemExit: pass\n"
@@ -68,7 +62,7 @@ def test_the_help_loads_no_server() -> None:
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
 
 
-def test_ctrl_c_says_at_once_what_the_end_waits_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_says_at_once_what_the_end_waits_for(tmp_path, monkeypatch):
     bench = PracticeBench(tmp_path)
     assert farewell(None) == ""
     assert farewell(bench) == "the bench is switched off"
@@ -79,7 +73,7 @@ def test_ctrl_c_says_at_once_what_the_end_waits_for(tmp_path: Path, monkeypatch:
     )
 
 
-def test_what_is_damaged_of_a_result_is_not_shown(tmp_path: Path) -> None:
+def test_what_is_damaged_of_a_result_is_not_shown(tmp_path):
     value = {"template": "C = {value:n}.", "values": {"value": "2.34(1)"}}
     for result, said in (
         ({"sentences": [value, 3, {"template": "{other}", "values": {}}, {}, None]}, ["C = 2.34(1)."]),
@@ -91,12 +85,12 @@ def test_what_is_damaged_of_a_result_is_not_shown(tmp_path: Path) -> None:
 
 
 @pytest.fixture
-def started(monkeypatch: pytest.MonkeyPatch) -> Queue[subprocess.Popen[str]]:
+def started(monkeypatch):
     """The processes of analyses, as they are started."""
-    processes: Queue[subprocess.Popen[str]] = Queue()
+    processes = Queue()
     start = subprocess.Popen
 
-    def note(*args: Any, **kwargs: Any) -> subprocess.Popen[str]:
+    def note(*args, **kwargs):
         process = start(*args, **kwargs)
         processes.put(process)
         return process
@@ -105,7 +99,7 @@ def started(monkeypatch: pytest.MonkeyPatch) -> Queue[subprocess.Popen[str]]:
     return processes
 
 
-def test_an_analysis_ends_with_the_view(tmp_path: Path, started: Queue[subprocess.Popen[str]]) -> None:
+def test_an_analysis_ends_with_the_view(tmp_path, started):
     analyses = Analyses()
     analyses.begin(tmp_path)
     process = started.get(timeout=PATIENCE_S)
@@ -129,9 +123,7 @@ def test_an_analysis_ends_with_the_view(tmp_path: Path, started: Queue[subproces
     assert "verdict" not in about
 
 
-def test_an_analysis_that_takes_too_long_is_killed(
-    tmp_path: Path, started: Queue[subprocess.Popen[str]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_analysis_that_takes_too_long_is_killed(tmp_path, started, monkeypatch):
     monkeypatch.setattr("levilab.live.analyzed._LONGEST_S", 0.0)
     analyses = Analyses()
     analyses.begin(tmp_path)
@@ -141,10 +133,10 @@ def test_an_analysis_that_takes_too_long_is_killed(
     assert "was given up" in analyses.failed[tmp_path]
 
 
-def test_a_second_analysis_replaces_the_result_that_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_second_analysis_replaces_the_result_that_is_shown(tmp_path, monkeypatch):
     analyses, verdicts, meanwhile = Analyses(), iter(["first", "the second"]), []
 
-    def analyze(words: list[str]) -> tuple[int, str]:
+    def analyze(words):
         if words[0] == "analyze":
             meanwhile.append(analyses.about(tmp_path).get("verdict"))
             text = json.dumps({"text": next(verdicts)})
@@ -162,20 +154,20 @@ def test_a_second_analysis_replaces_the_result_that_is_shown(tmp_path: Path, mon
 class Bench(PracticeBench):
     """A bench without a process.  Signals come while it is looked at, and while it is closed."""
 
-    def start(self) -> Self:
+    def start(self):
         return self
 
-    def events(self) -> list[PracticeEvent]:
+    def events(self):
         signal.raise_signal(signal.SIGINT)
         return []
 
-    def close(self) -> None:
+    def close(self):
         for number in SIGNALS:
             signal.raise_signal(number)
 
 
-def test_no_signal_is_given_back_before_the_bench_is_closed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    given_back: list[int] = []
+def test_no_signal_is_given_back_before_the_bench_is_closed(tmp_path, monkeypatch):
+    given_back = []
     before = {number: signal.signal(number, lambda number, _: given_back.append(number)) for number in SIGNALS}
     monkeypatch.setattr("levilab.live.serve.PracticeBench", Bench)
     try:
@@ -187,7 +179,7 @@ def test_no_signal_is_given_back_before_the_bench_is_closed(tmp_path: Path, monk
     assert ended.err.splitlines()[-2:] == ["the bench is switched off", "levilab: the view is closed"]
 
 
-def test_a_signal_before_the_server_leaves_it_unstarted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_signal_before_the_server_leaves_it_unstarted(tmp_path, monkeypatch):
     monkeypatch.setattr(ViewServer, "run", lambda *_, **__: pytest.fail("it serves"))
     end = End()
     end(signal.SIGTERM, None)
@@ -196,7 +188,7 @@ def test_a_signal_before_the_server_leaves_it_unstarted(tmp_path: Path, monkeypa
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no signal to one process alone")
 @pytest.mark.parametrize("name", ["SIGINT", "SIGHUP"])  # the server, too, listens to the first, and as to SIGTERM
-def test_a_signal_ends_the_view_in_one_line(tmp_path: Path, name: str) -> None:
+def test_a_signal_ends_the_view_in_one_line(tmp_path, name):
     words = [sys.executable, "-m", "levilab", "live", "--no-open", "--port", "0"]
     process = subprocess.Popen(
         words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
@@ -216,9 +208,7 @@ def test_a_signal_ends_the_view_in_one_line(tmp_path: Path, name: str) -> None:
 
 @pytest.mark.parametrize("words", [("live", "--mock", "--no-open", "--port", "0"), ("acquire", "field", "--mock")])
 @pytest.mark.parametrize("out", ["taken", "taken/runs"])
-def test_a_file_in_the_place_of_the_folder_of_runs_is_refused(
-    tmp_path: Path, words: tuple[str, ...], out: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_file_in_the_place_of_the_folder_of_runs_is_refused(tmp_path, words, out, monkeypatch):
     monkeypatch.setattr(PracticeBench, "start", lambda _: pytest.fail("the bench starts"))
     (tmp_path / "taken").touch()
     ended = command(*words, "--out", out, cwd=tmp_path)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from levilab.motion.figure import PIECES, motion_figure
-from levilab.motion.lines import lines_of, rate_for
+from levilab.motion.lines import rate_for
 from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation
 from levilab.motion.summary import as_document, summarise
 from levilab.motion.table import print_motion
@@ -237,11 +237,6 @@ def test_an_unlocked_top_has_the_wobble_once_a_turn_beside_the_drive():
     place = {line.name: line.frequency for line in found.lines.lines}
     assert place["drive"] == pytest.approx(35.0, abs=0.01)
     assert place["wobble, once a turn"] == pytest.approx(30.0, abs=0.2)
-
-
-def test_what_does_not_last_or_does_not_move_has_no_lines():
-    assert lines_of(simulate(preset("undriven"), 0.5, rate=400.0)).lines == ()
-    assert lines_of(simulate(preset("friction").changed({"observed": "spin"}), 30.0)).lines == ()
 
 
 # --- the figure ---

@@ -1,7 +1,5 @@
 """levilab.acquire, load, analyze and simulate, as scripts and notebooks call them."""
 
-from __future__ import annotations
-
 import gc
 import hashlib
 import inspect
@@ -11,7 +9,6 @@ import shutil
 import subprocess
 import sys
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -33,10 +30,6 @@ from support.commands import command
 from support.paths import SAMPLE_DATA
 from support.waiting import HANG_GUARD_S
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
 DEVICE = SAMPLE_DATA / "device.toml"
 RECORD = SAMPLE_DATA / "scope-files" / "rigol-ds1000z.csv"
 
@@ -49,7 +42,7 @@ CASES = {
 }
 
 
-def test_importing_levilab_loads_nothing_heavy() -> None:
+def test_importing_levilab_loads_nothing_heavy():
     heavy = {
         "numpy",
         "pandas",
@@ -73,7 +66,7 @@ def test_importing_levilab_loads_nothing_heavy() -> None:
 
 
 @pytest.mark.parametrize("kind", CASES)
-def test_run_file_and_dataframe_of_the_same_readings_agree(kind: str, tmp_path: Path) -> None:
+def test_run_file_and_dataframe_of_the_same_readings_agree(kind, tmp_path):
     folder, options, name, truth = CASES[kind]
     run = levilab.load(SAMPLE_DATA / folder / "run.json")  # its folder is meant
     of_run = levilab.analyze(run)
@@ -89,7 +82,7 @@ def test_run_file_and_dataframe_of_the_same_readings_agree(kind: str, tmp_path: 
     assert quantity.value == pytest.approx(truth, abs=4 * quantity.u)
 
 
-def test_records_of_light_are_analyzed_from_run_file_and_dataframe() -> None:
+def test_records_of_light_are_analyzed_from_run_file_and_dataframe():
     of_run, of_file = levilab.analyze(SAMPLE_DATA / "trace-tape"), levilab.analyze(RECORD)
     assert of_run.kind == of_file.kind == "spin"
     assert 28 < float(of_run.values["frequency"]) < 30  # the tops of two drives that coast
@@ -102,16 +95,16 @@ def test_records_of_light_are_analyzed_from_run_file_and_dataframe() -> None:
 
 
 @pytest.fixture(scope="module")
-def four() -> Any:
+def four():
     return levilab.analyze([SAMPLE_DATA / f"spin-down-{k}" for k in (1, 2, 3, 4)])
 
 
 @pytest.fixture(scope="module")
-def limits() -> Any:
+def limits():
     return levilab.analyze(SAMPLE_DATA / "lower-limits")
 
 
-def test_values_have_a_row_for_each_input_and_all_together(four: Any) -> None:
+def test_values_have_a_row_for_each_input_and_all_together(four):
     table = four.to_dataframe().set_index(["input", "name"])
     constants = table.loc[[f"spin-down-{k}" for k in (1, 2, 3, 4)]].xs("c32", level="name")
     assert constants["value"].mean() == pytest.approx(table.loc[("together", "c32"), "value"])
@@ -119,7 +112,7 @@ def test_values_have_a_row_for_each_input_and_all_together(four: Any) -> None:
     assert four.by_input["spin-down-2"]["c32"].u == constants.loc["spin-down-2", "u"]
 
 
-def test_readings_stand_with_their_residuals(four: Any) -> None:
+def test_readings_stand_with_their_residuals(four):
     readings = four.to_dataframe("readings")
     assert len(readings) == 78
     models = four.to_dataframe("models").set_index(["model", "name"])
@@ -130,7 +123,7 @@ def test_readings_stand_with_their_residuals(four: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", ANALYSES)
-def test_every_analysis_has_readings_with_the_residuals_of_its_result(kind: str) -> None:
+def test_every_analysis_has_readings_with_the_residuals_of_its_result(kind):
     folder = {"spin": "trace-laser", "sway": "sway/track.csv", "hold": "hold/45-hz", "video": "video"}
     folder |= {name: case[0] for name, case in CASES.items()}
     of_film = {"rim_m": 0.03, "stop_s": 1.0} if kind == "video" and pytest.importorskip("av") else {}
@@ -145,7 +138,7 @@ def test_every_analysis_has_readings_with_the_residuals_of_its_result(kind: str)
     assert len(fits) == (kind in {"spindown", "field", "precession"})
 
 
-def test_outliers_keep_their_row_and_have_no_residual() -> None:
+def test_outliers_keep_their_row_and_have_no_residual():
     frame = levilab.load(SAMPLE_DATA / "spin-down-1").to_dataframe()
     frame.loc[7, "spin_frequency_hz"] *= 2
     readings = levilab.analyze(frame).to_dataframe("readings")
@@ -153,21 +146,19 @@ def test_outliers_keep_their_row_and_have_no_residual() -> None:
     assert readings.index[readings["residual_hz"].isna()].tolist() == [7]
 
 
-def test_the_short_form_of_a_result_is_a_few_lines(four: Any, limits: Any) -> None:
+def test_the_short_form_of_a_result_is_a_few_lines(four, limits):
     assert repr(limits).splitlines()[:2] == ["<limit of lower-limits", "  mean = 21.86(8) Hz"]
     assert len(repr(four).splitlines()) <= 7
 
 
-def test_the_summary_is_what_the_command_line_prints_also_in_a_notebook(
-    limits: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_summary_is_what_the_command_line_prints_also_in_a_notebook(limits, tmp_path, monkeypatch):
     printed = command("analyze", "limit", SAMPLE_DATA / "lower-limits", "--no-save", cwd=tmp_path)
     monkeypatch.setattr("rich.console._is_jupyter", lambda: True)
     assert limits.summary().split() == printed.out.split()
 
 
 @pytest.mark.usefixtures("drawn_figures")
-def test_a_notebook_shows_results_escaped_and_short(tmp_path: Path) -> None:
+def test_a_notebook_shows_results_escaped_and_short(tmp_path):
     folder = tmp_path / "lower-limits"
     shutil.copytree(SAMPLE_DATA / "lower-limits", folder)
     record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
@@ -185,7 +176,7 @@ def test_a_notebook_shows_results_escaped_and_short(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", ANALYSES)
 @pytest.mark.usefixtures("drawn_figures")
-def test_a_cell_is_short_and_folds(kind: str) -> None:
+def test_a_cell_is_short_and_folds(kind):
     if kind == "video":
         return  # its film takes seconds, and its cell is as all others
     folder = {"spin": "trace-laser", "sway": "sway/track.csv", "hold": "hold/45-hz"}
@@ -194,7 +185,7 @@ def test_a_cell_is_short_and_folds(kind: str) -> None:
     assert html.count("<details") == html.count("</details>") > 1
 
 
-def test_analyze_writes_nothing_and_save_does(tmp_path: Path) -> None:
+def test_analyze_writes_nothing_and_save_does(tmp_path):
     folder = tmp_path / "lower-limits"
     shutil.copytree(SAMPLE_DATA / "lower-limits", folder)
     before = sorted(tmp_path.rglob("*"))
@@ -207,7 +198,7 @@ def test_analyze_writes_nothing_and_save_does(tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_saved_result_of_a_dataframe_has_its_readings_beside(tmp_path: Path) -> None:
+def test_a_saved_result_of_a_dataframe_has_its_readings_beside(tmp_path):
     result = levilab.analyze(pd.DataFrame({"spin_frequency_hz": [21.1, 22.2, 23.3]}), "limit")
     file, *_ = result.save(tmp_path)
     assert pd.read_csv(file)["spin_frequency_hz"].tolist() == [21.1, 22.2, 23.3]
@@ -225,7 +216,7 @@ def test_a_saved_result_of_a_dataframe_has_its_readings_beside(tmp_path: Path) -
         other.save(tmp_path / "a file")
 
 
-def test_what_a_dataframe_was_written_to_goes_with_the_result() -> None:
+def test_what_a_dataframe_was_written_to_goes_with_the_result():
     frame = pd.DataFrame({"spin_frequency_hz": [21.0, 22.0, 23.0]})
     result = levilab.analyze(frame, "limit")
     folder = result.found.sources[0].path.parent
@@ -238,12 +229,12 @@ def test_what_a_dataframe_was_written_to_goes_with_the_result() -> None:
 # --- DataFrames ---
 
 
-def spin_down() -> pd.DataFrame:
+def spin_down():
     time = 10.0 * np.arange(8)
     return pd.DataFrame({"time_s": time, "spin_frequency_hz": 40.0 * np.exp(-3.2e-3 * time) + 0.01 * np.cos(time)})
 
 
-def test_messages_about_a_dataframe_name_its_rows() -> None:
+def test_messages_about_a_dataframe_name_its_rows():
     frame = spin_down()
     frame.loc[3, "time_s"] = 20.0
     with pytest.raises(DataError, match=r"^the data, row 3: the time 20 s is repeated after 20 s in row 2"):
@@ -255,7 +246,7 @@ def test_messages_about_a_dataframe_name_its_rows() -> None:
     assert any(text.endswith("row 5") for text in result.document["warnings"])
 
 
-def test_masked_readings_of_numpy_are_left_out_as_nan() -> None:
+def test_masked_readings_of_numpy_are_left_out_as_nan():
     time, spin = spin_down().to_numpy(copy=True).T
     masked = np.isin(time, [20.0, 50.0])
     spin[masked] = 99.0
@@ -266,7 +257,7 @@ def test_masked_readings_of_numpy_are_left_out_as_nan() -> None:
         assert any(text.endswith("rows 2, 5") for text in result.document["warnings"])
 
 
-def test_the_folder_of_a_saved_result_of_arrays_is_loaded(tmp_path: Path) -> None:
+def test_the_folder_of_a_saved_result_of_arrays_is_loaded(tmp_path):
     result = levilab.analyze(spin_down(), reading_u=0.03)
     result.save(tmp_path)
     assert levilab.load(tmp_path).values == result.values
@@ -274,7 +265,7 @@ def test_the_folder_of_a_saved_result_of_arrays_is_loaded(tmp_path: Path) -> Non
         levilab.load(tmp_path / "result.json")
 
 
-def test_several_dataframes_are_told_apart_by_their_place() -> None:
+def test_several_dataframes_are_told_apart_by_their_place():
     frames = [spin_down(), spin_down() * 1.01]
     assert levilab.analyze(frames, reading_u=0.03).inputs == ("DataFrame 1", "DataFrame 2")
     frames[1].loc[2, "spin_frequency_hz"] = -1.0
@@ -282,22 +273,22 @@ def test_several_dataframes_are_told_apart_by_their_place() -> None:
         levilab.analyze(frames)
 
 
-def test_numbered_columns_lose_no_row(tmp_path: Path) -> None:
+def test_numbered_columns_lose_no_row(tmp_path):
     write_frame(pd.DataFrame(spin_down().to_numpy()), tmp_path / "a.csv")
     assert len((tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()) == 8
 
 
-def test_odd_titles_become_columns(tmp_path: Path) -> None:
+def test_odd_titles_become_columns(tmp_path):
     write_frame(spin_down().rename(columns={"spin_frequency_hz": 'ν,\n"x"'}), tmp_path / "a.csv")
     assert list(pd.read_csv(tmp_path / "a.csv").columns) == ["time_s", 'ν, "x"']
 
 
-def dates(frame: pd.DataFrame) -> Any:
+def dates(frame):
     return pd.Timestamp("2026-11-28 10:00") + pd.to_timedelta(frame["time_s"], unit="s")
 
 
 #: Forms that numbers come in.
-FORMS: dict[str, Callable[[pd.DataFrame], Any]] = {
+FORMS = {
     "index with a name": lambda frame: frame.set_index("time_s"),
     "dates": lambda frame: frame.drop(columns="time_s").set_axis(pd.DatetimeIndex(dates(frame))),
     "spans of time": lambda frame: frame.drop(columns="time_s").set_axis(pd.to_timedelta(frame["time_s"].array, "s")),
@@ -315,14 +306,14 @@ FORMS: dict[str, Callable[[pd.DataFrame], Any]] = {
 
 
 @pytest.mark.parametrize("form", FORMS)
-def test_numbers_in_any_form_are_the_same_readings(form: str) -> None:
+def test_numbers_in_any_form_are_the_same_readings(form):
     expected = levilab.analyze(spin_down()).data
     found = levilab.analyze(FORMS[form](spin_down())).data
     assert found["time_s"].to_numpy() == pytest.approx(expected["time_s"].to_numpy(), abs=1e-6)  # dates have 1 µs
     assert found["spin_frequency_hz"].tolist() == expected["spin_frequency_hz"].tolist()
 
 
-def test_two_arrays_need_no_brackets() -> None:
+def test_two_arrays_need_no_brackets():
     frame = spin_down()
     found = levilab.analyze(frame["time_s"].tolist(), frame["spin_frequency_hz"].tolist())
     assert found.values == levilab.analyze((frame["time_s"], frame["spin_frequency_hz"])).values
@@ -331,19 +322,19 @@ def test_two_arrays_need_no_brackets() -> None:
 # --- wrong calls ---
 
 
-def frame_of(*names: str) -> pd.DataFrame:
+def frame_of(*names):
     return pd.DataFrame({name: [40.0, 41.0, 42.0, 43.5] for name in names})
 
 
 #: Wrong calls: the argument that the UsageError names, or the class of another error.
-WRONG: dict[str, tuple[Callable[[], Any], str | type[levilab.LevilabError]]] = {
+WRONG = {
     "several suit": (lambda: levilab.analyze(SAMPLE_DATA), "kind"),
     "no such kind": (lambda: levilab.analyze(spin_down(), "spin-down"), "kind"),
     "no such data": (lambda: levilab.analyze(5), "data"),
     "frequencies before times": (lambda: levilab.analyze(([9.0, 7.0, 6.0], [1, 2, 3])), "data"),
     "times of a turn": (lambda: levilab.analyze(([1, 2, 3], [0.02, 0.03, 0.04])), "data"),
     "a result": (lambda: levilab.analyze(levilab.analyze(spin_down())), "data"),
-    "a kind that is no text": (lambda: levilab.analyze(spin_down(), 5), "kind"),  # type: ignore[arg-type]
+    "a kind that is no text": (lambda: levilab.analyze(spin_down(), 5), "kind"),
     "no equal columns": (lambda: levilab.analyze({"time_s": [0.0, 1.0], "spin_frequency_hz": [40.0]}), "data"),
     "nothing": (lambda: levilab.analyze([]), "data"),
     "no columns": (lambda: levilab.analyze(pd.DataFrame()), "data"),
@@ -371,7 +362,7 @@ WRONG: dict[str, tuple[Callable[[], Any], str | type[levilab.LevilabError]]] = {
 
 
 @pytest.mark.parametrize("case", WRONG)
-def test_a_wrong_call_names_the_argument_or_the_kind_of_failure(case: str) -> None:
+def test_a_wrong_call_names_the_argument_or_the_kind_of_failure(case):
     call, expected = WRONG[case]
     with pytest.raises(UsageError if isinstance(expected, str) else expected) as raised:
         call()
@@ -388,28 +379,19 @@ def test_a_wrong_call_names_the_argument_or_the_kind_of_failure(case: str) -> No
     (lambda: levilab.load(SAMPLE_DATA / "student-files" / "columns.json"), "is a file; a run folder is expected"),
     (lambda: levilab.analyze(levilab), "^data = the module levilab: a run,"),
 ])  # fmt: skip
-def test_a_natural_but_wrong_call_is_told_how_to_call(call: Callable[[], Any], said: str) -> None:
+def test_a_natural_but_wrong_call_is_told_how_to_call(call, said):
     with pytest.raises(levilab.LevilabError, match=said):
         call()
 
 
-def test_a_dictionary_and_a_list_are_taken_as_dataframe_and_array_are() -> None:
-    frame = spin_down()
-    by_name: dict[str, Any] = {str(name): frame[name].tolist() for name in frame}
-    expected = levilab.analyze(frame, reading_u=0.03).values
-    assert str(levilab.analyze(by_name, reading_u=0.03).values) == str(expected)
-    limits = [21.9, 22.0, 21.7, 21.8]
-    assert str(levilab.analyze(limits, "limit").values) == str(levilab.analyze(np.array(limits), "limit").values)
-
-
-def test_numbers_are_taken_with_their_units_as_on_the_command_line() -> None:
+def test_numbers_are_taken_with_their_units_as_on_the_command_line():
     assert in_seconds("duration", "2min") == 120
     assert chosen_scene("undriven", {"start.spin_hz": "1800 rpm"}, {"mass_kg": "25 g", "law": "stokes"}).changed(
         {}
     ) == chosen_scene("undriven", {"start.spin_hz": 30.0}, {"mass_kg": 0.025, "law": "stokes"})
 
 
-def test_every_option_is_a_keyword_with_its_default() -> None:
+def test_every_option_is_a_keyword_with_its_default():
     given = inspect.signature(levilab.analyze).parameters
     options = {one.name: one.default for row in ANALYSES.values() for one in fields(row.options)}
     options.pop("guess")  # whether titles are guessed is for those who name a single file
@@ -427,7 +409,7 @@ def test_every_option_is_a_keyword_with_its_default() -> None:
 # --- acquire and load ---
 
 
-def test_an_experiment_gives_its_run_without_a_word(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_experiment_gives_its_run_without_a_word(tmp_path, capsys):
     settings = {"spin.hold_s": np.float64(0.0)}
     run = levilab.acquire("spin", mock=True, seed=1, out=tmp_path, note="first try", settings=settings)
     assert capsys.readouterr() == ("", "")
@@ -442,8 +424,8 @@ def test_an_experiment_gives_its_run_without_a_word(tmp_path: Path, capsys: pyte
         levilab.acquire("spin", resume=run)
 
 
-def test_a_person_who_cannot_be_asked_ends_the_experiment(monkeypatch: pytest.MonkeyPatch) -> None:
-    def closed(_: str) -> str:
+def test_a_person_who_cannot_be_asked_ends_the_experiment(monkeypatch):
+    def closed(_):
         raise EOFError
 
     monkeypatch.setattr("builtins.input", closed)
@@ -451,14 +433,14 @@ def test_a_person_who_cannot_be_asked_ends_the_experiment(monkeypatch: pytest.Mo
         ask_with_input(Task("float the top"))
 
 
-def test_readings_of_a_run_are_drawn_channel_by_channel() -> None:
+def test_readings_of_a_run_are_drawn_channel_by_channel():
     figure = levilab.load(SAMPLE_DATA / "field-scan").plot()
     assert [panel.get_ylabel() for panel in figure.axes] == ["flux density  [mT]"]
     assert figure.axes[-1].get_xlabel() == "height  [cm]"
     assert len(levilab.load(SAMPLE_DATA / "upper-limits").plot().axes) == 4
 
 
-def test_a_run_whose_readings_are_damaged_is_still_shown(tmp_path: Path) -> None:
+def test_a_run_whose_readings_are_damaged_is_still_shown(tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(SAMPLE_DATA / "lower-limits", folder)
     (folder / "readings.csv").write_text("spin_frequency_hz\nabc\n", encoding="utf-8")
@@ -469,7 +451,7 @@ def test_a_run_whose_readings_are_damaged_is_still_shown(tmp_path: Path) -> None
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_simulated_motion_has_the_states_that_were_asked_for(tmp_path: Path) -> None:
+def test_a_simulated_motion_has_the_states_that_were_asked_for(tmp_path):
     motion = levilab.simulate("undriven", 2, rate=50, settings={"start.spin_hz": 31.0}, out=tmp_path)
     states = motion.to_dataframe()
     assert states["time_s"].tolist() == pytest.approx(np.arange(101) / 50)
@@ -484,7 +466,7 @@ def test_a_simulated_motion_has_the_states_that_were_asked_for(tmp_path: Path) -
     assert np.array_equal(written.to_numpy(), states.to_numpy())
 
 
-def test_a_top_too_heavy_to_float_falls() -> None:
+def test_a_top_too_heavy_to_float_falls():
     motion = levilab.simulate("undriven", 3, settings={"top.mass_kg": 0.04})
     assert not motion.survived
     assert "lost at the limit of its height" in repr(motion)

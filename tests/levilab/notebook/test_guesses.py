@@ -1,13 +1,10 @@
 """What people type who know lmfit, pandas and xarray: each guess of a round of new users, as they typed it."""
 
-from __future__ import annotations
-
 import copy
 import json
 import pickle
 import traceback
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -20,19 +17,16 @@ import levilab
 from levilab.errors import DoubtWarning
 from support.paths import SAMPLE_DATA
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
 #: Spin of the disc law with the constant of the first sample, at the times of its readings [Hz].
 T = np.arange(0.0, 200.0, 10.0)
 
 
-def _disc(t: np.ndarray) -> np.ndarray:
+def _disc(t):
     return 40.0 / (1 + 0.5 * 2.37e-4 * np.sqrt(2 * np.pi * 40.0) * t) ** 2
 
 
 #: What is typed → whether the answer is right.
-GUESSES: dict[str, Callable[[Any], object]] = {
+GUESSES = {
     # a run
     "run._repr_html_()": lambda html: "spin run" in html,
     "run.to_dataframe()": lambda frame: len(frame) == 20,
@@ -352,7 +346,7 @@ REFUSED = {
 
 
 @pytest.fixture(scope="module")
-def names() -> dict[str, Any]:
+def names():
     run = levilab.load(SAMPLE_DATA / "spin-down-1")
     return {
         "levilab": levilab,
@@ -378,24 +372,29 @@ def names() -> dict[str, Any]:
 
 @pytest.mark.filterwarnings("ignore::levilab.errors.DoubtWarning")
 @pytest.mark.parametrize("typed", GUESSES)
-def test_a_natural_guess_works(typed: str, names: dict[str, Any], tmp_path: Path) -> None:
+def test_a_natural_guess_works(typed, names, tmp_path):
     assert GUESSES[typed](eval(typed, names | {"new": tmp_path, "ax": Figure().subplots()}))
 
 
 @pytest.mark.parametrize("typed", REFUSED)
-def test_a_wrong_guess_is_told_the_right_one(typed: str, names: dict[str, Any]) -> None:
+def test_a_wrong_guess_is_told_the_right_one_and_its_traceback_ends_at_the_border(typed, names):
     with pytest.raises(levilab.LevilabError) as raised:
         eval(typed, names | {"ax": Figure().subplots()})
-    assert REFUSED[typed] in str(raised.value)
+    error = raised.value
+    assert REFUSED[typed] in str(error)
+    assert error.__cause__ is None
+    assert error.__context__ is None or error.__suppress_context__
+    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "levilab" in Path(frame.filename).parts]
+    assert len(frames) <= 1  # this test's own
 
 
-def test_a_doubt_is_a_warning_at_the_line_that_asked_so_that_a_loop_notices_it(names: dict[str, Any]) -> None:
+def test_a_doubt_is_a_warning_at_the_line_that_asked_so_that_a_loop_notices_it(names):
     with pytest.warns(DoubtWarning, match=r"the spin is about .* Hz, a Levitron spins at 20 to 60 Hz") as seen:
         levilab.analyze((T, 60 * names["f"]))
     assert [Path(one.filename).name for one in seen] == [Path(__file__).name]
 
 
-def test_a_curve_goes_on_beyond_the_readings_as_its_law_says(names: dict[str, Any]) -> None:
+def test_a_curve_goes_on_beyond_the_readings_as_its_law_says(names):
     """The count's tilt bends its curve into a resonance that no top reaches, and lifts it before the first reading."""
     found = levilab.analyze((T, 30 * np.exp(-3e-3 * T) + np.random.default_rng(2).normal(0.0, 0.005, T.size)))
     assert "moment_tilt" in found.models["stokes"]
@@ -404,7 +403,7 @@ def test_a_curve_goes_on_beyond_the_readings_as_its_law_says(names: dict[str, An
     assert found.predict(T, "stokes") + found.residuals == pytest.approx(found.to_dataframe("readings").iloc[:, 2])
 
 
-def test_parameters_of_a_fit_are_correlated_as_it_says(names: dict[str, Any]) -> None:
+def test_parameters_of_a_fit_are_correlated_as_it_says(names):
     start, c = names["result"].params.values()
     covariance = np.array(names["result"].document["models"][2]["covariance"])
     total = start.to_ufloat() + 1e5 * c.to_ufloat()  # of like sizes
@@ -418,7 +417,7 @@ def test_parameters_of_a_fit_are_correlated_as_it_says(names: dict[str, Any]) ->
     assert (of_another - c).u == pytest.approx(float(np.hypot(of_another.u, c.u)))
 
 
-def test_the_laws_of_each_of_several_runs_have_their_keys() -> None:
+def test_the_laws_of_each_of_several_runs_have_their_keys():
     both = levilab.analyze([SAMPLE_DATA / "spin-down-1", SAMPLE_DATA / "spin-down-2"])
     each = [models["disc"]["c32"] for models in both.models_by_input.values()]
     assert both["c32"].value == pytest.approx(np.mean([c.n for c in each]))
@@ -427,7 +426,7 @@ def test_the_laws_of_each_of_several_runs_have_their_keys() -> None:
         both.predict(0.0)
 
 
-def test_arrays_are_named_by_the_analysis_that_is_chosen() -> None:
+def test_arrays_are_named_by_the_analysis_that_is_chosen():
     assert levilab.analyze(np.array([21.0, 22.0, 23.0]), "limit")["mean"].n == 22.0
     scan = levilab.load(SAMPLE_DATA / "field-scan").df[["height_m", "flux_density_t"]]
     of_arrays = levilab.analyze(scan.to_numpy(), "field", device=SAMPLE_DATA / "device.toml")
@@ -436,7 +435,7 @@ def test_arrays_are_named_by_the_analysis_that_is_chosen() -> None:
     assert of_frame.predict(scan["height_m"]) == pytest.approx(scan["flux_density_t"], abs=3e-4)  # three of its scatter
 
 
-def test_a_pickle_of_a_dataframes_result_can_be_saved_and_drawn(tmp_path: Path) -> None:
+def test_a_pickle_of_a_dataframes_result_can_be_saved_and_drawn(tmp_path):
     time = np.arange(6000) / 3000.0
     light = 1.0 * (np.abs((25.0 * time) % 1 - 0.5) < 0.03) + np.random.default_rng(1).normal(0, 0.01, time.size)
     pickled = pickle.dumps(levilab.analyze(pd.DataFrame({"time_s": time, "light_v": light})))
@@ -445,24 +444,13 @@ def test_a_pickle_of_a_dataframes_result_can_be_saved_and_drawn(tmp_path: Path) 
     assert {path.name for path in result.save(tmp_path)} >= {"DataFrame.csv", "DataFrame.csv.result.spin.json"}
 
 
-@pytest.mark.parametrize("typed", REFUSED)
-def test_a_traceback_ends_at_the_border(typed: str, names: dict[str, Any]) -> None:
-    with pytest.raises(levilab.LevilabError) as raised:
-        eval(typed, names | {"ax": Figure().subplots()})
-    error = raised.value
-    assert error.__cause__ is None
-    assert error.__context__ is None or error.__suppress_context__
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "levilab" in Path(frame.filename).parts]
-    assert len(frames) <= 1  # this test's own
-
-
-def test_tab_offers_what_is_for_people() -> None:
+def test_tab_offers_what_is_for_people():
     offered = {name for name in dir(levilab) if not name.startswith("_")}
     assert offered == set(levilab.__all__)
     assert {"run", "page", "table"}.isdisjoint(offered)
 
 
-def test_rooms_are_found_where_a_function_has_their_name() -> None:
+def test_rooms_are_found_where_a_function_has_their_name():
     import levilab.report.page
     import levilab.runs.run
 
@@ -472,7 +460,7 @@ def test_rooms_are_found_where_a_function_has_their_name() -> None:
     assert levilab.report.page.write_report.__name__ == "write_report"
 
 
-def test_a_sweep_is_a_table_a_dataset_and_a_figure(tmp_path: Path) -> None:
+def test_a_sweep_is_a_table_a_dataset_and_a_figure(tmp_path):
     axes = {"spin_hz": [18.0, 25.0, 26.0], "top.mass_kg": "0.0245:0.0250:2"}
     swept = levilab.sweep("undriven", axes, observe="survived", duration=0.3, out=tmp_path / "map.zarr")
     assert swept.to_dataframe().shape == (6, 3)

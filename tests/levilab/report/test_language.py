@@ -1,10 +1,7 @@
 """A report in another language: what a person reads of it, and its figures."""
 
-from __future__ import annotations
-
 import json
 import re
-from typing import TYPE_CHECKING
 
 import pytest
 from matplotlib.figure import Figure
@@ -17,20 +14,16 @@ from levilab.texts.text import Text, speak
 from support.pages import Page
 from support.paths import SAMPLE_DATA
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
 
 @pytest.fixture
-def german() -> Iterator[None]:
+def german():
     speak("de")
     yield
     speak("en")
 
 
 @pytest.mark.usefixtures("german")
-def test_a_german_report_has_german_headings_and_answer(tmp_path: Path) -> None:
+def test_a_german_report_has_german_headings_and_answer(tmp_path):
     run = SAMPLE_DATA / "spin-down-1"
     page = write_report([run], tmp_path / "report.html", short=True).read_text(encoding="utf-8")
     for said in (">Ergebnis<", "Am besten passt das Scheibengesetz", "--language de", 'lang="de"'):
@@ -48,7 +41,7 @@ _ENGLISH = re.compile(r"(?<![-/.])\b(?:the|of|and|is|are|not|each|from|by|with|w
     ["spin-down-1", "lower-limits", "loose-washers", "precession-sweep", "field-scan", "trace-laser", "trace-tape",
      "hold", "sway/track.csv", "phone/magnetometer.csv"],
 )  # fmt: skip
-def test_no_english_sentence_is_left_in_a_german_report(tmp_path: Path, run: str) -> None:
+def test_no_english_sentence_is_left_in_a_german_report(tmp_path, run):
     """But for what the person at the bench wrote down."""
     page = write_report([SAMPLE_DATA / run], tmp_path / "report.html", crosscheck=run == "trace-tape")
     text = Page(page.read_text(encoding="utf-8")).text
@@ -59,7 +52,7 @@ def test_no_english_sentence_is_left_in_a_german_report(tmp_path: Path, run: str
 
 
 @pytest.mark.usefixtures("german")
-def test_a_figure_says_its_texts_and_numbers_in_german() -> None:
+def test_a_figure_says_its_texts_and_numbers_in_german():
     figure = Figure()
     axes = figure.add_subplot(title=Text("Spin-down: {said}", said="fits"), xlabel="time  [s]", xlim=(0.0, 1.0))
     as_png(figure)
@@ -69,7 +62,7 @@ def test_a_figure_says_its_texts_and_numbers_in_german() -> None:
 
 @pytest.mark.usefixtures("german")
 @pytest.mark.parametrize(("name", "path"), [("video", "video/top.mp4"), ("hold", "hold")])
-def test_no_english_text_is_left_in_a_german_figure(name: str, path: str) -> None:
+def test_no_english_text_is_left_in_a_german_figure(name, path):
     """Nor one that is longer than its axes: it would run into the next ones."""
     if name == "video":
         pytest.importorskip("av")

@@ -11,7 +11,7 @@ from levilab.present.terminal import Terminal
 from levilab.runs import listing
 from levilab.runs.find import RECORD
 from levilab.runs.listing import MOST_PROBLEMS, Listed, list_runs, print_runs
-from levilab.runs.run import READINGS, Run
+from levilab.runs.run import Run
 from many_runs import make_runs
 from support.commands import command
 
@@ -61,17 +61,6 @@ def test_the_fast_reader_finds_the_same_as_loading(tmp_path, monkeypatch):
     slow = list_runs(tmp_path)
     assert quick == slow
     assert sorted(run.status for run in quick) == ["finished"] * 4 + ["interrupted"] + ["unreadable"] * 3
-
-
-def test_the_fast_reader_leaves_a_missed_reading_to_the_slow_one(tmp_path, monkeypatch):
-    (folder,) = make_runs(tmp_path, 1, broken=0)
-    head, first, *lines = (folder / READINGS).read_text(encoding="utf-8").splitlines()
-    missed = ",".join([first.split(",")[0], "9.91e37", *first.split(",")[2:]])
-    (folder / READINGS).write_text("\n".join([head, missed, *lines, ""]), encoding="utf-8")
-    (quick,) = list_runs(tmp_path)
-    monkeypatch.setattr(listing, "_glance", lambda _: None)
-    assert [quick] == list_runs(tmp_path)
-    assert quick.readings == len(lines)
 
 
 def test_the_latest_runs_alone(tmp_path):

@@ -91,15 +91,6 @@ def test_a_run_that_cannot_be_described_is_finished(tmp_path, monkeypatch):
     assert message.startswith("datapackage.json is missing (Input/output error): the run is whole without it")
 
 
-def test_a_torn_last_line_is_left_out_with_a_warning(tmp_path):
-    folder = written(tmp_path)
-    whole = (folder / "readings.csv").read_bytes()
-    (folder / "readings.csv").write_bytes(whole + b"40.0,38.")
-    table = Run.load(folder).readings()
-    assert len(table.frame) == 4
-    assert any("cut off" in warning or "torn" in warning for warning in table.warnings)
-
-
 def test_a_run_whose_process_is_gone_is_interrupted_and_one_that_lives_is_running(tmp_path):
     with RunWriter.create(tmp_path, record()) as writer:
         writer.reading(row(0))

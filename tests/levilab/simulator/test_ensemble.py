@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from levilab.simulator import SceneError, SimulationError
+from levilab.simulator import SimulationError
 from levilab.simulator.accuracy import SAFETY_FACTOR, estimate
 from levilab.simulator.ensemble import _pilots, grid, simulate_many, step_share_of
 from levilab.simulator.kernels.motion import TIME, R
@@ -234,11 +234,6 @@ def test_tops_of_different_kinds_go_together():
     for law, place in zip(("none", "stokes"), many.position, strict=True):
         alone = simulate(UNDRIVEN.changed({"drag.law": law}), 1.0, tolerance=1e-10, rate=None)
         assert place == pytest.approx(alone.position[-1], abs=1e-9)
-
-
-def test_a_wrong_key_is_named():
-    with pytest.raises(SceneError, match=r"top\.mass"):
-        simulate_many(UNDRIVEN, {"top.mass": np.array([0.025])}, 1.0)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import pytest
 from levilab.simulator.ensemble import simulate_many
 from levilab.simulator.equilibrium import (
     _disc_stiffnesses,
-    advice,
     axial_field,
     floating_height,
     stability_of,
@@ -94,10 +93,6 @@ def test_a_moment_across_the_axis_lifts_nothing():
     found, over_masses = stability_of(across), windows_over(across, [0.025])
     assert (found.windows, found.equilibria, over_masses.adiabatic) == ((), (), ())
     assert np.isnan(over_masses.heights).all()
-
-
-def test_a_mass_that_cannot_float_is_named_in_grams():
-    assert advice(stability_of(UNDRIVEN.changed({"top.mass_kg": 0.0255}))).startswith("a top of 25.5 g does not float")
 
 
 def test_without_weight_nothing_floats_and_that_is_said():

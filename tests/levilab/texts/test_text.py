@@ -1,12 +1,9 @@
 """Texts in other languages: each language has every text with its values, and a new one is a file."""
 
-from __future__ import annotations
-
 import ast
 import json
 import pickle
 import re
-from typing import TYPE_CHECKING, Any
 from unittest.mock import Mock
 
 import pytest
@@ -45,9 +42,6 @@ from levilab.texts.text import Text, in_language, language_of, languages, speak,
 from support.paths import SAMPLE_DATA
 from support.sources import sources
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
 LANGUAGES = [code for code in languages() if code != "en"]
 #: Functions whose text a person reads, in the modules of these rooms, and the number of the argument.
 SAYING = {
@@ -63,16 +57,16 @@ _LITERAL = r'"((?:[^"\\]|\\.)*)"'
 _PHRASE = re.compile(rf"phrase\((?:[^()\"]*\?)?\s*{_LITERAL}(?:\s*:\s*{_LITERAL})?")
 
 
-def is_worded(text: str) -> bool:
+def is_worded(text):
     """Whether there is a word beside the values: units and letters are the same in all languages."""
     return bool(re.search(r"[A-Za-z]{3,}", re.sub(r"\{[^}]*\}", "", text)))
 
 
-def fields(text: str) -> set[str]:
+def fields(text):
     return set(re.findall(r"\{\w+(?::[^}]*)?\}", text))
 
 
-def strings(node: ast.AST) -> Iterator[str]:
+def strings(node):
     """The strings that an argument may be; an f-string, which no table can have, as its beginning."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         yield node.value
@@ -83,11 +77,11 @@ def strings(node: ast.AST) -> Iterator[str]:
         yield from strings(node.orelse)
 
 
-def of_pages() -> set[str]:
+def of_pages():
     """What the live view's pages say: HTML, JavaScript, and the rows that they show."""
-    found: set[str] = set()
+    found = set()
     for html in PAGE.glob("*.html"):
-        change_texts(html.read_text("utf-8"), lambda text: found.add(text) or text)  # type: ignore[func-returns-value]
+        change_texts(html.read_text("utf-8"), lambda text: found.add(text) or text)
     for module in PAGE.glob("*.js"):
         found |= {one for pair in _PHRASE.findall(module.read_text("utf-8")) for one in pair if one}
     found |= {text for row in PRACTICE.values() for text in (row.title, row.asks)}
@@ -106,7 +100,7 @@ def of_worksheets():
     return {text.replace(f"{TOPS} tops", "{tops} tops") for text in texts}
 
 
-def of_files() -> set[str]:
+def of_files():
     """What is said of files and runs that are left out, and of scenes."""
     kinds = (*files.KINDS, files.OTHER, files.EMPTY, OTHER_COLUMNS)
     runs = {f"{name} run" for name in EXPERIMENTS}
@@ -116,14 +110,14 @@ def of_files() -> set[str]:
     return texts | needed | scenes | runs | {f"{r}s" for r in runs}
 
 
-def errors(base: type[Exception]) -> set[str]:
+def errors(base):
     """The names of a class of errors and of those below it."""
     return {base.__name__}.union(*map(errors, base.__subclasses__()))
 
 
-def of_analyses() -> set[str]:
+def of_analyses():
     """What errors of the analyses say, and of what."""
-    found: set[str] = set()
+    found = set()
     calls = [(name, node) for name, tree in sources().items() for node in ast.walk(tree) if isinstance(node, ast.Call)]
     for name, call in calls:
         if name.startswith("analysis.") and ast.unparse(call.func) in {"super().__init__", *errors(AnalysisError)}:
@@ -131,7 +125,7 @@ def of_analyses() -> set[str]:
     return found | {TooFewPulses.HINT, OnlyHum.HINT}
 
 
-def of_tables() -> set[str]:
+def of_tables():
     """What tables say of a scene's settings and of its effects, of ends and of faults."""
     said = {text for one in (*effects.KINDS, *effects.field_kinds(Scene())) for text in (one.name, one.what)}
     settings = {one.expected for one in RULES} | {one.text for one in REMARKS} | {one.why for one in SWITCHES}
@@ -139,12 +133,12 @@ def of_tables() -> set[str]:
     return said.union(settings, *(table.values() for table in tables))
 
 
-def of_program() -> set[str]:
+def of_program():
     """What the program says in sentences: each `Text`, and what the functions of SAYING are given."""
     found = of_analyses() | of_tables()
     refusals = errors(LevilabError)
     for name, tree in sources().items():
-        named: dict[str, set[str]] = {}
+        named = {}
         for node in ast.walk(tree):
             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
                 known = (text for text in strings(node.value) if not text.startswith("f-string"))
@@ -163,7 +157,7 @@ def of_program() -> set[str]:
 
 
 @pytest.mark.parametrize("code", LANGUAGES)
-def test_a_language_has_every_text(code: str) -> None:
+def test_a_language_has_every_text(code):
     assert sorted(text for text in of_pages() if is_worded(text) and text not in language_of(code).page) == []
     assert (
         sorted(
@@ -176,12 +170,12 @@ def test_a_language_has_every_text(code: str) -> None:
 
 
 @pytest.mark.parametrize("code", LANGUAGES)
-def test_a_text_has_the_values_of_the_english_one(code: str) -> None:
+def test_a_text_has_the_values_of_the_english_one(code):
     texts = language_of(code).texts
     assert {english: text for english, text in texts.items() if fields(english) != fields(text) or not text} == {}
 
 
-def settings_fields() -> set[str]:
+def settings_fields():
     """Names of settings: fields of the classes of experiments' settings, and what drivers declare by `Setting`."""
     named = set()
     for one in (node for tree in sources().values() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
@@ -194,7 +188,7 @@ def settings_fields() -> set[str]:
 
 
 @pytest.mark.parametrize("code", LANGUAGES)
-def test_no_text_is_of_a_sentence_that_is_said_no_more(code: str) -> None:
+def test_no_text_is_of_a_sentence_that_is_said_no_more(code):
     trees = [*sources().values(), ast.parse((SAMPLE_DATA / "make.py").read_text("utf-8"))]
     nodes = (node for tree in trees for node in ast.walk(tree))
     said = (
@@ -212,7 +206,7 @@ def test_no_text_is_of_a_sentence_that_is_said_no_more(code: str) -> None:
     assert sorted(text for text in language_of(code).texts if text not in said) == []
 
 
-def test_a_text_is_the_english_sentence_and_comes_through_json_and_pickle() -> None:
+def test_a_text_is_the_english_sentence_and_comes_through_json_and_pickle():
     why = Text("the top spins at {spin:.2f} Hz", spin=21.5)
     said = Text("drive on at {hz:g} Hz, but {beside}: {takes}", hz=30.5, beside=why, takes="no more")
     assert said == "drive on at 30.5 Hz, but the top spins at 21.50 Hz: no more"
@@ -227,11 +221,11 @@ def test_a_text_is_the_english_sentence_and_comes_through_json_and_pickle() -> N
               {"template": "x", "values": [1]},
               {"template": "{a:d}", "values": {"a": "x"}}, {"template": "{a:99999999}", "values": {"a": [[[[]]]]}}]
 )  # fmt: skip
-def test_a_table_that_a_person_has_changed_is_no_text(table: object) -> None:
+def test_a_table_that_a_person_has_changed_is_no_text(table):
     assert text_from(table, "as it was") in {"as it was", "x", "{a:99999999}"}
 
 
-def test_a_process_speaks_one_language_and_no_unknown_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_speaks_one_language_and_no_unknown_one(monkeypatch):
     monkeypatch.setattr("levilab.texts.text._of_process", "en")
     assert in_language("the top follows the drive") == "the top follows the drive"
     speak("de")
@@ -240,7 +234,7 @@ def test_a_process_speaks_one_language_and_no_unknown_one(monkeypatch: pytest.Mo
         check_language("xx")
 
 
-def test_a_name_keeps_its_point_and_a_number_gets_a_comma() -> None:
+def test_a_name_keeps_its_point_and_a_number_gets_a_comma():
     assert [in_language(name, "de") for name in ("z1.5.csv", "v1.2", "d0.1")] == ["z1.5.csv", "v1.2", "d0.1"]
     listed = Text("{values:.1f} Hz and {text:n}", values=(1.5, 2.0), text="0.12(3) Hz")
     assert in_language(listed, "de") == "1,5; 2,0 Hz and 0,12(3) Hz"
@@ -250,7 +244,7 @@ def test_a_name_keeps_its_point_and_a_number_gets_a_comma() -> None:
     assert in_language_of_reader(shown, "de").rows[0].cells == ("z1.5.csv", "1,50")
 
 
-def test_a_note_and_a_finding_of_several_inputs_keep_their_language() -> None:
+def test_a_note_and_a_finding_of_several_inputs_keep_their_language():
     spin = Text("The spin is {at}, its slope {slope:n}.", at="30.5 Hz", slope="0.1 Hz/s")
     sources = [Mock(warnings=(spin,)), Mock(warnings=())]
     for source, name in zip(sources, ("run0.5.csv", "b.csv"), strict=True):
@@ -265,7 +259,7 @@ def test_a_note_and_a_finding_of_several_inputs_keep_their_language() -> None:
 @pytest.mark.parametrize(
     ("times", "said"), [((2, 1), "gezählt wurde die doppelte Frequenz"), ((3, 2), "gezählt wurden 3/2 der Frequenz")]
 )
-def test_a_miscount_is_a_german_sentence(times: tuple[int, int], said: str) -> None:
+def test_a_miscount_is_a_german_sentence(times, said):
     assert in_language(miscount_as_text(Miscount(0, times)), "de") == said
 
 
@@ -277,7 +271,7 @@ def test_a_miscount_is_a_german_sentence(times: tuple[int, int], said: str) -> N
         ("gate_s=99", "gate_s = 99 muss kürzer sein als interval_s = 10"),
     ],
 )
-def test_a_wrong_setting_is_answered_in_german(given: str, said: str) -> None:
+def test_a_wrong_setting_is_answered_in_german(given, said):
     with pytest.raises(UsageError) as refused:
         with_given_settings(settings_without_bench("spin"), "spin", [given])
     assert said in (german := in_language(text_of(refused.value), "de"))
@@ -294,7 +288,7 @@ def test_a_wrong_setting_is_answered_in_german(given: str, said: str) -> None:
         "tune --top 24.9 --temperature 21 --washers 0.06,0.1 --trial 0.1g,20C,sink --trial 0.06g,20C,seitlich",
     ],
 )  # fmt: skip
-def test_what_commands_say_is_german_to_the_last_word(levilab: Any, words: str, monkeypatch: Any) -> None:
+def test_what_commands_say_is_german_to_the_last_word(levilab, words, monkeypatch):
     monkeypatch.setenv("LEVILAB_LANGUAGE", "de")
     done = levilab(*words.split(), check=None)
     said = set(re.findall(r"\w+", done.stdout + done.stderr))

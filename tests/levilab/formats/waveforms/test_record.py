@@ -4,7 +4,6 @@ import codecs
 import re
 import struct
 import sys
-import tracemalloc
 import types
 import uuid
 import wave
@@ -16,8 +15,6 @@ from hypothesis import strategies as st
 
 from levilab.errors import DataError, DoesNotSuit, UsageError
 from levilab.formats.columns import TableError
-from levilab.formats.waveforms import rows as text_rows
-from levilab.formats.waveforms import wav
 from levilab.formats.waveforms.header import NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
@@ -363,33 +360,6 @@ def test_wav_of_every_width(bits, tmp_path):
     for record in (waveform(tmp_path / "a.wav"), waveform(tmp_path / "b.wav")):
         assert [signal.name for signal in record.signals] == ["left", "right"]
         np.testing.assert_array_equal(record.samples("right"), samples)
-
-
-@pytest.mark.parametrize("kind", ["csv", "wav"])
-def test_a_file_larger_than_memory_is_read_in_pieces(kind, tmp_path, monkeypatch):
-    """Five times as many samples take no more memory, which is less than the larger file's numbers would."""
-    monkeypatch.setattr(text_rows, "PIECE", 1 << 15)
-    monkeypatch.setattr(wav, "BLOCK", 1 << 11)
-    peaks = []
-    for n in (20_000, 100_000):
-        path = tmp_path / f"long.{kind}"
-        if kind == "csv":
-            text = "X,CH1,Start,Increment\nSequence,Volt,0,1e-4\n" + "".join(f"{k},0.125\n" for k in range(n))
-            path.write_text(text, encoding="utf-8")
-        else:
-            with wave.open(str(path), "wb") as sound:
-                sound.setparams((1, 2, 10_000, n, "NONE", ""))
-                sound.writeframes(bytes(2 * n))
-        next(waveform(path).blocks())  # pandas and scipy are loaded
-        tracemalloc.start()
-        try:
-            record = waveform(path)
-            assert sum(len(block) for block in record.blocks()) == n == record.count
-            peaks.append(tracemalloc.get_traced_memory()[1])
-        finally:
-            tracemalloc.stop()
-    assert peaks[1] < 2 * peaks[0]  # of five times the samples; Python frees some blocks later than others
-    assert peaks[1] < (2 if kind == "csv" else 1) * 8 * 100_000  # the numbers of two columns, of one
 
 
 def read_or_refused(path, rate):

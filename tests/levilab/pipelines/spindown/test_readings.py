@@ -9,7 +9,7 @@ from analysis.spindown.fit import fit_spin_down
 from analysis.spindown.tilt import count_of
 from levilab.errors import DataError, UsageError
 from levilab.formats.columns import TableError
-from levilab.formats.table import read_run_readings, read_table
+from levilab.formats.table import read_table
 from levilab.pipelines.options import SpinDownOptions, read_options
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.readings import read_spin_file, spin_readings
@@ -31,10 +31,6 @@ def test_readings_are_arrays_with_the_tables_warnings(tmp_path):
     np.testing.assert_array_equal(readings.frequency, [61, 60, 59])
     np.testing.assert_array_equal(readings.u, [0.1, 0.1, 0.2])
     assert "line 4" in readings.warnings[0]
-
-
-def test_uncertainties_may_be_absent(tmp_path):
-    assert spin_readings(table_of(tmp_path, "t,f\n0,61\n1,60\n2,59\n")).u is None
 
 
 @pytest.mark.parametrize(
@@ -70,18 +66,6 @@ def test_rows_of_0_hz_after_the_fall_are_left_out_with_a_note(tmp_path):
     readings = spin_readings(table_of(tmp_path, HEADER + "0,61,.1\n1,60,.1\n2,59,.1\n3,0,0\n4,0,0\n"))
     np.testing.assert_array_equal(readings.frequency, [61, 60, 59])
     assert readings.warnings == ("data.csv: the last 2 rows of 0 Hz, after the top fell, are left out",)
-
-
-def test_a_missing_column_is_reported_with_those_there_are(tmp_path):
-    with pytest.raises(TableError, match=r"spin_frequency_hz; it has 't', 'z': say `columns` = f=NAME"):
-        spin_readings(table_of(tmp_path, "t,z\n0,1\n1,2\n2,3\n"))
-
-
-def test_a_run_with_too_few_readings_is_reported(tmp_path):
-    path = tmp_path / "readings.csv"
-    path.write_text(HEADER + "0,61,.1\n")
-    with pytest.raises(TableError, match="holds 1 reading, at least 3"):
-        spin_readings(read_run_readings(path))
 
 
 def test_readings_closer_than_a_turn_are_doubted(tmp_path):
