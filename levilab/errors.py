@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import TYPE_CHECKING
 
 from levilab.texts.text import Text, languages
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
 
 
 class LevilabError(Exception):

@@ -11,14 +11,12 @@ import os
 import re
 import tempfile
 import tomllib
-from typing import TYPE_CHECKING, Any, BinaryIO
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
 
 from levilab.computer import computer
 from levilab.errors import LevilabError, UsageError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
 
 
 class CannotWrite(LevilabError):

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import TYPE_CHECKING, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from instruments.errors import InstrumentError
 from levilab.acquisition.experiment import CounterSettings
-from levilab.acquisition.session import ExperimentFailed
+from levilab.acquisition.session import ExperimentFailed, Row, Session
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from levilab.acquisition.session import Row, Session
 
 S = TypeVar("S", bound=CounterSettings)
 

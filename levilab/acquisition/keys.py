@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.acquisition.given import describe_values, schema_of
 from levilab.acquisition.table import settings_of, tables_to_write
+from levilab.bench.config import BenchConfig
 from levilab.present.tables import Table, table
-
-if TYPE_CHECKING:
-    from levilab.bench.config import BenchConfig
 
 
 @dataclass(frozen=True)

@@ -3,41 +3,32 @@
 from __future__ import annotations
 
 import secrets
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
 
 from analysis.numbers import digits
+from instruments.catalogue import Model
 from instruments.clock import VirtualClock
-from levilab.acquisition.experiment import CounterSettings
+from levilab.acquisition.experiment import CounterSettings, ExperimentSettings
 from levilab.acquisition.given import read_conditions, with_given_settings
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
-from levilab.bench.config import BenchConfig, ConfigError, read_bench
+from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, read_bench
 from levilab.bench.kinds import COUNTER, KINDS, estimates_u
-from levilab.bench.person import ask_no_person
-from levilab.bench.wiring import described_wiring
+from levilab.bench.person import Person, ask_no_person
+from levilab.bench.wiring import Wiring, described_wiring
 from levilab.errors import DataError, LevilabError, UsageError
 from levilab.runs.find import run_to_resume
 from levilab.runs.run import LONGEST_GROUP, Run
 from levilab.settings import in_one_line
-from levilab.simulator.scene import SceneError, read_scene, scene_of
+from levilab.simulator.scene import Scene, SceneError, read_scene, scene_of
 from levilab.texts.text import Text, text_of
 from levilab.world.bench import VIRTUAL, scene_world, virtual_instruments, virtual_settings, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from instruments.catalogue import Model
-    from levilab.acquisition.experiment import ExperimentSettings
-    from levilab.bench.config import InstrumentSettings
-    from levilab.bench.person import Person
-    from levilab.bench.wiring import Wiring
-    from levilab.simulator.scene import Scene
-
 
 HOW = (
     "acquired on the virtual bench: the drivers are the real ones, the instruments wire-level models, {what}, "

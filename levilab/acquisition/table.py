@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import inspect
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 from pydantic import Field, create_model
 
-from levilab.acquisition.experiment import CounterSettings, Experiment
+from levilab.acquisition.experiment import CounterSettings, Experiment, ExperimentSettings
 from levilab.acquisition.experiments import NAMES, experiment
 from levilab.bench.config import BenchConfig, Setting, SettingsTable
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from levilab.acquisition.experiment import ExperimentSettings
 
 #: Name → experiment.
 EXPERIMENTS: dict[str, Experiment[Any]] = {name: experiment(name) for name in NAMES}

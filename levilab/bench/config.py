@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from pathlib import Path
+from typing import Any, Literal, TypeVar
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, ValidationError
 
@@ -11,9 +12,6 @@ from instruments.drivers.generator import Limits as DriveLimits
 from levilab.errors import LevilabError
 from levilab.files import parse_toml, toml_value
 from levilab.settings import Settings, in_one_line
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 @dataclass(frozen=True)

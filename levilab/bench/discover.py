@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from instruments.drivers import Instrument
 from instruments.errors import InstrumentError
 from instruments.links.advice import one_line
 from instruments.links.visa import addresses
 from levilab.bench.config import InstrumentSettings
 from levilab.bench.kinds import COUNTER, KINDS, transport_to
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from instruments.drivers import Instrument
 
 #: How long one address is waited for [s]: who is there answers within some milliseconds.
 PATIENCE_S = 1.0

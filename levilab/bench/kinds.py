@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from instruments.catalogue import COUNTERS, GENERATORS, MAGNETOMETERS, OSCILLOSCOPES, Model
+from instruments.clock import Clock
 from instruments.drivers import Instrument
+from instruments.drivers.counter import Counter
+from instruments.drivers.generator import Generator
+from instruments.drivers.magnetometer import Magnetometer
+from instruments.drivers.oscilloscope import Oscilloscope
 from instruments.links.opening import open_link
-from levilab.bench.config import ConfigError, InstrumentSettings
-
-if TYPE_CHECKING:
-    from instruments.clock import Clock
-    from instruments.drivers.counter import Counter
-    from instruments.drivers.generator import Generator
-    from instruments.drivers.magnetometer import Magnetometer
-    from instruments.drivers.oscilloscope import Oscilloscope
-    from instruments.links.transport import TrafficLog, Transport
-    from levilab.bench.config import BenchConfig
+from instruments.links.transport import TrafficLog, Transport
+from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings
 
 I_co = TypeVar("I_co", bound=Instrument, covariant=True)
 

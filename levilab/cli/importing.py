@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from contextlib import AbstractContextManager
 
 from levilab.cli.exit_codes import INTERRUPTED
 from levilab.interruption import interruption_ends_process
-
-if TYPE_CHECKING:
-    from contextlib import AbstractContextManager
 
 LINE = "levilab: interrupted\n"
 

@@ -5,17 +5,15 @@ from __future__ import annotations
 import inspect
 import math
 import os
+from collections.abc import Callable, Collection, Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from levilab.errors import UsageError, check_language, list_known
 from levilab.texts.text import ENGLISH, Text, languages, speak
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
 
 
 def number(unit: str = "", *, low: float = -math.inf, high: float = math.inf) -> Callable[[Any], float]:

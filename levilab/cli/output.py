@@ -5,17 +5,15 @@ from __future__ import annotations
 import contextlib
 import os
 import sys
-from typing import TYPE_CHECKING, Any, TextIO
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, TextIO
 
 import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.quantities import with_options
 from levilab.present.characters import printable
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
 
 
 def print_json(document: Any, *, indent: int | None = 2, sort_keys: bool = False) -> None:

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import typer
 
 from levilab.cli.later import Later
 from levilab.errors import UsageError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 #: A quantity in a message, and its value, as in "take `rate` = 500 or less".
 _QUANTITY = re.compile(r"`([a-z]\w*)`( = False\b| = True\b| = )?")

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import betaincinv, ndtr, stdtr
 from scipy.stats import poisson
@@ -19,10 +19,7 @@ from scipy.stats import poisson
 from analysis.pulses.regression import student
 from levilab.crosscheck.study import FALSE_ALARM, Spread, Verdict
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 def ranks_of(spread: Spread) -> Array:

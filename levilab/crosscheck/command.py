@@ -2,29 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from rich.markup import escape
 
 from levilab.crosscheck.catalogue import SUBJECTS
 from levilab.crosscheck.own.study import OWN, TRIALS, study_result
 from levilab.crosscheck.stored import NAME, as_json, store
-from levilab.crosscheck.study import by_pulls, study_world
+from levilab.crosscheck.study import Judge, Study, by_pulls, study_world
 from levilab.crosscheck.table import as_text, crosscheck_table, failures_as_text
 from levilab.errors import UsageError
 from levilab.files import replace_atomically, writing
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.result import Place
 from levilab.pipelines.suits import recall_suiting
 from levilab.present.progress import ShareBar
 from levilab.present.terminal import draw, terminal
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from pathlib import Path
-
-    from levilab.crosscheck.study import Judge, Study
-    from levilab.pipelines.result import Place
 
 FIGURE, RANKS = "crosscheck.png", "calibration.png"
 #: Number of trials of a calibration: a distribution function that is 0.12 off is seen (Kolmogorov: 1.63/√n at 1 %).

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from pathlib import Path
 
-from levilab.acquisition.loop import acquire
+from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.crosscheck.subject import TrialFailed
 from levilab.present.progress import Display
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from levilab.acquisition.loop import AcquisitionRequest
-    from levilab.runs.run import Run
+from levilab.runs.run import Run
 
 
 def acquire_mock(

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
+
+import numpy as np
 
 from analysis.tuning import TEMPERATURE_U
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    import numpy as np
 
 Law = Literal["even", "even in the logarithm", "normal", "log-normal"]
 #: Each with its two numbers as text, and the function that draws from it.

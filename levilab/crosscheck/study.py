@@ -9,24 +9,19 @@ from __future__ import annotations
 import math
 import re
 import tempfile
-from collections.abc import Callable, Mapping  # pydantic reads the fields of Study from it
+from collections.abc import Callable, Iterator, Mapping, Sequence  # pydantic reads the fields of Study from it
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from analysis.errors import AnalysisError
 from analysis.pulses.regression import student
 from instruments.errors import InstrumentError
-from levilab.crosscheck.subject import Trial, TrialFailed
+from levilab.crosscheck.subject import Pull, Subject, Trial, TrialFailed
 from levilab.errors import LevilabError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from levilab.crosscheck.subject import Pull, Subject
 
 #: How likely a true value lies within 1 u.
 COVERAGE = math.erf(1 / math.sqrt(2))

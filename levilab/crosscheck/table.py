@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
 from levilab.crosscheck.own.model import OF_ONE_RUN
 from levilab.crosscheck.own.study import ENOUGH, TRIALS
-from levilab.crosscheck.study import LONG_TAILS, Spread, Verdict, by_pulls
-from levilab.present.document.blocks import Details, Note, Paragraph, Tabular
+from levilab.crosscheck.study import LONG_TAILS, Judge, Spread, Study, Verdict, by_pulls
+from levilab.present.document.blocks import Block, Details, Note, Paragraph, Tabular
 from levilab.present.numbers import enumeration, how_many, with_sign
 from levilab.present.tables import Row, Table, table
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from levilab.crosscheck.study import Judge, Study
-    from levilab.present.document.blocks import Block
 
 _NUMBERS = ("pulls", "mean pull", "s.d. of pulls\n(wanted)", "within 1 u\n(wanted)", "u/value")
 #: Degrees of freedom from which on u is as if known.

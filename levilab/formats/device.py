@@ -5,7 +5,8 @@ All of it may be left out; what is not there is taken from the run, or is not kn
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Self
+from pathlib import Path
+from typing import Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationError, field_validator, model_validator
 
@@ -13,9 +14,6 @@ from levilab.errors import DataError
 from levilab.files import parse_toml
 from levilab.formats.typed import check_range
 from levilab.settings import Settings, in_one_line
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 class DeviceError(DataError):

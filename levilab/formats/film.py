@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.errors import DataError
 from levilab.software import how_to_install
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
+Picture = NDArray[np.uint8]
 
-    from numpy.typing import NDArray
-
-    Picture = NDArray[np.uint8]
 
 #: Key under which phones write at how many pictures in a second a film was taken, whatever it plays at.
 _CAPTURED = "com.android.capture.fps"

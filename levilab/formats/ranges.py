@@ -6,13 +6,11 @@ Wide enough for any top that floats and its bench.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple, Self
+from typing import NamedTuple, Self
 
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 
 class Unit(NamedTuple):

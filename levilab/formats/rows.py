@@ -15,9 +15,9 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.numbers import how_many
 from levilab.formats.columns import Column, TableError, shorten
@@ -37,9 +37,6 @@ from levilab.formats.titles import dimension, is_unit, read_title, unit_factor
 from levilab.formats.transposed import LIES
 from levilab.texts.note import Note
 from levilab.texts.text import Text as Said
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 #: Decimal mark → what is expected, for messages.
 EXPECTED = {",": Said("a number with decimal comma"), ".": Said("a number with decimal point")}

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import itertools
 import time
+from collections.abc import Callable
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING
 
 from levilab.laboratory.plan import draw
 from levilab.laboratory.visit import Told, visit
 from levilab.workers.ways import processes
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+StatusOf = Callable[[Exception], int | None]
 
-    StatusOf = Callable[[Exception], int | None]
 
 #: Laboratories that a process carries out between two messages.
 _BATCH = 20

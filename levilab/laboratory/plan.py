@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from random import Random
-from typing import TYPE_CHECKING
 
 from instruments.catalogue import CATALOGUE
 from levilab.laboratory.events import EVENTS
@@ -12,9 +12,6 @@ from levilab.laboratory.fate import Event
 from levilab.simulator.laws import LAWS
 from levilab.world.light import Tape
 from levilab.world.spin_world import SpinScene, random_scene
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
 
 #: Processes that a laboratory has at most: the first, and those that resume its run.
 MOST_LIVES = 4

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from levilab.laboratory.plan import MOST_LIVES
+from levilab.laboratory.plan import MOST_LIVES, Plan
 from levilab.laboratory.visit import Told, visit
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from levilab.laboratory.plan import Plan
 
 #: More attempts would take longer than a person waits.
 _MOST_TRIES = 200

@@ -11,26 +11,29 @@ import signal
 import sys
 import tempfile
 import traceback
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from random import Random
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from analysis.errors import AnalysisError
 from instruments.errors import InstrumentError
-from levilab.acquisition.loop import acquire
+from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
+from levilab.acquisition.session import Row, Session
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.bench.config import Limits
+from levilab.bench.wiring import Wiring
 from levilab.computer import at_another_computer
 from levilab.errors import LevilabError
 from levilab.laboratory import judge
-from levilab.laboratory.bench import LaboratoryClock, LaboratoryPerson, laboratory_wiring
+from levilab.laboratory.bench import LaboratoryBench, LaboratoryClock, LaboratoryPerson, laboratory_wiring
 from levilab.laboratory.disk import SimulatedComputer
 from levilab.laboratory.events import EVENTS
-from levilab.laboratory.fate import Fate, Killed
+from levilab.laboratory.fate import Event, Fate, Killed
 from levilab.laboratory.judge import Finding, Life
-from levilab.laboratory.plan import MOST_LIVES
+from levilab.laboratory.plan import MOST_LIVES, Plan
 from levilab.pipelines.suits import analyze_suiting
 from levilab.present.progress import Display
 from levilab.report.document import document_of
@@ -40,18 +43,7 @@ from levilab.runs.listing import list_runs
 from levilab.runs.run import Run
 from levilab.simulator.scene import read_scene
 from levilab.world.bench import scene_world, virtual_instruments
-from levilab.world.spin_world import SpinWorld
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from levilab.acquisition.loop import AcquisitionRequest
-    from levilab.acquisition.session import Row, Session
-    from levilab.bench.wiring import Wiring
-    from levilab.laboratory.bench import LaboratoryBench
-    from levilab.laboratory.fate import Event
-    from levilab.laboratory.plan import Plan
-    from levilab.world.spin_world import World
+from levilab.world.spin_world import SpinWorld, World
 
 #: Where the runs are, the bench file of a bench that goes on between processes, and the command of each run.
 _RUNS, _BENCH, _COMMAND = Path("runs"), Path("bench.toml"), ["levilab", "acquire"]

@@ -9,17 +9,13 @@ import re
 import subprocess
 import sys
 import threading
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
 
 from levilab.files import stamp
-from levilab.pipelines.result import beside
+from levilab.pipelines.result import Place, beside
 from levilab.texts.text import ENGLISH, Text, text_from
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from levilab.pipelines.result import Place
 
 #: Figures that stand beside an input, and its report.
 FIGURES = re.compile(r"[a-z][a-z-]{0,30}\.(png|svg)")

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import heapq
 import os
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from levilab.errors import DataError
 from levilab.runs.find import RECORD
-from levilab.runs.run import LONGEST_GROUP, Run
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator
-    from pathlib import Path
-
-    from levilab.runs.run import RunRecord
+from levilab.runs.run import LONGEST_GROUP, Run, RunRecord
 
 #: Runs to choose from.
 MOST_RUNS = 50

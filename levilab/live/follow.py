@@ -7,9 +7,12 @@ import json
 import math
 import time
 from collections import deque
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.errors import DataError
 from levilab.files import stamp
@@ -19,12 +22,6 @@ from levilab.live.tail import Tail
 from levilab.runs.find import RECORD
 from levilab.runs.run import EVENTS, READINGS, Run, RunRecord
 from levilab.texts.text import text_from
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from pathlib import Path
-
-    from numpy.typing import NDArray
 
 #: Events that are kept: of more, the first and the last ones matter, and the file has all.
 MOST_EVENTS = 400

@@ -8,9 +8,10 @@ import hashlib
 import re
 import secrets
 import unicodedata
+from collections.abc import AsyncIterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import LevilabError, UsageError
 from levilab.formats.film import NoFilm, open_film
@@ -20,9 +21,6 @@ from levilab.pipelines.correction import ENDING, read_correction, read_file_opti
 from levilab.pipelines.look import Look, look_as_kept, look_at
 from levilab.pipelines.options import read_options
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Mapping
 
 #: The largest file that is taken in [bytes]: an hour of sound, two million rows of an oscilloscope.
 MOST_BYTES = 400 << 20

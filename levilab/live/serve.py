@@ -6,15 +6,17 @@ import contextlib
 import errno
 import socket
 import threading
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import uvicorn
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from levilab.errors import LevilabError, UsageError, check_language
 from levilab.files import must_be_folder
+from levilab.interruption import End
 from levilab.live.desk import Desk
 from levilab.live.doors import Doors, doors_for_guests
 from levilab.live.practice.bench import PracticeBench
@@ -22,11 +24,6 @@ from levilab.live.server import Hall, application
 from levilab.live.share import address_in_network
 from levilab.runs.find import RECORD, run_or_folder
 from levilab.texts.text import ENGLISH, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping
-
-    from levilab.interruption import End
 
 #: Only programs of this machine reach it; a shared view has a second socket, for guests.
 HOST = "127.0.0.1"

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 from levilab.errors import UsageError
 from levilab.formats.typed import read_mass, read_masses, read_temperature
 from levilab.pipelines.tune.advice import advise
 from levilab.pipelines.tune.owner import Owner, washers_text
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 #: Trials that are taken at most.
 _MOST_TRIALS = 100

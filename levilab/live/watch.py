@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import time
 from collections import deque
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,17 +17,11 @@ from levilab.live.envelope import by_columns
 from levilab.live.follow import Followed
 from levilab.live.running import Running, fit_so_far
 from levilab.live.views import u_of, unit_of, view_of
-from levilab.telemetry.address import read_address
+from levilab.telemetry.address import Address, read_address
 from levilab.telemetry.codec import pack
-from levilab.telemetry.messages import Poses, Record, State
+from levilab.telemetry.messages import Message, Poses, Record, State
 from levilab.telemetry.subscriber import Subscriber
 from levilab.texts.text import ENGLISH, Text, in_language
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from levilab.telemetry.address import Address
-    from levilab.telemetry.messages import Message
 
 #: A bench that has published nothing for so long is silent [s].
 SILENT_AFTER_S = 4.0

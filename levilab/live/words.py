@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable
 from functools import cache
 from html import escape, unescape
-from typing import TYPE_CHECKING
 
 from levilab.texts.text import in_language, language_of, languages
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 #: What a person sees or hears of HTML: text between elements, and these attributes.
 _SAID = re.compile(r'(>\s*)([^<>\s{][^<>]*?)(?=\s*<)|(\b(?:title|aria-label|placeholder|data-drop)=")([^"]+)(?=")')

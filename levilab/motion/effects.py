@@ -8,8 +8,9 @@ effect: the simulator is fast enough to compute it.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,15 +18,10 @@ from analysis.lines import spectral_lines
 from levilab.errors import SimulationError
 from levilab.motion.lines import rate_for
 from levilab.simulator.equilibrium import advice, modes_at, stability_of
-from levilab.simulator.scene import SceneError
+from levilab.simulator.scene import Scene, SceneError
 from levilab.simulator.single import simulate
+from levilab.simulator.trajectory import Trajectory
 from levilab.texts.text import Text, text_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from levilab.simulator.scene import Scene
-    from levilab.simulator.trajectory import Trajectory
 
 #: Time that is compared [s]: some twenty oscillations of the height, and a resolution of 0.1 Hz.
 LONGEST = 20.0

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 import sys
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,22 +17,16 @@ from levilab.errors import UsageError
 from levilab.files import writing
 from levilab.interruption import interruption_postponed
 from levilab.motion.lines import rate_for
-from levilab.motion.summary import as_document, summarise
+from levilab.motion.summary import Summary, as_document, summarise
 from levilab.runs.events import RunEvent
 from levilab.runs.run import STATES, RunRecord
 from levilab.runs.writer import RunWriter
 from levilab.simulator.compilation import announce_compilation
+from levilab.simulator.scene import Scene
 from levilab.simulator.single import LONGEST_S, simulate
+from levilab.simulator.trajectory import Trajectory
 from levilab.software import software_versions
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from levilab.motion.summary import Summary
-    from levilab.simulator.scene import Scene
-    from levilab.simulator.trajectory import Trajectory
 
 FIGURE = "motion.png"
 

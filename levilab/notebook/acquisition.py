@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from contextlib import suppress
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.acquisition.loop import acquire
-from levilab.acquisition.request import request_for
+from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import EXPERIMENTS
+from levilab.bench.person import Task
 from levilab.errors import DataError, UsageError
 from levilab.notebook.result import AnalysisResult
 from levilab.notebook.run import RecordedRun
@@ -20,13 +23,6 @@ from levilab.present.progress import Display
 from levilab.runs.find import RECORD, find_run, no_such_path
 from levilab.runs.run import Run
 from levilab.simulator.keys import plain
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from os import PathLike
-
-    from levilab.acquisition.request import AcquisitionOptions
-    from levilab.bench.person import Task
 
 
 def acquire_run(experiment: str, options: AcquisitionOptions) -> RecordedRun:

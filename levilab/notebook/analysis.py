@@ -6,13 +6,14 @@ import shutil
 import tempfile
 import warnings
 import weakref
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from glob import glob
 from os import PathLike
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import DataError, DoesNotSuit, DoubtWarning, LevilabError, UsageError, unquote
 from levilab.notebook.frame import (
@@ -27,19 +28,13 @@ from levilab.notebook.frame import (
 )
 from levilab.notebook.result import AnalysisResult
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.document import refuse_columns_of_runs
+from levilab.pipelines.document import Analysis, refuse_columns_of_runs
 from levilab.pipelines.options import read_options
-from levilab.pipelines.suits import suiting
+from levilab.pipelines.suits import Suiting, suiting
 from levilab.present.numbers import list_in_words
 from levilab.runs.find import find_run
 from levilab.runs.run import Run
 from levilab.texts.note import reword
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from levilab.pipelines.document import Analysis
-    from levilab.pipelines.suits import Suiting
 
 
 def analyze_data(data: Any, kind: Any, given: Mapping[str, Any]) -> AnalysisResult:

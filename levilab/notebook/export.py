@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import sys
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import UsageError, unquote
 from levilab.notebook.analysis import analyze_data
 from levilab.notebook.motion import SimulatedMotion
 from levilab.notebook.result import AnalysisResult
 from levilab.notebook.sweep import SimulatedMap
-from levilab.report.export.contents import contents_of, contents_of_results
+from levilab.report.export.contents import Contents, contents_of, contents_of_results
 from levilab.report.export.write import export
 from levilab.runs.run import Run
-
-if TYPE_CHECKING:
-    from os import PathLike
-
-    from levilab.report.export.contents import Contents
 
 
 def export_data(data: Any, output: str | PathLike[str], **options: Any) -> list[Path]:

@@ -5,23 +5,20 @@ from __future__ import annotations
 import math
 import operator
 import re
+from collections.abc import Callable, Mapping, Sequence, ValuesView
 from dataclasses import dataclass, field
 from functools import partial
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from analysis.uncertainty import Estimate
 from levilab.errors import UsageError
 from levilab.formats.typed import ratio
 from levilab.notebook.names import Helpful, NoSuchAttribute, bare, border, meant
 from levilab.present.numbers import in_one_line, without_unit
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence, ValuesView
-
-    from numpy.typing import ArrayLike
 
 V = TypeVar("V")
 #: Name in another library (uncertainties, lmfit, pint) → attribute.

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import sys
 import tempfile
+from collections.abc import Mapping
 from dataclasses import fields
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import DataError, UsageError
 from levilab.notebook.motion import SimulatedMotion
@@ -17,10 +18,7 @@ from levilab.report.page import write_report
 from levilab.runs.find import find_run
 from levilab.runs.run import Run
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    Reported = Run | AnalysisResult | SimulatedMotion | SimulatedMap | str | PathLike[str]
+Reported = Run | AnalysisResult | SimulatedMotion | SimulatedMap | str | PathLike[str]
 
 
 def report_on(data: Any, output: str | PathLike[str], *, tables: bool, crosscheck: bool) -> Path:

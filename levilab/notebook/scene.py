@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import UsageError
 from levilab.formats.typed import read_number, unit_of_key
 from levilab.simulator.keys import parse_setting
 from levilab.simulator.scene import Scene, leaves, preset, presets, read_scene
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from os import PathLike
 
 
 def list_scenes() -> dict[str, str]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from levilab.errors import DataError, UsageError
 from levilab.files import parse_toml, replace_atomically, toml_value, writing
@@ -12,10 +14,6 @@ from levilab.formats.columns import SHORTHANDS, key_of
 from levilab.formats.texts import locate, texts_of
 from levilab.formats.understanding import is_named, understand
 from levilab.pipelines.options import OF_FILES, read_options
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
 
 ENDING = ".levilab.toml"
 #: The table of tables of what holds for one sheet or run of a file alone.

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import islice
+from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,19 +19,13 @@ from levilab.formats.titles import COMPONENTS, MAGNITUDE
 from levilab.formats.understanding import UnderstoodColumn, UnderstoodRun, understand
 from levilab.formats.waveforms.header import NoWaveform
 from levilab.formats.waveforms.record import read_record
-from levilab.formats.waveforms.waveform import PulseTimes
+from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 from levilab.pipelines.correction import corrected_parts, read_correction
 from levilab.pipelines.field import readings as scan
 from levilab.pipelines.limit import readings as limit
 from levilab.pipelines.precession import readings as precession
 from levilab.pipelines.spin import magnetometer
 from levilab.pipelines.spindown import readings as spindown
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-    from pathlib import Path
-
-    from levilab.formats.waveforms.waveform import Waveform
 
 #: Quantities that a column may hold, as text, and the units to choose from.
 QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType({

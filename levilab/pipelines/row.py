@@ -5,17 +5,13 @@ A column of a table of many runs is read from the input's part of result.json, s
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from analysis.uncertainty import Estimate
 from levilab.present.numbers import column
-from levilab.present.units import name_with_unit, unit
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-
-    from levilab.present.units import Scale
+from levilab.present.units import Scale, name_with_unit, unit
 
 #: The type of a column: a float, a whole number, true or false, text.
 Kind = Literal["number", "count", "truth", "text"]

@@ -8,21 +8,28 @@ folder is for the analyses of the runs and files in it.  A result that was writt
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from analysis.errors import AnalysisError
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.pipelines import catalogue
-from levilab.pipelines.result import ResultError, is_of_another, read_inputs, results_in
+from levilab.pipelines.analyzed import A
+from levilab.pipelines.document import Analysis
+from levilab.pipelines.options import InputOptions
+from levilab.pipelines.result import Archive, ResultError, Written, is_of_another, read_inputs, results_in
 from levilab.pipelines.result import save as save_files
 from levilab.pipelines.sources import (
     FEW,
     Found,
     LeftOut,
     NothingSuits,
+    NotTaken,
     Skipped,
     SkippedRuns,
+    Source,
     data_files,
     find,
     in_words,
@@ -34,17 +41,7 @@ from levilab.runs.find import RECORD, find_run, find_runs
 from levilab.runs.run import Run
 from levilab.texts.text import Text
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Mapping, Sequence
-    from pathlib import Path
-
-    from levilab.pipelines.analyzed import A
-    from levilab.pipelines.document import Analysis
-    from levilab.pipelines.options import InputOptions
-    from levilab.pipelines.result import Archive, Written
-    from levilab.pipelines.sources import NotTaken, Source
-
-    Tell = Callable[[str], None]
+Tell = Callable[[str], None]
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from analysis.errors import AnalysisError
 from analysis.numbers import digits
 from analysis.top import Cylinder, Top, top_of
+from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.files import finite
 from levilab.formats.device import read_device
@@ -16,11 +18,6 @@ from levilab.pipelines.field.device import parts_of
 from levilab.pipelines.row import Quantity
 from levilab.present.numbers import with_uncertainty
 from levilab.present.tables import Row, Table, table
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from analysis.uncertainty import Estimate
 
 SCHEMA = "levilab-top/1"
 

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING
 
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 #: No run is longer [s]; the calendar ends at 3×10¹¹ s.
 _LONGEST_S = 1e9

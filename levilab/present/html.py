@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from html import escape
-from typing import TYPE_CHECKING
 
 from levilab.present.document.typesetting import typeset
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
 
 #: Texts stand on the left and numbers on the right, with room between columns, whatever a page does with tables.
 _LEFT, _RIGHT = "text-align: left; padding: 0 1em 0 0", "text-align: right; padding: 0 1em 0 0"

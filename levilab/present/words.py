@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 from levilab.present.units import split
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 #: Instruments say infinite as 9.9e37 (SCPI-99 volume 1, §7.2.1.4).
 INFINITE = 9e37

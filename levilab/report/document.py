@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any, Literal
+from pathlib import Path
+from typing import Any, Literal
 
 from levilab.crosscheck.own.study import OWN, quick_study
 from levilab.crosscheck.stored import read_study
 from levilab.crosscheck.table import blocks_of
 from levilab.errors import unquote
-from levilab.pipelines.sources import mark_of
+from levilab.pipelines.analyzed import A, Analyzed
+from levilab.pipelines.document import Analysis
+from levilab.pipelines.part import ReportPart
+from levilab.pipelines.sources import Source, mark_of
 from levilab.present.document.blocks import (
     Banner,
+    Block,
     Code,
     Document,
     Facts,
@@ -26,23 +32,13 @@ from levilab.present.document.blocks import (
     with_marks,
 )
 from levilab.present.numbers import enumeration, how_many, list_in_words
-from levilab.report.inputs import About, describe, in_common
+from levilab.report.inputs import About, Input, describe, in_common
 from levilab.report.reproduction import Asked, paths_in_commands, reproduction
 from levilab.texts.note import is_doubt
 from levilab.texts.text import Sentences, Text, in_language
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from pathlib import Path
+Results = Sequence[tuple[Analysis[Any], Any]]
 
-    from levilab.pipelines.analyzed import A, Analyzed
-    from levilab.pipelines.document import Analysis
-    from levilab.pipelines.part import ReportPart
-    from levilab.pipelines.sources import Source
-    from levilab.present.document.blocks import Block
-    from levilab.report.inputs import Input
-
-    Results = Sequence[tuple[Analysis[Any], Any]]
 
 #: With more inputs the report is an overview: the section of each can be opened, and the figure is a PNG, a tenth as
 #: large as an SVG with the lines of all of them.

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from levilab.errors import unquote
-from levilab.pipelines.sources import mark_of
+from levilab.pipelines.part import InputPart, ReportPart
+from levilab.pipelines.sources import Source, mark_of
 from levilab.pipelines.tune.owner import washers_text
 from levilab.present.clock import local, moment
-from levilab.present.document.blocks import Details, Fact, Facts, Listing, Note, Section, Tabular, with_marks
+from levilab.present.document.blocks import Block, Details, Fact, Facts, Listing, Note, Section, Tabular, with_marks
 from levilab.present.tables import table
 from levilab.present.units import split
 from levilab.present.words import setting_in_words, settings_in_words, value_in_words
+from levilab.runs.run import RunRecord
 from levilab.texts.text import Text, in_language, text_from
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from levilab.pipelines.part import InputPart, ReportPart
-    from levilab.pipelines.sources import Source
-    from levilab.present.document.blocks import Block
-    from levilab.runs.run import RunRecord
 
 #: Events printed in the page; more stay in the run folder.
 MOST_EVENTS = 100

@@ -6,21 +6,18 @@ What simulates is imported where one of them was found: a report of measurements
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import DataError
 from levilab.files import parse_json
+from levilab.present.document.blocks import Section
 from levilab.report.tables.values import Values
 from levilab.runs.find import find_runs
 from levilab.runs.run import Run, read_record
 from levilab.stability.report import stability_section
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from levilab.present.document.blocks import Section
 
 #: Of more inputs of a kind the report is an overview.
 MOST_IN_FULL = 12

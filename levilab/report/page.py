@@ -5,42 +5,35 @@ Nothing is fetched when it is opened, what a person typed is never markup, and t
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from hashlib import sha256
+from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import DoesNotSuit, NoneUsable, UsageError
 from levilab.files import check_writable, replace_atomically, writing
+from levilab.pipelines.analyzed import A
+from levilab.pipelines.document import Analysis
 from levilab.pipelines.sources import SkippedRuns, data_files
 from levilab.pipelines.suits import recall_suiting, remarks, texts_of
 from levilab.present.clock import local
-from levilab.present.document.blocks import in_language_of_reader
+from levilab.present.document.blocks import Document, in_language_of_reader
 from levilab.present.numbers import list_in_words
-from levilab.report.document import document_of, notebook_blocks
+from levilab.report.document import Results, document_of, notebook_blocks
 from levilab.report.html.page import fragment_of, page_of
-from levilab.report.kinds import KINDS
+from levilab.report.kinds import KINDS, Kind
 from levilab.report.pdf.renderer import as_pdf, check_typst
 from levilab.report.reproduction import Asked, Heading
-from levilab.report.tables.values import folder_of, of_analysis, write_tables
+from levilab.report.tables.values import Values, folder_of, of_analysis, write_tables
 from levilab.runs.find import find_runs
 from levilab.texts.text import Text, spoken
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-    from contextlib import AbstractContextManager
-    from pathlib import Path
-
-    from levilab.pipelines.analyzed import A
-    from levilab.pipelines.document import Analysis
-    from levilab.present.document.blocks import Document
-    from levilab.report.document import Results
-    from levilab.report.kinds import Kind
-    from levilab.report.tables.values import Values
-
-    #: Each kind of input with those that were found.
-    Found = Sequence[tuple[Kind, Sequence[Path]]]
+#: Each kind of input with those that were found.
+Found = Sequence[tuple[Kind, Sequence[Path]]]
 
 
 class UnknownFormat(UsageError):

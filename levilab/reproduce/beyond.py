@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,16 +15,13 @@ from levilab.motion.lines import lines_of
 from levilab.motion.lock import body_angle
 from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import enumeration, with_sign
-from levilab.reproduce.check import Because, Found, check, statement
+from levilab.reproduce.check import Because, Finding, Found, check, statement
 from levilab.reproduce.figure import counter_figure, window_figure
 from levilab.reproduce.tops import DURATION_S, MASS_KG, THESIS, Array, known, many, preset_at, simulate_for_lines
 from levilab.simulator.equilibrium import modes_at, stability_of, windows_over
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 from levilab.stability.thesis import SIMULATED_HZ
-
-if TYPE_CHECKING:
-    from levilab.reproduce.check import Finding
 
 #: A spin-down in full motion: longest duration, and what a reading averages over and how often it is taken [s].
 LONGEST_S, GATE_S, EVERY_S = 240.0, 1.0, 5.0

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from levilab.present.document.blocks import Picture
 from levilab.present.numbers import with_sign
-from levilab.reproduce.check import Found, check, statement
+from levilab.reproduce.check import Finding, Found, check, statement
 from levilab.reproduce.figure import dipole_figure
 from levilab.reproduce.tops import THESIS, Array
 from levilab.simulator.disc import nodes_of, rule_for
 from levilab.simulator.equilibrium import axial_field, stability_of
 from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
-from levilab.simulator.scene import preset
-
-if TYPE_CHECKING:
-    from levilab.reproduce.check import Finding
-    from levilab.simulator.scene import Scene
+from levilab.simulator.scene import Scene, preset
 
 #: Where the thesis's top floated [m].
 HEIGHT_M = THESIS["device.height"].value / 100

@@ -8,23 +8,19 @@ from __future__ import annotations
 
 import math
 from functools import cache, partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.pull import Driven
 from analysis.stability import wobble_resonance
 from levilab.present.document.blocks import Note, Picture
-from levilab.reproduce.check import Found, check, statement
+from levilab.reproduce.check import Finding, Found, check, statement
 from levilab.reproduce.figure import drive_figure
 from levilab.reproduce.tops import THESIS, known
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.published.printed import several
 from levilab.simulator.scene import preset
 from levilab.stability.thesis import HIGHEST_HZ, ISLANDS_HZ, LOOSE_HZ
-
-if TYPE_CHECKING:
-    from levilab.reproduce.check import Finding
 
 #: Amplitudes [T] and ramps [Hz/s] of the drive; the amplitude of the thesis's simulations.
 FIELDS_T, RAMPS = (3e-4, 4e-4, 5e-4, 6e-4), (0.0, 0.05, 0.1)

@@ -4,24 +4,18 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.motion.lines import lines_of
+from levilab.motion.lines import AxisLines, lines_of
 from levilab.motion.lock import is_locked
 from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import with_decimals
-from levilab.reproduce.check import Found, Within, check, statement
+from levilab.reproduce.check import Finding, Found, Within, check, statement
 from levilab.reproduce.figure import azimuth_figure, driven_figure
-from levilab.reproduce.tops import THESIS, simulate_for_lines
+from levilab.reproduce.tops import THESIS, Array, simulate_for_lines
 from levilab.simulator.scene import preset
-
-if TYPE_CHECKING:
-    from levilab.motion.lines import AxisLines
-    from levilab.reproduce.check import Finding
-    from levilab.reproduce.tops import Array
-    from levilab.simulator.trajectory import Trajectory
+from levilab.simulator.trajectory import Trajectory
 
 #: Distances from a line within which the power of the axis is counted [Hz].
 NEAR_LINES_HZ = (0.1, 1.0)

@@ -3,32 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import numpy as np
 
 from analysis.field.ring import Ring
 from analysis.field.ring import on_axis as ring_on_axis
 from levilab.present.document.blocks import Note
-from levilab.reproduce.check import Found, erratum
-from levilab.reproduce.tops import ESTIMATE_KG, MASS_KG, THESIS, estimate_hz, known, many, preset_at, scan
+from levilab.reproduce.check import Finding, Found, erratum
+from levilab.reproduce.tops import ESTIMATE_KG, MASS_KG, THESIS, Array, estimate_hz, known, many, preset_at, scan
 from levilab.simulator.energy import magnetic_energy
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.field import field_of, flux_density, on_axis
 from levilab.simulator.kernels.motion import R, V
 from levilab.simulator.model import base_field
 from levilab.simulator.published.printed import several
-from levilab.simulator.scene import preset
+from levilab.simulator.scene import Scene, preset
 from levilab.simulator.single import simulate
+from levilab.simulator.trajectory import Trajectory
 from levilab.stability.scan import lower_limit
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from levilab.reproduce.check import Finding
-    from levilab.reproduce.tops import Array
-    from levilab.simulator.scene import Scene
-    from levilab.simulator.trajectory import Trajectory
 
 #: Rates of change are taken from the motion this long before and after the start [s]: its error is 1e-7 of them.
 _H_S = 2e-5

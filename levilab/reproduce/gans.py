@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -18,10 +18,7 @@ from levilab.reproduce.figure import gans_figure
 from levilab.reproduce.tops import Array, known, many
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.published.printed import published
-from levilab.simulator.scene import preset
-
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
+from levilab.simulator.scene import Scene, preset
 
 GANS = published("gans-1998")
 ABSTRACT = "abstract"

@@ -4,20 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from levilab.present.document.blocks import Note, Picture
-from levilab.reproduce.check import Among, Because, Comparison, Found, Within, check, statement
+from levilab.reproduce.check import Among, Because, Comparison, Finding, Found, Within, check, statement
 from levilab.reproduce.figure import limits_figure
 from levilab.reproduce.tops import DURATION_S, FALL_M, MASS_KG, THESIS, Array, Flags, known, many, preset_at, scan
 from levilab.simulator.equilibrium import stability_of
 from levilab.stability.scan import all_up_until, last_up, lower_limit, upper_edges
 from levilab.stability.thesis import SIMULATED_HZ, STARTS
-
-if TYPE_CHECKING:
-    from levilab.reproduce.check import Finding
 
 #: Steps of the scans for lower limits, for upper ones, and for the misprint [Hz].
 STEP_HZ, UPPER_STEP_HZ, COARSE_HZ = 0.01, 0.02, 0.05

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,18 +11,14 @@ from analysis.numbers import digits
 from analysis.stability import sleeping_limit
 from levilab.motion.lines import lines_of
 from levilab.present.document.blocks import Picture
-from levilab.reproduce.check import Because, Found, Within, check, statement
+from levilab.reproduce.check import Because, Finding, Found, Within, check, statement
 from levilab.reproduce.figure import fall_figure, paths_figure, tilted_figure
 from levilab.reproduce.tops import DURATION_S, FALL_M, THESIS, known, many, preset_at, simulate_for_lines
 from levilab.simulator.equilibrium import stability_of
-from levilab.simulator.scene import preset
+from levilab.simulator.scene import Scene, preset
 from levilab.simulator.single import simulate
+from levilab.simulator.trajectory import Trajectory
 from levilab.stability.thesis import SIMULATED_HZ, STARTS
-
-if TYPE_CHECKING:
-    from levilab.reproduce.check import Finding
-    from levilab.simulator.scene import Scene
-    from levilab.simulator.trajectory import Trajectory
 
 #: How long a path is shown [s], and samples per second.
 PATH_S, PATH_HZ = 10.0, 400.0

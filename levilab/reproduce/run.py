@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import UsageError, list_known
-from levilab.reproduce.chapters import CHAPTERS
-from levilab.reproduce.check import Verdict, as_document, counts
+from levilab.reproduce.chapters import CHAPTERS, Chapter
+from levilab.reproduce.check import Finding, Found, Verdict, as_document, counts
 from levilab.software import software_versions
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from levilab.reproduce.chapters import Chapter
-    from levilab.reproduce.check import Finding, Found
 
 SCHEMA = "levilab-reproduction/1"
 

@@ -5,24 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.stability import SymmetricTop, sleeping_limit, spin_windows
 from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import with_sign
-from levilab.reproduce.check import Among, Because, Found, check, statement
+from levilab.reproduce.check import Among, Because, Finding, Found, check, statement
 from levilab.reproduce.figure import simon_figure
 from levilab.reproduce.tops import Array, Flags, many, scan
 from levilab.simulator.field import field_of, on_axis
 from levilab.simulator.published.printed import published
-from levilab.simulator.scene import preset
+from levilab.simulator.scene import Scene, preset
 from levilab.stability.scan import all_up_until, lower_limit
-
-if TYPE_CHECKING:
-    from levilab.reproduce.check import Finding
-    from levilab.simulator.scene import Scene
 
 SIMON = published("simon-1997")
 TOPS = ("1", "2", "3")

@@ -10,24 +10,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.numbers import digits
 from analysis.spindown.combine import mean
-from analysis.spindown.fit import fit_spin_down
+from analysis.spindown.fit import SpinDown, fit_spin_down
 from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
-from levilab.reproduce.check import Comparison, Found, Within, check, statement
+from levilab.reproduce.check import Comparison, Finding, Found, Within, check, statement
 from levilab.reproduce.figure import spindown_figure
 from levilab.reproduce.tops import THESIS, Array, known
 from levilab.simulator.published.printed import several
 from levilab.simulator.scene import preset
-
-if TYPE_CHECKING:
-    from analysis.spindown.fit import SpinDown
-    from levilab.reproduce.check import Finding
 
 #: Of synthetic readings: noise [Hz], and the time between two [s].
 NOISE_HZ, STEP_S = 0.03, 10.0

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.limits import Sample, compare, summarize
 from levilab.present.document.blocks import Picture
 from levilab.present.numbers import with_sign
-from levilab.reproduce.check import Found, check, statement
+from levilab.reproduce.check import Finding, Found, check, statement
 from levilab.reproduce.figure import statistics_figure
-from levilab.reproduce.tops import THESIS, known
+from levilab.reproduce.tops import THESIS, Array, known
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.published.printed import several
 from levilab.simulator.scene import preset
-
-if TYPE_CHECKING:
-    from levilab.reproduce.check import Finding
-    from levilab.reproduce.tops import Array
 
 #: The limits are printed in steps of this [Hz].
 STEP_HZ = 0.1

@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Mapping
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.stability import thesis_limit
 from levilab.motion.lines import rate_for
-from levilab.simulator.ensemble import simulate_many
+from levilab.simulator.ensemble import Ensemble, simulate_many
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.published.printed import published
-from levilab.simulator.scene import preset, with_settings
+from levilab.simulator.scene import Scene, preset, with_settings
 from levilab.simulator.single import simulate
+from levilab.simulator.trajectory import Trajectory
 from levilab.stability.thesis import STARTS
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from levilab.simulator.ensemble import Ensemble
-    from levilab.simulator.scene import Scene
-    from levilab.simulator.trajectory import Trajectory
 
 T = TypeVar("T")
 Array = NDArray[np.float64]

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.stability import floating_mass, reduced_mass
 from levilab.present.document.blocks import Note, Picture
-from levilab.reproduce.check import Because, Comparison, Found, check
+from levilab.reproduce.check import Because, Comparison, Finding, Found, check
 from levilab.reproduce.figure import Contours, contour_figure
 from levilab.reproduce.tops import ESTIMATE_KG, THESIS, estimate_hz, known
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
-from levilab.simulator.scene import preset
-
-if TYPE_CHECKING:
-    from levilab.reproduce.check import Finding
-    from levilab.simulator.scene import Scene
+from levilab.simulator.scene import Scene, preset
 
 #: The base with b = 2a has the inner radius of the thesis's: only the ratio matters.
 TWICE = {"base.outer_radius_m": 0.060}

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import os
 import stat
+from collections.abc import Sequence
 from dataclasses import dataclass
 from operator import methodcaller
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import pydantic_core
 from rich.cells import cell_len
@@ -22,9 +23,6 @@ from levilab.present.terminal import print_rows, terminal
 from levilab.runs.find import RECORD, find_runs, must_be_searchable
 from levilab.runs.run import READINGS, Run, RunRecord
 from levilab.texts.text import Text, in_language
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,11 @@ import contextlib
 import hashlib
 import io
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
 from instruments.drivers.oscilloscope import Trace
@@ -22,12 +24,8 @@ from levilab.errors import DataError
 from levilab.files import parse_json, replace_atomically
 from levilab.settings import Settings, in_one_line
 
-if TYPE_CHECKING:
-    from pathlib import Path
+Codes = NDArray[np.uint8] | NDArray[np.uint16]
 
-    from numpy.typing import NDArray
-
-    Codes = NDArray[np.uint8] | NDArray[np.uint16]
 
 #: The folder of the codes, and the file with a line for each record.
 FOLDER, INDEX = "traces", "traces.jsonl"

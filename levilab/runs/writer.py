@@ -14,10 +14,13 @@ import math
 import os
 import re
 import shutil
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import count
-from typing import TYPE_CHECKING, Any, Self
+from pathlib import Path
+from typing import Any, Self
 
 from analysis.numbers import how_many
+from instruments.drivers.oscilloscope import Trace
 from levilab.computer import computer, utc_now
 from levilab.errors import DataError, unquote
 from levilab.files import CannotWrite, make_folder, must_be_folder, replace_atomically
@@ -25,15 +28,8 @@ from levilab.runs import traces
 from levilab.runs.events import RunEvent
 from levilab.runs.find import RECORD
 from levilab.runs.package import field, package, resource
-from levilab.runs.run import EVENTS, LOCK, PACKAGE, READINGS, STATES, WIRE, RunRecord, lock_of, read_record
+from levilab.runs.run import EVENTS, LOCK, PACKAGE, READINGS, STATES, WIRE, Run, RunRecord, Status, lock_of, read_record
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-    from pathlib import Path
-
-    from instruments.drivers.oscilloscope import Trace
-    from levilab.runs.run import Run, Status
 
 #: Files that grow line by line, kept in memory to be written again.
 _KEPT = (READINGS, STATES, EVENTS, traces.INDEX)

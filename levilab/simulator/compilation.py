@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import contextlib
 import time
-from typing import TYPE_CHECKING
 
 import levilab.simulator.kernels  # noqa: F401 - first, since its error says what to do without numba
 
 # isort: split
+from collections.abc import Callable, Iterator
+
 from numba.core.event import Event, Listener, install_listener
 
 from levilab.simulator.kernels.splitting import advance
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 
 @contextlib.contextmanager

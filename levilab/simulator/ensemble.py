@@ -5,9 +5,10 @@ from __future__ import annotations
 import itertools
 import math
 import os
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,14 +23,10 @@ from levilab.simulator.kernels.loads import Bursts
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, L, N, R, V
 from levilab.simulator.kernels.pieces import DURATION, FIRST, HEIGHT, OFF, RADIUS, RATE, STEEP, STEP
 from levilab.simulator.keys import SceneError
+from levilab.simulator.scene import Scene
 from levilab.simulator.single import MIN_STEPS_FOR_DOUBLING, check, simulate, simulate_at_step
 from levilab.simulator.stops import MOST_KINKS, MOST_STEPS
 from levilab.simulator.varied import Batch, batches, broadcast, scene_at
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from levilab.simulator.scene import Scene
 
 Array = NDArray[np.float64]
 

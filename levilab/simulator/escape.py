@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,6 @@ from scipy.optimize import brentq
 
 from levilab.simulator.kernels.motion import TIME, R, V
 from levilab.simulator.trajectory import Event
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 Array = NDArray[np.float64]
 #: Radius and height of the escape [m]: the same for all tops, or shape (n,) each.

@@ -5,15 +5,13 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
 
 from levilab.errors import LevilabError, RequestError
 from levilab.files import parse_toml, toml_value
 from levilab.formats.typed import read_number, unit_of_key
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping
 
 Table = dict[str, Any]
 

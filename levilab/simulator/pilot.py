@@ -9,18 +9,14 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from levilab.simulator.accuracy import SAFETY_FACTOR
 from levilab.simulator.kernels.motion import TIME, N, R
-from levilab.simulator.problem import Stretch
-
-if TYPE_CHECKING:
-    from levilab.simulator.problem import Problem
-    from levilab.simulator.stops import Stops
+from levilab.simulator.problem import Problem, Stretch
+from levilab.simulator.stops import Stops
 
 Array = NDArray[np.float64]
 

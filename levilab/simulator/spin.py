@@ -12,17 +12,15 @@ so a law is a row of functions.  The laws share no algebra with the ones that ar
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from levilab.simulator.laws import LAWS
 from levilab.simulator.numbers import sqrt
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 Array = NDArray[np.float64]
 

@@ -8,12 +8,13 @@ each of them gets a scene of its own.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin
+from typing import Annotated, Any, get_args, get_origin
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
 from levilab.errors import LevilabError, SimulationError
@@ -28,14 +29,8 @@ from levilab.simulator.model import model_of
 from levilab.simulator.numbers import Indices, Numbers, T, numbers, numbers_of, split, template_of
 from levilab.simulator.problem import scheme_for
 from levilab.simulator.scene import RULES, Scene
+from levilab.simulator.schemes import Scheme
 from levilab.simulator.start import start_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-
-    from numpy.typing import ArrayLike
-
-    from levilab.simulator.schemes import Scheme
 
 Array = NDArray[np.float64]
 #: Keys with their values, broadcast to one shape.

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import shlex
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
 
 from levilab.errors import DataError, LevilabError
 from levilab.files import parse_json
-from levilab.present.document.blocks import Banner, Code, Fact, Facts, Section, Tabular, Verdict, Warnings
+from levilab.present.document.blocks import Banner, Block, Code, Fact, Facts, Section, Tabular, Verdict, Warnings
 from levilab.present.numbers import plain
 from levilab.present.tables import table
-from levilab.simulator.scene import changes, scene_of
+from levilab.simulator.scene import Scene, changes, scene_of
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from pathlib import Path
-
-    from levilab.present.document.blocks import Block
-    from levilab.simulator.scene import Scene
 
 #: An option of a command that a reader types.
 _OPTION = "--{}"

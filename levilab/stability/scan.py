@@ -7,15 +7,12 @@ of the scan.  So a scan, never a bisection alone, and its step beside every limi
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
-    Flags = NDArray[np.bool_]
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
 
 
 def intervals(flags: Flags) -> list[tuple[int, int]]:

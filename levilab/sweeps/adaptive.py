@@ -9,30 +9,33 @@ from __future__ import annotations
 
 import contextlib
 from collections import deque
+from collections.abc import Callable, Generator
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.errors import SimulationError, UsageError, WorkersLost
 from levilab.files import writing
 from levilab.interruption import interruption_postponed
 from levilab.sweeps.axes import first_error
+from levilab.sweeps.plan import Plan
 from levilab.sweeps.quantities import OBSERVABLES, columns_of, step_in_words
-from levilab.sweeps.refinement import AUDIT, CONFIDENCE, STRIDE, Points, Refined, refine, run_refinement
+from levilab.sweeps.refinement import (
+    AUDIT,
+    CONFIDENCE,
+    STRIDE,
+    Flags,
+    Points,
+    Question,
+    Refined,
+    refine,
+    run_refinement,
+)
 from levilab.sweeps.run import Task, compute
-from levilab.sweeps.store import COMPUTED, DONE, FILLED, STATUS, as_text
-from levilab.workers import results_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator
-
-    from numpy.typing import NDArray
-
-    from levilab.sweeps.plan import Plan
-    from levilab.sweeps.refinement import Flags, Question
-    from levilab.sweeps.store import Store
-    from levilab.workers import Done, Workers
+from levilab.sweeps.store import COMPUTED, DONE, FILLED, STATUS, Store, as_text
+from levilab.workers import Done, Workers, results_of
 
 #: Attributes of the store: the settings of the refinement, and its report.
 ASKED, FOUND = "adaptive", "refined"

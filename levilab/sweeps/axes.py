@@ -4,28 +4,23 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.errors import SimulationError, UsageError
 from levilab.formats.dialect import Dialect
 from levilab.formats.typed import read_number, unit_of_key
 from levilab.settings import hint_about
 from levilab.simulator.keys import SceneError, short_text
-from levilab.simulator.scene import SWITCHES
+from levilab.simulator.scene import SWITCHES, Scene
 from levilab.simulator.start import start_of
 from levilab.simulator.varied import broadcast
 from levilab.sweeps.keys import value_at
 from levilab.sweeps.plan import Axis, Scale, unit_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Mapping, Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    from levilab.simulator.scene import Scene
 
 #: Dimensions of a map: one with more can neither be drawn nor computed in reasonable time.
 MOST_AXES = 3

@@ -7,35 +7,30 @@ and lock from `levilab.motion`.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.errors import UsageError
-from levilab.motion.lines import lines_of_many, rate_for
+from levilab.motion.lines import AxisLines, lines_of_many, rate_for
 from levilab.motion.lock import LAST_SHARE, RATE_HZ, SHORTEST_S, can_lock, keeps_phase, shows_lock
 from levilab.motion.summary import changing_energy
 from levilab.simulator.energy import core_spin, energy
-from levilab.simulator.ensemble import simulate_many
+from levilab.simulator.ensemble import Ensemble, simulate_many
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
 from levilab.simulator.model import model_of
 from levilab.simulator.numbers import Numbers, ceil, largest
+from levilab.simulator.scene import Scene
 from levilab.simulator.start import start_of
 from levilab.simulator.varied import broadcast, for_each, scene_at
 from levilab.sweeps.plan import QUICKLY, Plan, chunk_shape
 from levilab.sweeps.quantities import GROUPS, LINES, columns_of
 
-if TYPE_CHECKING:
-    from collections.abc import Mapping
+Values = Mapping[str, NDArray[Any]]
 
-    from numpy.typing import NDArray
-
-    from levilab.motion.lines import AxisLines
-    from levilab.simulator.ensemble import Ensemble
-    from levilab.simulator.scene import Scene
-
-    Values = Mapping[str, NDArray[Any]]
 
 #: Samples per second for the height, whose fastest motion is some Hz: its turning points are met to 0.5 % of the swing.
 HEIGHT_RATE_HZ = 100.0

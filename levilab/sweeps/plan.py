@@ -9,18 +9,15 @@ from __future__ import annotations
 import hashlib
 import itertools
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.present.units import split
 from levilab.simulator.scene import Scene, scene_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from numpy.typing import NDArray
 
 Scale = Literal["linear", "log", "list", "table"]
 #: The dimension of a plan whose points are the rows of a table.

@@ -17,15 +17,12 @@ every axis holds a point of the coarse grid, and is sure to be seen.
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
 
 Flags = NDArray[np.bool_]
 Points = NDArray[np.intp]

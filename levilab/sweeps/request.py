@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from levilab.errors import UsageError
+from levilab.simulator.scene import Scene
 from levilab.simulator.single import LONGEST_S
 from levilab.sweeps.adaptive import begin_adaptive, is_adaptive
 from levilab.sweeps.axes import check_axes, read_points
 from levilab.sweeps.observables import check_observables, cut
-from levilab.sweeps.plan import Plan
+from levilab.sweeps.plan import Axis, Plan
 from levilab.sweeps.quantities import columns_of
 from levilab.sweeps.run import with_step
 from levilab.sweeps.store import Store, differences
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Sequence
-    from pathlib import Path
-
-    from levilab.simulator.scene import Scene
-    from levilab.sweeps.plan import Axis
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,13 @@ import contextlib
 import json
 import shutil
 import sys
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.computer import computer, utc_now
 from levilab.errors import DataError
@@ -23,12 +26,6 @@ from levilab.simulator.keys import short_text
 from levilab.software import software_versions
 from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
 from levilab.sweeps.quantities import columns_of, quantity_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-    from pathlib import Path
-
-    from numpy.typing import NDArray
 
 SCHEMA = "levilab-sweep/1"
 DONE = "done"

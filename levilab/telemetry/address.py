@@ -7,13 +7,10 @@ import json
 import os
 import secrets
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from levilab.computer import computer
 from levilab.files import parse_json
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 #: Both ends are on this machine, always.
 LOOPBACK = "127.0.0.1"

@@ -16,15 +16,13 @@ from __future__ import annotations
 
 import json
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.files import parse_json
 from levilab.texts.text import Text, text_from
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
 
 _REFERENCE, _TEXT = "$array", "$text"
 _KINDS = ("<f4", "|b1")

@@ -20,12 +20,9 @@ from __future__ import annotations
 import hmac
 import struct
 from collections import OrderedDict
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
 
 from levilab.telemetry.address import TOKEN_BYTES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 #: Bytes of a message in a datagram: macOS sends none of more than 9216.
 PART_BYTES = 8000

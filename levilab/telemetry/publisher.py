@@ -5,17 +5,13 @@ from __future__ import annotations
 import contextlib
 import socket
 import time
-from typing import TYPE_CHECKING, Self
+from collections.abc import Callable
+from pathlib import Path
+from typing import Self
 
 from levilab.telemetry.address import LOOPBACK, Address, remove_address, write_address
 from levilab.telemetry.datagrams import DATAGRAM_BYTES, is_wish, split
-from levilab.telemetry.messages import encode
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from levilab.telemetry.messages import Message
+from levilab.telemetry.messages import Message, encode
 
 #: A view that has not asked for so long gets nothing more [s].
 FORGOTTEN_AFTER_S = 3.0

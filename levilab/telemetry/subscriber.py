@@ -5,18 +5,13 @@ from __future__ import annotations
 import contextlib
 import socket
 import time
-from typing import TYPE_CHECKING, Self
+from collections.abc import Callable
+from typing import Self
 
-from levilab.telemetry.address import LOOPBACK
+from levilab.telemetry.address import LOOPBACK, Address
 from levilab.telemetry.codec import MalformedMessage
 from levilab.telemetry.datagrams import DATAGRAM_BYTES, Joiner, wish
-from levilab.telemetry.messages import decode
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from levilab.telemetry.address import Address
-    from levilab.telemetry.messages import Message
+from levilab.telemetry.messages import Message, decode
 
 #: Interval between two wishes of a view [s]; a bench forgets a view after three intervals.
 ASKS_EVERY_S = 1.0

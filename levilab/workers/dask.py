@@ -10,17 +10,15 @@ import contextlib
 import logging
 import time
 import warnings
+from collections.abc import Callable
 from concurrent.futures import Executor, Future
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import LevilabError, WorkersLost
 from levilab.software import how_to_install
 from levilab.workers.ways import Workers
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 #: Longest time for the first answer of a scheduler [s].
 ANSWER_S = 10.0

@@ -8,15 +8,13 @@ from __future__ import annotations
 import pickle
 import platform
 import traceback
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, lru_cache, partial
 from importlib.metadata import PackageNotFoundError, version
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import LevilabError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 #: Results depend to the last bit on the versions of these, and pickles on Python's.
 LIBRARIES = ("levilab", "Python", "numpy", "numba", "llvmlite")

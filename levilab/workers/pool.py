@@ -12,17 +12,14 @@ import multiprocessing
 import os
 import sys
 import threading
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import resource_tracker
 from multiprocessing.context import SpawnContext, SpawnProcess
 from types import ModuleType
-from typing import TYPE_CHECKING
 
 from levilab.interruption import ignore_interruption, interruption_blocked
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 #: Windows waits for no more handles at once; Python allows no more processes in a pool there.
 MAX_PROCESSES = 61 if sys.platform == "win32" else 4096

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import UsageError
 from levilab.workers.pool import MAX_PROCESSES, Pool
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
 
 
 def _cancel(executor: Executor) -> None:

@@ -9,16 +9,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from instruments.virtual.counter.edges import Thresholds
+from instruments.virtual.generator.channel import Output
 from instruments.virtual.generator.voltage import fundamental
-
-if TYPE_CHECKING:
-    from instruments.virtual.generator.channel import Output
 
 Array = NDArray[np.float64]
 

@@ -5,24 +5,18 @@ from __future__ import annotations
 import math
 import re
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import Self
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
 from levilab.acquisition.experiment import Experiment, ExperimentSettings
-from levilab.acquisition.session import ExperimentFailed
-from levilab.bench.config import ConfigError
+from levilab.acquisition.session import ExperimentFailed, Row, Session
+from levilab.bench.config import ConfigError, Limits
 from levilab.bench.person import PlaceProbe, ShieldProbe
 from levilab.formats.ranges import problem_of
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from typing import Self
-
-    from levilab.acquisition.session import Row, Session
-    from levilab.bench.config import Limits
 
 #: More heights than a person has the patience for: a step in the wrong unit.
 _MOST_HEIGHTS = 1000

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
-from typing import TYPE_CHECKING, ClassVar, Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, PositiveFloat
@@ -14,20 +15,14 @@ from instruments.errors import InstrumentError
 from levilab.acquisition.counting import prepare_counter
 from levilab.acquisition.driving import DriveSettings, drive_off, drive_up, reach_generator_again
 from levilab.acquisition.experiment import Experiment
-from levilab.acquisition.session import NotHeld
-from levilab.bench.config import ConfigError
+from levilab.acquisition.session import NotHeld, Row, Session
+from levilab.acquisition.triggering import Motor
+from levilab.bench.config import ConfigError, Limits
 from levilab.formats.table import FEWEST
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from levilab.acquisition.session import Row, Session
-    from levilab.acquisition.triggering import Motor
-    from levilab.bench.config import Limits
 
 #: A top further from its spin [Hz] is not held: the wobble of a full motion leaves 0.1 Hz after the loop has settled,
 #: and a top whose pulses no longer come loses 1 Hz in some 6 s.

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING, ClassVar, Literal
+from collections.abc import Callable
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 
-from analysis.limits import FEWEST_ON_PARABOLA, spin_at_fall, spin_at_loss
+from analysis.limits import FEWEST_ON_PARABOLA, Array, spin_at_fall, spin_at_loss
 from analysis.locked import Cause, cause_of_loss, lag_before_loss, slip_of
 from levilab.acquisition.counting import AnotherTop, Missed, free_top, prepare_counter, spin_now
 from levilab.acquisition.driving import (
@@ -26,21 +27,13 @@ from levilab.acquisition.driving import (
     is_over,
 )
 from levilab.acquisition.experiment import Experiment
-from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NotHeld
-from levilab.acquisition.triggering import CYCLE
-from levilab.bench.config import ConfigError
+from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NotHeld, Row, Session
+from levilab.acquisition.triggering import CYCLE, Motor
+from levilab.bench.config import ConfigError, Limits
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from analysis.limits import Array
-    from levilab.acquisition.session import Row, Session
-    from levilab.acquisition.triggering import Motor
-    from levilab.bench.config import Limits
 
 #: A top that the drive does not take up is given up after this many falls.
 _MOST_FALLS = 3

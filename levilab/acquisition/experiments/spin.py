@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from levilab.acquisition.counting import free_top, prepare_counter
 from levilab.acquisition.driving import DriveSettings, drive_up_and_let_go, drives
 from levilab.acquisition.experiment import Experiment
+from levilab.acquisition.session import Row, Session
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from levilab.acquisition.session import Row, Session
 
 #: The usual deceleration at a spin, the mean of the four published runs, whichever law: 2.34e-4 (rad/s)^−½/s of a disc
 #: is 3.2e-3 1/s of Stokes [Hz/s, Hz].

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 import time
 from collections import Counter
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +15,10 @@ from numpy.typing import NDArray
 from analysis.errors import AnalysisError
 from analysis.pulses import spin_of_times, spin_of_trace
 from analysis.pulses.synthetic import DURATION, HARD, RATE, Case, Trace, bound, make
+from analysis.pulses.trace import Choice
 from levilab.benchmark.found import describe_measurement
 from levilab.errors import UsageError
 from levilab.files import finite
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from analysis.pulses.trace import Choice
 
 Array = NDArray[np.float64]
 

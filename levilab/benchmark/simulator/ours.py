@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from levilab.simulator.schemes import SCHEMES
 from levilab.simulator.start import start_of
 from levilab.simulator.stops import stops_between
 from levilab.simulator.varied import batches
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator
 
 #: Steps in the 5 s.
 STEPS = {

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from importlib.util import find_spec
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from levilab.benchmark.simulator import motion
 from levilab.benchmark.simulator.taylor import heyoka_batch, heyoka_integrator
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
 
 Array = NDArray[np.float64]
 Result = TypeVar("Result")

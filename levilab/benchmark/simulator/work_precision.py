@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.benchmark.found import describe_measurement
 from levilab.benchmark.simulator import ours
-from levilab.benchmark.simulator.peers import PEERS, Peer
+from levilab.benchmark.simulator.peers import PEERS, Peer, Point
 from levilab.files import finite
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from levilab.benchmark.simulator.peers import Point
 
 ROUNDS = 3
 #: What is to be compared: ours, the peer, the error [m], and the ratio that was aimed at.

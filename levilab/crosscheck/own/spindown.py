@@ -2,33 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.budget import gate_bias, printed_step
 from analysis.spindown.combine import combine
 from analysis.spindown.drag import LAWS
-from analysis.spindown.fit import fit_spin_down
-from analysis.spindown.tilt import count_of
+from analysis.spindown.fit import SpinDown, fit_spin_down
+from analysis.spindown.lawfit import LawFit
+from analysis.spindown.tilt import Release, count_of
 from levilab.crosscheck.own.model import OF_ONE_RUN, Own
 from levilab.crosscheck.subject import Trial, pull_of
 from levilab.pipelines.budget import gate_of
-from levilab.pipelines.spindown.analysis import EXPERIMENT
+from levilab.pipelines.spindown.analysis import EXPERIMENT, SpinDownAnalysis
 from levilab.present.numbers import how_many
 from levilab.simulator import laws
 from levilab.texts.text import Text
 
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
-    from analysis.spindown.fit import SpinDown
-    from analysis.spindown.lawfit import LawFit
-    from analysis.spindown.tilt import Release
-    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
-
-    Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
 #: Processor time of the fits of one run [s]: of any, and for a reading.
 _COST_S, _COST_OF_READING_S = 0.006, 2e-5

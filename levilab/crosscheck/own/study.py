@@ -6,21 +6,18 @@ The random numbers follow from the readings' hashes, so that the same result has
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from analysis.errors import AnalysisError
 from levilab.crosscheck.own import field, hold, limit, precession, spin, spindown, sway
+from levilab.crosscheck.own.model import Own
 from levilab.crosscheck.study import Study, make_trials
 from levilab.errors import LevilabError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from levilab.crosscheck.own.model import Own
-    from levilab.pipelines.analyzed import Analyzed
+from levilab.pipelines.analyzed import Analyzed
 
 #: Analysis → its result as a subject of trials.
 OWN: Mapping[str, Callable[[Any], Own]] = MappingProxyType({

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
 
 import numpy as np
 
+from analysis.uncertainty import Estimate
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.priors import PRIORS, drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
@@ -15,12 +17,6 @@ from levilab.pipelines.options import FieldOptions
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import Scene
 from levilab.world.base import random_base
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    from analysis.uncertainty import Estimate
 
 #: The true moment [A m²].
 MOMENT = 0.714

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
+from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import settings_of
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.priors import drawing
@@ -15,11 +16,6 @@ from levilab.crosscheck.subject import Pull, Subject, pull_of
 from levilab.crosscheck.subjects.spindown import draw_scene, in_world
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.simulator.spin import DECAYS
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from levilab.acquisition.loop import AcquisitionRequest
 
 #: The time for which a spin is held [s].
 _HELD_S = 100.0

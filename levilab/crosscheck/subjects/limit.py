@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from analysis.locked import Cause
+from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.crosscheck.subjects.spindown import draw_scene, in_world
 from levilab.pipelines.catalogue import ANALYSES
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from levilab.acquisition.loop import AcquisitionRequest
-    from levilab.pipelines.limit.analysis import Limits
-    from levilab.world.spin_world import SpinScene
+from levilab.pipelines.limit.analysis import Limits
+from levilab.world.spin_world import SpinScene
 
 #: Number of tops of a run.
 TOPS = 10

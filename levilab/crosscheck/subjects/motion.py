@@ -4,29 +4,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from analysis.spindown.fit import SpinDown
 from instruments.clock import VirtualClock
+from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import settings_of, with_settings
+from levilab.bench.wiring import Wiring
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.crosscheck.subjects.spindown import spindown_of
+from levilab.runs.run import Run
 from levilab.simulator.kernels.motion import R
 from levilab.simulator.scene import Scene, preset
 from levilab.simulator.single import simulate
 from levilab.simulator.start import nutating_start, start_of, steady_rates
 from levilab.world.bench import scene_world, virtual_wiring
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from analysis.spindown.fit import SpinDown
-    from levilab.acquisition.loop import AcquisitionRequest
-    from levilab.bench.wiring import Wiring
-    from levilab.runs.run import Run
 
 #: The disc's constant of the thesis's runs [(rad/s)^−½/s].
 USUAL = 2.34e-4

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
@@ -14,12 +14,7 @@ from levilab.crosscheck.subjects import spindown
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.simulator.spin import DECAYS
 from levilab.world.bench import VIRTUAL_MODELS
-from levilab.world.spin_world import SpinWorld
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from levilab.world.spin_world import SpinScene
+from levilab.world.spin_world import SpinScene, SpinWorld
 
 #: How long the phone records beyond the fall [s].
 _AFTER_S = 20.0

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.subject import Pull, Subject, pull_of
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.precession.words import intercept_of, slope_of
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def trial(seed: int, folder: Path) -> list[Pull]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
 from instruments.clock import VirtualClock
+from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.priors import drawing
@@ -19,11 +20,6 @@ from levilab.simulator.laws import LAWS
 from levilab.world.bench import virtual_wiring
 from levilab.world.light import Tape
 from levilab.world.spin_world import Array, SpinScene, SpinWorld
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from levilab.acquisition.loop import AcquisitionRequest
 
 #: The chirp's truth is a difference over twice this [s].
 _APART_S = 0.05

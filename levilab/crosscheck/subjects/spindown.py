@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from analysis.spindown.fit import SpinDown
 from instruments.clock import VirtualClock
+from levilab.acquisition.loop import AcquisitionRequest
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
@@ -20,12 +23,6 @@ from levilab.simulator.single import simulate
 from levilab.simulator.spin import DECAYS
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from analysis.spindown.fit import SpinDown
-    from levilab.acquisition.loop import AcquisitionRequest
 
 #: The spin at which the drive goes off [Hz].
 START_HZ = 40.0

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.crosscheck.priors import PRIORS, drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
@@ -13,15 +14,10 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import Scene, preset
 from levilab.simulator.single import simulate
+from levilab.simulator.trajectory import Trajectory
 
-if TYPE_CHECKING:
-    from pathlib import Path
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    from levilab.simulator.trajectory import Trajectory
-
-    Array = NDArray[np.float64]
 
 #: Frames per second, and length of the film [s].
 RATE, DURATION_S = 120.0, 110.0

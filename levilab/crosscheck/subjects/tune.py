@@ -6,7 +6,7 @@ The window of masses is the simulator's, at the temperature of the magnets; a ha
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
@@ -17,9 +17,6 @@ from levilab.pipelines.tune.advice import advise
 from levilab.pipelines.tune.owner import Owner, read_owner, washers_text, write_owner
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import Scene, preset
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 #: The owner's washers [kg].
 WASHERS_KG = (6e-5,) * 6 + (2e-4,) * 4

@@ -6,11 +6,14 @@ import contextlib
 import os
 import subprocess
 import tempfile
+from collections.abc import Iterator
 from dataclasses import replace
 from importlib import util
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import IO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.formats.columns import NoTable, TableError, shorten
 from levilab.formats.film import NoFilm, open_film
@@ -19,14 +22,8 @@ from levilab.formats.waveforms.wav import signals_of
 from levilab.formats.waveforms.waveform import BLOCK, Waveform, check_count
 from levilab.software import how_to_install
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-    from typing import IO
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 #: What a file may be, in FFmpeg's names: no list of other files, no address, no script.
 _FORMATS = "mov,mp4,m4a,3gp,3g2,mj2,mp3,ogg,flac,aac,amr,aiff,caf,matroska,webm,asf,avi"

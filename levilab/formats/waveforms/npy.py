@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from pathlib import Path
 from tokenize import TokenError
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.waveform import BLOCK, PulseTimes, Signal, Waveform, check_count, check_step
 from levilab.texts.note import of_file
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-    from typing import Any
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 #: An array with more columns than this lies on its side.
 MOST_CHANNELS = 64

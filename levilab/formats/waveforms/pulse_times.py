@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from functools import partial
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.formats.columns import TableError, shorten
+from levilab.formats.dialect import Dialect
 from levilab.formats.titles import is_unit, plain_unit, read_title, unit_factor
 from levilab.formats.waveforms.header import NoRate, NoWaveform
-from levilab.formats.waveforms.rows import read_blocks
+from levilab.formats.waveforms.rows import Block, Head, read_blocks
 from levilab.formats.waveforms.waveform import FEWEST_PULSES, PulseTimes, Signal, Waveform, check_count, check_step
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    from levilab.formats.dialect import Dialect
-    from levilab.formats.waveforms.rows import Block, Head
 
 #: Slower turns are no turns [s]: times in µs or ms without a unit, of which a window of seconds holds none.
 _LONGEST_TURN_S = 10.0

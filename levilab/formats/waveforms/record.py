@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from pathlib import Path
 
 from levilab.errors import UsageError
 from levilab.formats.kinds import AUDIO, kind_of_bytes
@@ -17,12 +18,7 @@ from levilab.formats.waveforms.samples import read_samples
 from levilab.formats.waveforms.scope_binary import SUFFIXES, read_scope_binary
 from levilab.formats.waveforms.sigrok import is_sigrok, read_sigrok
 from levilab.formats.waveforms.wav import read_wav
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-    from pathlib import Path
-
-    from levilab.formats.waveforms.waveform import PulseTimes, Waveform
+from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 
 #: How names of files end that may hold samples, readings or pulse times, where a folder is searched.
 SEARCHED = TEXTS | SPREADSHEETS | SUFFIXES | {".wav", ".npy", ".zip", ".sr", *AUDIO.suffixes}

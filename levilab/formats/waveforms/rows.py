@@ -4,26 +4,20 @@ from __future__ import annotations
 
 import io
 import warnings
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.numbers import how_many
 from levilab.formats.columns import TableError, shorten
-from levilab.formats.dialect import MISSING
+from levilab.formats.dialect import MISSING, Dialect
 from levilab.formats.layout import EXPORT, HEAD, encoding_of, lines_of, refuse_other_kinds
 from levilab.formats.waveforms.waveform import HIGHEST
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    from levilab.formats.dialect import Dialect
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 #: Characters of a piece: small beside memory, large beside the cost of a call of pandas.

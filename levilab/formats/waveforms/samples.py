@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.numbers import digits
 from levilab.formats.columns import TableError, quote_names, shorten
+from levilab.formats.dialect import Dialect
 from levilab.formats.waveforms.header import LONGEST_DOUBTFUL_STEP_S, Header, NoRate, NoWaveform, printed, read_header
-from levilab.formats.waveforms.rows import read_blocks
+from levilab.formats.waveforms.rows import Block, Head, read_blocks
 from levilab.formats.waveforms.waveform import (
     FEWEST_PULSES,
     PulseTimes,
@@ -23,16 +26,8 @@ from levilab.formats.waveforms.waveform import (
 from levilab.texts.note import of_file
 from levilab.texts.text import Text
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-    from pathlib import Path
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    from levilab.formats.dialect import Dialect
-    from levilab.formats.waveforms.rows import Block, Head
-
-    Array = NDArray[np.float64]
 
 #: Scopes keep times in single precision before they print them: relative rounding, 2⁻²⁴ twice.
 SINGLE = 1.2e-7

@@ -5,22 +5,19 @@ from __future__ import annotations
 import contextlib
 import io
 import warnings
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.waveform import Signal, Waveform, check_count, check_step
 from levilab.software import how_to_install
 from levilab.texts.note import of_file
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 #: How the names of such files end.
 SUFFIXES = frozenset({".wfm", ".bin", ".isf", ".trc", ".wvf"})

@@ -10,21 +10,18 @@ import configparser
 import re
 import zipfile
 import zlib
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.waveform import BLOCK, Signal, Waveform, check_count, check_step
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-    from pathlib import Path
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 #: Name of the files that each capture has, and how large the second may be [bytes].
 _MEMBERS, _LARGEST_METADATA = {"version", "metadata"}, 1 << 20

@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import struct
 import warnings
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.waveform import BLOCK, Signal, Waveform, check_count
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-    from typing import Any
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 #: Samples of integers → (value of silence, full scale).
 _SCALES = {"u1": (128.0, 128.0), "i2": (0.0, 32768.0), "i4": (0.0, 2147483648.0)}

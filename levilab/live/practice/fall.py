@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
-from levilab.simulator.equilibrium import advice, stability_of
+from levilab.simulator.equilibrium import Stability, advice, stability_of
 from levilab.simulator.scene import Scene
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from levilab.simulator.equilibrium import Stability
 
 #: A top whose moment is tilted leans ever more, and falls before its spin reaches the limit of an upright one, within
 #: this factor: on this bench with 20.9 Hz a free one at 23.3 Hz (tilt 1.2°; at 22.5 Hz with half of it, at 20.9 Hz

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from analysis.errors import AnalysisError
 from analysis.field.fit import FieldScan, fit_scan
@@ -16,11 +16,7 @@ from levilab.pipelines.field.device import known_of, known_top, usual
 from levilab.pipelines.field.readings import FieldReadings
 from levilab.pipelines.field.words import remark, scan_as_text, scans_as_text
 from levilab.pipelines.options import FieldOptions
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
-
-    from levilab.pipelines.sources import Source
+from levilab.pipelines.sources import Source
 
 
 @dataclass(frozen=True, eq=False)

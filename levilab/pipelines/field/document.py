@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Sequence
+from typing import Any, Literal
 
 import numpy as np
 
 from analysis.budget import Budget, Component
-from analysis.field.fit import UNITS, parts_of
+from analysis.field.fit import UNITS, FieldScan, UPart, parts_of
+from analysis.uncertainty import Estimate
 from levilab.pipelines.budget import setting_of
 from levilab.pipelines.document import Analysis, statistics_of, value_of, values_of
 from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun, Mean, analyze_source
-from levilab.pipelines.field.readings import read_scan_file, read_scan_run
+from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
 from levilab.pipelines.field.report import field_columns, field_curve, field_curve_u, field_part, field_tables
 from levilab.pipelines.field.words import FIELD_ROW, QUANTITIES, remark
 from levilab.pipelines.options import FieldOptions
 from levilab.pipelines.row import symbols_of
+from levilab.pipelines.sources import Source
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from analysis.field.fit import FieldScan, UPart
-    from analysis.uncertainty import Estimate
-    from levilab.pipelines.field.readings import FieldReadings
-    from levilab.pipelines.sources import Source
-
 
 EXPERIMENT = "field"
 #: The parameters that have a budget.

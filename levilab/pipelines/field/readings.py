@@ -2,30 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.field.errors import TooFewHeights
 from analysis.field.fit import FEWEST_HEIGHTS, SAME_HEIGHT_M
 from analysis.numbers import digits
 from levilab.formats.columns import TableError
-from levilab.formats.table import read_table, refuse
+from levilab.formats.table import Table, read_table, refuse
+from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import Readings
+from levilab.runs.run import Run
 from levilab.texts.note import of_file
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    from levilab.formats.table import Table
-    from levilab.pipelines.options import InputOptions
-    from levilab.runs.run import Run
-
-    Array = NDArray[np.float64]
 
 #: A stand is no higher [m], and no probe measures more [T]: beyond, the unit is another one.
 _HIGHEST_M, _STRONGEST_T = 2.0, 35.0

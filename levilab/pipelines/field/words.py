@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
-from analysis.field.fit import LEARNS_NOTHING, UNITS
-from analysis.field.floating import FERRITE_PER_K
+from analysis.field.fit import LEARNS_NOTHING, UNITS, FieldScan
+from analysis.field.floating import FERRITE_PER_K, Floating
 from analysis.numbers import digits
+from analysis.remarks import Remark
 from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, statistic
 from levilab.pipelines.sources import Doubting, note_of
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-
-    from analysis.field.fit import FieldScan
-    from analysis.field.floating import Floating
-    from analysis.remarks import Remark
-
 
 #: Of the base.
 _BASE = (

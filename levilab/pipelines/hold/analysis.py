@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
@@ -15,19 +16,13 @@ from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.hold.readings import HoldReadings
 from levilab.pipelines.options import HoldOptions, SpinDownOptions
 from levilab.pipelines.row import Quantity, columns_of
+from levilab.pipelines.sources import Source
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.words import SYMBOLS, law_names
 from levilab.present.numbers import enumeration, plain, with_uncertainty
 from levilab.runs.run import read_record
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from pathlib import Path
-
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
-
 
 #: Of `analysis.held.Hold`.
 QUANTITIES = (

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from analysis.budget import Budget
 from analysis.held import Hold
@@ -19,17 +20,11 @@ from levilab.pipelines.hold.analysis import (
     set_spindown_beside,
     text_of,
 )
-from levilab.pipelines.hold.readings import read_hold_file, read_hold_run
+from levilab.pipelines.hold.readings import HoldReadings, read_hold_file, read_hold_run
 from levilab.pipelines.hold.report import hold_columns, hold_part, hold_tables
 from levilab.pipelines.options import HoldOptions
 from levilab.pipelines.row import find_all, symbols_of
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from levilab.pipelines.hold.readings import HoldReadings
-    from levilab.pipelines.sources import Source
-
+from levilab.pipelines.sources import Source
 
 #: Name of a part → its description, where it comes from, what would make it smaller.
 _ROWS = {

@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST
+from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import Readings
 from levilab.present.numbers import how_many
 from levilab.runs.events import RunEvent
+from levilab.runs.run import Run
 from levilab.texts.text import Text
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    from levilab.pipelines.options import InputOptions
-    from levilab.runs.run import Run
-
-    Array = NDArray[np.float64]
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
-from levilab.pipelines.hold.analysis import QUANTITIES, text_of
+import numpy as np
+
+from analysis.held import Hold
+from levilab.pipelines.hold.analysis import QUANTITIES, HoldAnalysis, text_of
+from levilab.pipelines.hold.readings import HoldReadings
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, points_of, title_of
 from levilab.pipelines.row import cells_of
+from levilab.pipelines.sources import Source
 from levilab.pipelines.spindown.words import SYMBOLS
 from levilab.present.document.blocks import Paragraph, Tabular
 from levilab.present.numbers import how_many, plain, short_name, with_uncertainty, without_unit
 from levilab.present.tables import Table, table
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    import numpy as np
-
-    from analysis.held import Hold
-    from levilab.pipelines.hold.analysis import HoldAnalysis
-    from levilab.pipelines.hold.readings import HoldReadings
-    from levilab.pipelines.sources import Source
 
 
 def hold_tables(analysis: HoldAnalysis) -> tuple[Table, ...]:

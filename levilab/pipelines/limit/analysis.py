@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.limit.readings import LimitReadings
 from levilab.pipelines.options import LimitOptions
 from levilab.pipelines.row import Quantity, columns_of, entry
+from levilab.pipelines.sources import Source
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.events import RunEvent
 from levilab.simulator.keys import SceneError
@@ -27,12 +28,6 @@ from levilab.simulator.scene import Scene, scene_of
 from levilab.stability.thesis import ISLANDS_HZ, is_thesis_device
 from levilab.texts.note import Note
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from levilab.pipelines.sources import Source
-
 
 #: Of `analysis.limits.Statistics`.
 QUANTITIES = (

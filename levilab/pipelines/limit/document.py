@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
 from analysis.budget import Budget, Component, printed_step, rest, u_of_step
+from analysis.limits import Statistics
 from analysis.numbers import digits
 from levilab.pipelines.budget import time_base
 from levilab.pipelines.document import Analysis, values_of
 from levilab.pipelines.limit.analysis import LIMIT_ROW, QUANTITIES, LimitAnalysis, Limits, limits_of, together
-from levilab.pipelines.limit.readings import read_limit_file, read_limit_run
+from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, read_limit_run
 from levilab.pipelines.limit.report import limit_columns, limit_part, limit_tables
 from levilab.pipelines.options import LimitOptions
 from levilab.pipelines.result import Dump, Result
 from levilab.pipelines.row import find_all, symbols_of
+from levilab.pipelines.sources import Source
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from analysis.limits import Statistics
-    from levilab.pipelines.limit.readings import LimitReadings
-    from levilab.pipelines.sources import Source
-
 
 #: Four times as many tops halve what scatters from one to the next.
 _TO_HALVE = 4

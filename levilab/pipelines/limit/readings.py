@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
 from analysis.limits import U_OF_WAY, spin_at_fall
@@ -17,21 +19,15 @@ from levilab.formats.columns import NoSuchColumn, NoTable, TableError
 from levilab.formats.table import FEWEST, Table, must_be_positive, read_table
 from levilab.formats.texts import locate, texts_of
 from levilab.formats.titles import read_title, unit_factor
+from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import Readings
-from levilab.pipelines.spin.magnetometer import read_field_record
+from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
 from levilab.runs.events import RunEvent
+from levilab.runs.run import Run
 from levilab.texts.note import of_file
 
-if TYPE_CHECKING:
-    from pathlib import Path
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    from levilab.pipelines.options import InputOptions
-    from levilab.pipelines.spin.magnetometer import FieldRecord
-    from levilab.runs.run import Run
-
-    Array = NDArray[np.float64]
 
 #: Columns that an analysis of limits looks at.
 QUANTITIES = ("spin_frequency_hz", "spin_frequency_u_hz")

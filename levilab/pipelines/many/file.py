@@ -10,22 +10,18 @@ import csv
 import io
 import json
 import os
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from importlib.util import find_spec
 from itertools import islice
-from typing import TYPE_CHECKING, Any, Self
+from pathlib import Path
+from typing import Any, Self
 
 from levilab.errors import DataError, UsageError
 from levilab.files import locked, parse_json, replace_atomically, replacing, writing
-from levilab.pipelines.row import text_of, value_of_text
+from levilab.pipelines.row import Cell, Column, text_of, value_of_text
 from levilab.present.units import split
 from levilab.software import how_to_install
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
-    from pathlib import Path
-
-    from levilab.pipelines.row import Cell, Column
 
 SCHEMA = "levilab-table/1"
 CSV, PARQUET = ".csv", ".parquet"

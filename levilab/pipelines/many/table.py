@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import os
 from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import DataError, DoesNotSuit, NoneUsable, unquote
 from levilab.files import CannotWrite
 from levilab.formats.texts import locate
 from levilab.formats.waveforms.header import NoRate
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.document import Analysis
 from levilab.pipelines.many.file import TableFile, check_name
+from levilab.pipelines.options import InputOptions
 from levilab.pipelines.result import relative
 from levilab.pipelines.row import Cell, Column, entry, plain
 from levilab.pipelines.sources import data_files, sha256_of
@@ -22,14 +25,7 @@ from levilab.pipelines.suits import save
 from levilab.runs.find import RECORD, find_run, no_such_path, run_folders
 from levilab.runs.run import Run
 from levilab.software import software_versions
-from levilab.workers import processes, results_of, this_process
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from levilab.pipelines.document import Analysis
-    from levilab.pipelines.options import InputOptions
-    from levilab.workers import Done
+from levilab.workers import Done, processes, results_of, this_process
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,14 +18,11 @@ from levilab.pipelines.budget import gate_of
 from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.precession.readings import SweepReadings
 from levilab.pipelines.precession.words import remarks_of, verdict
+from levilab.pipelines.sources import Source
+from levilab.runs.traces import StoredTrace
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
+Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
-    from levilab.pipelines.sources import Source
-    from levilab.runs.traces import StoredTrace
-
-    Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
 #: The experiment whose runs it takes, and whose settings count.
 EXPERIMENT = "precession"

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from collections.abc import Iterator
+from typing import Any, Literal
 
 import numpy as np
 
 from analysis.budget import Budget, Component, printed_step, rest, u_of_step
 from analysis.numbers import digits
+from analysis.precession.line import Line
 from analysis.precession.sweep import SweepFit
 from levilab.pipelines.budget import gate_of, setting_of, time_base
 from levilab.pipelines.document import Analysis, number, values_of
 from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.precession.analysis import EXPERIMENT, PrecessionAnalysis, PrecessionRun, combine, fit_source
-from levilab.pipelines.precession.readings import read_sweep_file, read_sweep_run
+from levilab.pipelines.precession.readings import SweepReadings, read_sweep_file, read_sweep_run
 from levilab.pipelines.precession.report import (
     precession_columns,
     precession_curve,
@@ -23,16 +25,10 @@ from levilab.pipelines.precession.report import (
 )
 from levilab.pipelines.precession.words import PRECESSION_ROW, QUANTITIES, intercept_of, slope_of, verdict
 from levilab.pipelines.row import find_all, symbols_of
+from levilab.pipelines.sources import Source
 from levilab.texts.text import Text
 
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from analysis.precession.line import Line
-    from levilab.pipelines.precession.readings import SweepReadings
-    from levilab.pipelines.sources import Source
-
-    Array = np.ndarray[tuple[int], np.dtype[np.float64]]
+Array = np.ndarray[tuple[int], np.dtype[np.float64]]
 
 
 #: Relative uncertainties of the drive's frequency that differ by less than this are those of one clock.

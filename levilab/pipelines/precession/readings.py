@@ -2,32 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.numbers import digits
-from analysis.precession.gates import rates_at_point, shared_scatter
+from analysis.precession.gates import Gates, Rate, rates_at_point, shared_scatter
 from levilab.formats.columns import TableError
-from levilab.formats.table import FEWEST, read_table, refuse
+from levilab.formats.table import FEWEST, Table, read_table, refuse
+from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import SAME, Readings
 from levilab.present.numbers import how_many, pulses_too_many
 from levilab.runs.gates import gates_of
+from levilab.runs.run import Run
 from levilab.texts.note import of_file
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from pathlib import Path
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    from analysis.precession.gates import Gates, Rate
-    from levilab.formats.table import Table
-    from levilab.pipelines.options import InputOptions
-    from levilab.runs.run import Run
-
-    Array = NDArray[np.float64]
 
 #: Columns that an analysis of sweeps looks at.
 QUANTITIES = (

@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from analysis.numbers import digits
-from analysis.precession.sweep import EXCLUDED_P
+from analysis.precession.miscounts import Miscount
+from analysis.precession.power import Power
+from analysis.precession.sweep import EXCLUDED_P, Point, SweepFit
 from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Quantity, columns_of, entry, statistic
 from levilab.pipelines.sources import Doubting, note_of
 from levilab.present.numbers import plain, pulses_too_many, with_uncertainty
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from analysis.precession.miscounts import Miscount
-    from analysis.precession.power import Power
-    from analysis.precession.sweep import Point, SweepFit
 
 
 def slope_of(fit: SweepFit) -> Estimate:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,9 @@ from analysis.budget import rest
 from analysis.errors import AnalysisError
 from analysis.pulses import (
     Finding,
+    Phase,
     SpinFrequency,
+    Track,
     collect_findings,
     phases,
     spin_of_times,
@@ -26,24 +28,17 @@ from analysis.pulses.errors import OnlyHum
 from analysis.rotation import FieldSpin, spin_of_field, track_of_field, transverse_moment
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
+from levilab.formats.waveforms.waveform import Waveform
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.options import SpinOptions
 from levilab.pipelines.row import Column, Quantity, columns_of, entry
-from levilab.pipelines.spin.magnetometer import findings_of, spin_of_line, track_middle
+from levilab.pipelines.sources import Source
+from levilab.pipelines.spin.magnetometer import FieldRecord, findings_of, spin_of_line, track_middle
 from levilab.pipelines.spin.readings import Records, track_of_record
 from levilab.pipelines.spin.words import finding_text
 from levilab.present.numbers import with_decimals, with_uncertainty
 from levilab.texts.note import Note, kind_of
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from analysis.pulses import Phase, Track
-    from analysis.pulses.result import SpinFrequency
-    from levilab.formats.waveforms.waveform import Waveform
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.spin.magnetometer import FieldRecord
 
 
 def _correlation(k: int) -> Callable[[SpinFrequency], Any]:

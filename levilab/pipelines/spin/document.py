@@ -3,30 +3,32 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 from analysis.budget import Budget, Component, rest
 from analysis.numbers import digits
+from analysis.pulses import SpinFrequency
+from analysis.uncertainty import Estimate
 from levilab.pipelines.budget import direct_row, time_base
 from levilab.pipelines.document import Analysis, values_of
 from levilab.pipelines.options import SpinOptions
 from levilab.pipelines.row import find_all, symbols_of
-from levilab.pipelines.spin.analysis import OF_A_RUN, QUANTITIES, SPIN_ROW, SpinAnalysis, SpinRun, spin_of_source
-from levilab.pipelines.spin.readings import read_spin_file, read_spin_run
+from levilab.pipelines.sources import Source
+from levilab.pipelines.spin.analysis import (
+    OF_A_RUN,
+    QUANTITIES,
+    SPIN_ROW,
+    SpinAnalysis,
+    SpinRun,
+    UParts,
+    spin_of_source,
+)
+from levilab.pipelines.spin.readings import Records, read_spin_file, read_spin_run
 from levilab.pipelines.spin.report import spin_columns, spin_part, spin_tables
 from levilab.runs.traces import INDEX
 from levilab.runs.waveforms import has_traces
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from analysis.pulses import SpinFrequency
-    from analysis.uncertainty import Estimate
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.spin.analysis import UParts
-    from levilab.pipelines.spin.readings import Records
-
 
 #: Powers of the record's length by which u falls, with as much noise, and pulses as often.
 _BY_LENGTH = {"frequency": "√8", "chirp": "√32"}

@@ -6,28 +6,23 @@ import os
 import zlib
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from pathlib import Path
+from typing import Literal
 
-from analysis.pulses import track_of_blocks, track_of_samples
+from analysis.pulses import Track, track_of_blocks, track_of_samples
 from analysis.rotation.record import FEWEST
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
+from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
 from levilab.present.numbers import how_many
+from levilab.runs.run import Run
 from levilab.runs.traces import INDEX, undescribed_codes
 from levilab.runs.waveforms import run_waveforms
 from levilab.texts.note import Note, of_file
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from analysis.pulses import Track
-    from levilab.pipelines.options import InputOptions
-    from levilab.runs.run import Run
-
 
 #: Channels whose frequency is no spin, as experiments call them, with what it is.
 NO_SPIN = {"laser": "how often the stem cuts the laser: its precession", "drive": "that of the drive"}

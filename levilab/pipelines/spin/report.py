@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,21 +11,14 @@ from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, title_of
 from levilab.pipelines.row import cells_of
-from levilab.pipelines.spin.analysis import MOST_DRAWN, OF_A_RUN, in_a_sentence, shown_time
+from levilab.pipelines.sources import Source
+from levilab.pipelines.spin.analysis import MOST_DRAWN, OF_A_RUN, SpinAnalysis, SpinRun, in_a_sentence, shown_time
+from levilab.pipelines.spin.readings import Records
 from levilab.present.clock import with_clock
-from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
+from levilab.present.document.blocks import Block, Listing, Paragraph, Points, Tabular
 from levilab.present.numbers import column, enumeration, how_many, plain, short_name, with_decimals, with_uncertainty
 from levilab.present.tables import Table, table
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.spin.analysis import SpinAnalysis, SpinRun
-    from levilab.pipelines.spin.readings import Records
-    from levilab.present.document.blocks import Block
-
 
 #: A slope, or a scatter of records, is seen beyond this multiple of u.
 _SEEN = 3.0

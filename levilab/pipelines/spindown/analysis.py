@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from analysis.errors import AnalysisError
-from analysis.spindown.combine import Combined, combine
+from analysis.spindown.combine import Combined, CombinedLaw, combine
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown, fit_spin_down
+from analysis.spindown.lawfit import LawFit
 from analysis.spindown.tilt import THESIS_TOP, Top
 from levilab.errors import DataError
+from levilab.formats.device import Device
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.field.device import THESIS, inertias
 from levilab.pipelines.options import SpinDownOptions
+from levilab.pipelines.sources import Source
 from levilab.pipelines.spindown.readings import SpinReadings
 from levilab.pipelines.spindown.words import TILT_ALLOWED, is_seen, remark, verdict_in_doubt, verdict_of_all
 from levilab.present.numbers import enumeration
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from analysis.spindown.combine import CombinedLaw
-    from analysis.spindown.lawfit import LawFit
-    from levilab.formats.device import Device
-    from levilab.pipelines.sources import Source
 
 #: The experiment whose runs it takes, and whose settings say how the readings were counted.
 EXPERIMENT = "spin"

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from analysis.budget import Budget, Component, printed_step, rest, u_of_step
 from analysis.numbers import digits
-from analysis.spindown.combine import Combined
+from analysis.spindown.combine import Combined, CombinedLaw, Mean
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown
+from analysis.spindown.lawfit import LawFit, Parts
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
+from analysis.spindown.verdict import Verdict
+from analysis.uncertainty import Estimate
 from levilab.pipelines.budget import bench_clock, direct_row, gate_of, setting_of, time_base
 from levilab.pipelines.document import Analysis, number, statistics_of, value_of, values_of
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.row import find_all
+from levilab.pipelines.sources import Source
 from levilab.pipelines.spindown.analysis import EXPERIMENT, SpinDownAnalysis, combine_sound, fit_source
-from levilab.pipelines.spindown.readings import read_run_readings, read_spin_file
+from levilab.pipelines.spindown.readings import SpinReadings, read_run_readings, read_spin_file
 from levilab.pipelines.spindown.report import (
     spindown_columns,
     spindown_curve,
@@ -37,17 +42,6 @@ from levilab.pipelines.spindown.words import (
     verdict_of_run,
 )
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from analysis.spindown.combine import CombinedLaw, Mean
-    from analysis.spindown.lawfit import LawFit, Parts
-    from analysis.spindown.verdict import Verdict
-    from analysis.uncertainty import Estimate
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.spindown.readings import SpinReadings
-
 
 #: The law whose exponent is a result beside the constants of the best one.
 _POWER, _EXPONENT = "power", "exponent"

@@ -1,17 +1,20 @@
 """What a table of readings must fulfil before an analysis may trust it."""
 
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, ClassVar
+from pathlib import Path
+from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError, NotPositive, TimesNotIncreasing
 from analysis.numbers import digits
-from analysis.pulses import phases, track_of_times
+from analysis.pulses import Track, phases, track_of_times
 from analysis.pulses.times import FASTEST_BY_HAND_HZ
-from analysis.rotation import track_of_field
+from analysis.rotation import FieldTrack, track_of_field
 from analysis.rotation.track import WINDOW_S as FIELD_WINDOW_S
 from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from analysis.spindown.readings import check_readings
@@ -22,29 +25,17 @@ from levilab.formats.table import FEWEST, Table, read_table, refuse
 from levilab.formats.understanding import is_possible_spin, possible_spins
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
-from levilab.formats.waveforms.waveform import PulseTimes
+from levilab.formats.waveforms.waveform import PulseTimes, Waveform
+from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import Readings
-from levilab.pipelines.spin.magnetometer import findings_of, read_field_record
+from levilab.pipelines.spin.magnetometer import FieldRecord, findings_of, read_field_record
 from levilab.pipelines.spin.readings import track_of_record
 from levilab.pipelines.spin.words import finding_text
 from levilab.present.numbers import how_many
 from levilab.runs.events import RunEvent
+from levilab.runs.run import Run
 from levilab.texts.note import Note, of_file
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-    from pathlib import Path
-    from typing import Any
-
-    from numpy.typing import NDArray
-
-    from analysis.pulses import Track
-    from analysis.rotation import FieldTrack
-    from levilab.formats.waveforms.waveform import Waveform
-    from levilab.pipelines.options import InputOptions
-    from levilab.pipelines.spin.magnetometer import FieldRecord
-    from levilab.runs.run import Run
 
 #: Columns of a table that are looked at.
 QUANTITIES = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")

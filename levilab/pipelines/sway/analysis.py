@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,16 +15,11 @@ from levilab.errors import DataError
 from levilab.pipelines.analyzed import EachAlone
 from levilab.pipelines.options import SwayOptions
 from levilab.pipelines.row import Quantity, columns_of, entry, statistic
+from levilab.pipelines.sources import Source
 from levilab.pipelines.sway.device import known_of
 from levilab.pipelines.sway.readings import SwayReadings
 from levilab.present.numbers import with_uncertainty
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-
-    from levilab.pipelines.sources import Source
-
 
 #: Of `analysis.sway.Geometry`.
 QUANTITIES = (

@@ -4,35 +4,29 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.sway import Sensor, image, slow_part, without_image
 from levilab.errors import DataError
 from levilab.formats.columns import NoSuchColumn, TableError
 from levilab.formats.device import Device
-from levilab.formats.table import read_run_readings, read_table, refuse
+from levilab.formats.table import Table, read_run_readings, read_table, refuse
 from levilab.formats.understanding import Request, plan_of
 from levilab.pipelines.field.device import THESIS
-from levilab.pipelines.options import SwayOptions
+from levilab.pipelines.options import InputOptions, SwayOptions
 from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.analysis import DISTANCE_U_M
 from levilab.pipelines.spin.magnetometer import FieldRecord
 from levilab.pipelines.spindown.readings import field_readings
-from levilab.runs.run import STATES
+from levilab.runs.run import STATES, Run
 from levilab.texts.text import Text
 
-if TYPE_CHECKING:
-    from pathlib import Path
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    from levilab.formats.table import Table
-    from levilab.pipelines.options import InputOptions
-    from levilab.runs.run import Run
-
-    Array = NDArray[np.float64]
 
 #: Columns of a table that are looked at, and those without which it is no track.
 QUANTITIES = ("time_s", "x_m", "y_m", "height_m", "spin_frequency_hz")

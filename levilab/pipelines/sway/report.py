@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,18 +12,13 @@ from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, points_of, title_of
 from levilab.pipelines.row import cells_of
-from levilab.pipelines.sway.analysis import QUANTITIES
+from levilab.pipelines.sources import Source
+from levilab.pipelines.sway.analysis import QUANTITIES, SwayAnalysis, SwayRun
+from levilab.pipelines.sway.readings import SwayReadings
 from levilab.present.document.blocks import Listing, Paragraph, Tabular
 from levilab.present.numbers import how_many, short_name, with_decimals, with_uncertainty, without_unit
 from levilab.present.tables import Table, table
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.sway.analysis import SwayAnalysis, SwayRun
-    from levilab.pipelines.sway.readings import SwayReadings
 
 
 def sway_tables(analysis: SwayAnalysis) -> tuple[Table, ...]:

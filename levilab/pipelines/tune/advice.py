@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,15 +17,10 @@ from levilab.errors import UsageError
 from levilab.files import finite
 from levilab.pipelines.document import values_of
 from levilab.pipelines.row import Quantity
-from levilab.pipelines.tune.owner import in_grams, washers_text
+from levilab.pipelines.tune.owner import Owner, in_grams, washers_text
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.tables import Row, Table, table
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-
-    from levilab.pipelines.tune.owner import Owner
 
 SCHEMA = "levilab-tune/1"
 #: Without a scan the middle lies within the reach of the washers, and this share of the mass beyond.

@@ -6,8 +6,9 @@ It is read and written as a person would write it: "24.98 g", "0.06 + 0.1 g, 20.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from pydantic import PositiveFloat, ValidationError
 
@@ -21,10 +22,6 @@ from levilab.pipelines.suits import recall_suiting
 from levilab.runs.find import find_run
 from levilab.settings import Settings, in_one_line
 from levilab.texts.text import ENGLISH, Text, in_language, spoken
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-    from pathlib import Path
 
 _HEAD = "# Kept by levilab tune; a trial that is wrong may be corrected here, or its line deleted.\n"
 _TRIAL = (

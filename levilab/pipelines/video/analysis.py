@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 from analysis.errors import AnalysisError
 from analysis.film.circles import Circle
 from analysis.film.errors import NoMark, SlowMotion
-from analysis.film.mark import phases_of, without_pull
+from analysis.film.mark import Phases, phases_of, without_pull
 from analysis.film.turning import WINDOW_S, Turning, choices_of, spins_of_start, turning_of
 from analysis.limits import spin_at_fall
 from analysis.sway import swings_of
@@ -21,24 +23,15 @@ from levilab.formats.film import Film, open_film
 from levilab.formats.kinds import AUDIO, kind_of_bytes
 from levilab.formats.table import file_errors
 from levilab.pipelines.analyzed import EachAlone
-from levilab.pipelines.options import VideoOptions
+from levilab.pipelines.options import InputOptions, VideoOptions
 from levilab.pipelines.row import Quantity, columns_of
-from levilab.pipelines.sources import Readings
+from levilab.pipelines.sources import Readings, Source
 from levilab.pipelines.video.leaning import Leaning, Rising, leaning_of, rising_of
 from levilab.pipelines.video.tracking import Followed, follow
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.progress import ShareBar
+from levilab.runs.run import Run
 from levilab.texts.text import Sentences, Text, text_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from pathlib import Path
-
-    from analysis.film.mark import Phases
-    from levilab.pipelines.options import InputOptions
-    from levilab.pipelines.sources import Source
-    from levilab.runs.run import Run
-
 
 #: Of `levilab.pipelines.video.analysis.Video`.
 QUANTITIES = (

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from analysis.budget import Budget
 from levilab.pipelines.budget import direct_row
 from levilab.pipelines.document import Analysis, values_of
 from levilab.pipelines.options import VideoOptions
 from levilab.pipelines.row import find_all, symbols_of
+from levilab.pipelines.sources import Source
 from levilab.pipelines.video.analysis import (
     QUANTITIES,
     VIDEO_ROW,
+    FilmReadings,
     Video,
     VideoAnalysis,
     analyze_source,
@@ -19,10 +21,6 @@ from levilab.pipelines.video.analysis import (
     read_film,
 )
 from levilab.pipelines.video.report import video_columns, video_files, video_part, video_tables
-
-if TYPE_CHECKING:
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.video.analysis import FilmReadings
 
 #: Quantity, and the only part of its u: name, source, kind, note, remedy.
 _ROWS: tuple[tuple[str, str, str, Literal["A", "B"], str, str], ...] = (

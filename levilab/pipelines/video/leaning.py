@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.film.swing import swing_of
+from analysis.film.swing import Swing, swing_of
 from analysis.film.turning import windows_of
 from analysis.uncertainty import Estimate
-
-if TYPE_CHECKING:
-    from analysis.film.swing import Swing
 
 Array = NDArray[np.float64]
 

@@ -3,24 +3,18 @@
 from __future__ import annotations
 
 import io
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, title_of
 from levilab.pipelines.row import cells_of
-from levilab.pipelines.video.analysis import QUANTITIES
-from levilab.present.document.blocks import Listing, Paragraph, Tabular
+from levilab.pipelines.sources import Source
+from levilab.pipelines.video.analysis import QUANTITIES, FilmReadings, Video, VideoAnalysis
+from levilab.present.document.blocks import Block, Listing, Paragraph, Tabular
 from levilab.present.numbers import short_name, with_decimals
 from levilab.present.tables import Table, table
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.video.analysis import FilmReadings, Video, VideoAnalysis
-    from levilab.present.document.blocks import Block
 
 
 def video_tables(analysis: VideoAnalysis) -> tuple[Table, ...]:

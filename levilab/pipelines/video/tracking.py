@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.film.circles import Circle, coarse, find_base, find_top
 from analysis.film.dot import find_dot
@@ -14,17 +16,11 @@ from analysis.film.rim import Rim, fit_rim
 from analysis.film.side import Side, find_side, fit_side
 from analysis.film.view import compare_views
 from levilab.errors import DataError
-from levilab.formats.film import pictures
+from levilab.formats.film import Film, Picture, pictures
 from levilab.texts.text import Text
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+Array = NDArray[np.float64]
 
-    from numpy.typing import NDArray
-
-    from levilab.formats.film import Film, Picture
-
-    Array = NDArray[np.float64]
 
 #: The top is looked for in the beginning of the film, in pictures at least so far apart [s].
 _FIRST_S, _APART_S = 0.6, 1 / 90

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
 from itertools import chain, count
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError
 from levilab.errors import DataError, unquote
 from levilab.files import as_json
-from levilab.pipelines.result import Place
+from levilab.formats.waveforms.waveform import Waveform
+from levilab.pipelines.document import Analysis
+from levilab.pipelines.result import Place, Result
 from levilab.pipelines.row import plain
 from levilab.pipelines.suits import recall_suiting, remarks, texts_of
 from levilab.present.units import UNITS, split
@@ -28,16 +32,7 @@ from levilab.sweeps.store import Store
 from levilab.texts.note import kind_of
 from levilab.texts.text import Text
 
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-
-    from numpy.typing import NDArray
-
-    from levilab.formats.waveforms.waveform import Waveform
-    from levilab.pipelines.document import Analysis
-    from levilab.pipelines.result import Result
-
-    Results = Sequence[tuple[Analysis[Any], Any]]
+Results = Sequence[tuple[Analysis[Any], Any]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.present.units import name_with_unit
-from levilab.report.groups.beside import REPEAT
+from levilab.report.groups.beside import REPEAT, Class
 from levilab.texts.text import in_language
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Iterator, Sequence
+Cell = str | float | int | None
 
-    from levilab.report.groups.beside import Class
-
-    Cell = str | float | int | None
 
 #: Of a workbook without runs: its bytes depend on its inputs alone.
 _NO_DATE = datetime(1980, 1, 1, tzinfo=UTC)

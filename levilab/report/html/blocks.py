@@ -5,16 +5,19 @@ from __future__ import annotations
 import base64
 import re
 from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 from levilab.present.document.blocks import (
     Banner,
+    Block,
     Bullets,
     Code,
     Details,
+    Fact,
     Facts,
     Listing,
     Note,
@@ -27,14 +30,8 @@ from levilab.present.document.blocks import (
     Warnings,
 )
 from levilab.present.document.typesetting import typeset
+from levilab.present.tables import Row, Table
 from levilab.texts.text import Text, in_language
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
-
-    from levilab.present.document.blocks import Block, Fact
-    from levilab.present.tables import Row, Table
-
 
 #: Elements that have no content and no end.
 _EMPTY = frozenset({"meta", "br", "img"})

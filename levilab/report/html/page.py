@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import base64
 import json
+from collections.abc import Iterable
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
-from typing import TYPE_CHECKING
 
-from levilab.present.document.blocks import Section
+from levilab.present.document.blocks import Block, Document, Section
 from levilab.report.html.blocks import Html, Writer, element, join, words
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from levilab.present.document.blocks import Block, Document
 
 
 def page_of(document: Document) -> str:

@@ -7,19 +7,24 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 from importlib import resources
 from importlib.util import find_spec
+from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import LevilabError
 from levilab.present.characters import printable
 from levilab.present.document.blocks import (
     Banner,
+    Block,
     Bullets,
     Code,
     Details,
+    Document,
     Fact,
     Facts,
     Listing,
@@ -34,17 +39,10 @@ from levilab.present.document.blocks import (
 )
 from levilab.present.document.typesetting import typeset
 from levilab.present.numbers import how_many
+from levilab.present.tables import Row, Table
 from levilab.software import how_to_install
 from levilab.texts.text import Text as Said
 from levilab.texts.text import in_language
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-    from datetime import datetime
-    from pathlib import Path
-
-    from levilab.present.document.blocks import Block, Document
-    from levilab.present.tables import Row, Table
 
 TEMPLATE = "report.typ"
 #: Letters of a word that is never divided; a longer one is divided behind what stands between its parts, as in a path.

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING
 
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
@@ -27,18 +27,11 @@ from levilab.present.document.blocks import (
 from levilab.present.numbers import column, how_many
 from levilab.present.progress import Display
 from levilab.present.tables import table
-from levilab.report.groups.beside import class_of
+from levilab.report.groups.beside import Class, class_of
 from levilab.report.groups.document import truth_text
 from levilab.report.page import FORMATS
-from levilab.report.worksheets.sheets import SHEETS, TOPS
+from levilab.report.worksheets.sheets import SHEETS, TOPS, Sheet
 from levilab.texts.text import ENGLISH, Text, in_language
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from levilab.report.groups.beside import Class
-    from levilab.report.worksheets.sheets import Sheet
-
 
 _TEXTS = Path(__file__).parent / "texts.toml"
 

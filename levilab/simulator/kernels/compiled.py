@@ -16,9 +16,10 @@ import sys
 import tempfile
 import time
 import uuid
+from collections.abc import Callable, Mapping
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numba
 import numba.core
@@ -28,9 +29,6 @@ from numba.core.event import Event, Listener, register
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic, overload
 from platformdirs import user_cache_path
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
 
 F = TypeVar("F", bound="Callable[..., Any]")
 
