@@ -182,12 +182,11 @@ function takePoses(pieces) {
   }
 }
 
-/** Mark the fall in the last minutes, with the spin that was counted last. */
+/** Mark the fall in the last minutes. */
 function markFall() {
   fellAt = data.lastUp;
   put(by("replay"), {hidden: true});
-  const spin = history.counts.at(-1)?.[1];
-  history.mark(data.lastUp, spin ? phrase("fell at {spin} Hz", {spin: fixed(spin, 1)}) : phrase("fell"));
+  history.mark(data.lastUp, phrase("fell"));
   dirty.plot = true;
 }
 

@@ -335,7 +335,8 @@ export function drawRecords(paper, records, source) {
     const [from, to] = range([one.low, one.high]);
     const more = Math.max(0, (LEAST_SPAN_V - (to - from)) / 2);  // noise alone does not fill the screen
     const [lowest, highest] = [from - more, to + more];
-    const floor = (channel + 1) * band - 7, ceiling = channel * band + 24;  // above it stands what it is
+    const floor = (channel + 1) * band - Math.min(7, band / 8);  // above the signal stands what it is, on a low screen across it
+    const ceiling = channel * band + Math.min(24, band / 4);
     const toX = (k) => (one.start_s + (k + 0.5) * one.step_s - begin) / (end - begin) * width;
     const toY = (value) => floor - (value - lowest) / (highest - lowest) * (floor - ceiling);
     const old = one.said ? `, ${one.said}` : "";

@@ -269,7 +269,7 @@ def _meaning(analysis: FieldAnalysis) -> Iterator[str]:
     reduced = scan.statistics.reduced_chi_square
     if reduced is None:
         yield "No uncertainty of the readings is given, so whether a ring describes the field is not tested."
-    elif reduced < 1.5:
+    elif all(remark.kind != "scan scatters" for remark in scan.remarks):
         yield Text(
             "A uniform ring describes the readings to their uncertainties (χ²/dof = {chi:n}).", chi=digits(reduced)
         )

@@ -32,7 +32,7 @@ def hold_figure(analysis: HoldAnalysis) -> Figure:
         best = found.best
         figure = Figure(figsize=(WIDE, 5.3 if best else 3.3))
         finding = Text("The drag at {n} held spins, and the drag laws through it", n=len(analysis.runs))
-        headline(figure, finding if len(analysis.runs) > 1 else text_of(analysis.runs[0]),
+        headline(figure, finding if len(analysis.runs) > 1 else text_of(analysis.runs[0]).each[0],
                  synthetic_mark([one.synthetic for one in analysis.sources]))  # fmt: skip
         upper = panel(figure, 0.75, 0.5, 4.05, 2.3)
         _draw(upper, analysis, "readings", np.ones_like)

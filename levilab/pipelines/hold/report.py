@@ -76,15 +76,15 @@ def hold_part(analysis: HoldAnalysis) -> ReportPart:
     return ReportPart(
         subject="held spin",
         heading="Held spins: the drag by the amplitude that balances it",
-        lead=Text("{n} held spins", n=len(analysis.runs)),
+        lead=how_many(len(analysis.runs), "held spin"),
         result=(
             Paragraph(_MEANING, "What it means."), Tabular("hold-spins", spins_table(analysis), VALUE_U), *laws,
         ),
         figure=FigureText(
             title="Drag at held spins.",
-            caption=(
-                "The drag that the amplitude balanced at each held spin, with its u, and the drag laws through it; "
-                "below, both over the best law."
+            caption=Sentences(
+                "The drag that the amplitude balanced at each held spin, with its u, and the drag laws through it.",
+                "Below, both over the best law." if analysis.combined.best else "",
             ),
             points=points_of(analysis, _points, "readings", *(["ratios"] if analysis.combined.best else [])),
         ),

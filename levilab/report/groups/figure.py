@@ -28,6 +28,8 @@ _LEFT, _RIGHT, _GAP, _HEAD, _FOOT, _ROW = 1.75, 6.85, 0.25, 0.85, 0.55, 0.135
 _MOST_PANELS = 3
 #: Of the name of a group, that have room at the left.
 _LETTERS = 26
+#: Distances from the truth beyond it are arrows at the edge [u].
+_FARTHEST = 4.7
 
 
 def class_figure(of: Class) -> Figure:
@@ -100,6 +102,7 @@ def _draw_distances(axes: Axes, quantities: Sequence[Compared]) -> None:
     for of, colour, marker in zip(quantities, (GREEN, BLUE, "black"), "o^s", strict=False):
         for k, distance in enumerate(of.from_truth):
             if distance is not None:
-                axes.plot(np.clip(distance, -4.7, 4.7), k, marker=marker, markersize=3.5, color=colour)
+                beyond = ">" if distance > _FARTHEST else "<" if distance < -_FARTHEST else marker
+                axes.plot(np.clip(distance, -_FARTHEST, _FARTHEST), k, marker=beyond, markersize=3.5, color=colour)
     axes.set(xlim=(-5, 5))
     axes.set_xlabel("from the truth  [u]; band ±2", fontsize=8)

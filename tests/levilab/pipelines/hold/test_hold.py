@@ -93,6 +93,9 @@ def test_tables_figure_and_report_have_each_spin_and_law():
 def test_a_single_hold_and_one_without_a_gain(tmp_path):
     alone = analyzed(RUNS[:1])
     assert {law.name for law in alone.combined.laws} == {"stokes", "newton", "disc"}
+    assert (part := HOLD.part(alone)).lead == "1 held spin"
+    assert "Below" not in part.figure.caption
+    assert "…" not in hold_figure(alone).texts[0].get_text()
     shutil.copytree(RUNS[0], tmp_path / "run")
     (tmp_path / "run" / "events.jsonl").write_text('{"kind": "gain measured", "text": "", "times_s": [1]}\n')
     found = analyzed([tmp_path / "run"])

@@ -18,6 +18,7 @@ from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.report.groups.beside import DIFFER, GOOD, REPEAT, _quantity, _width, class_of, finding, verdict
 from levilab.report.groups.document import write_class
+from levilab.report.groups.figure import class_figure
 from levilab.runs.find import RECORD
 from levilab.world.spin_world import SpinScene, random_scene
 from support.acquisitions import RAISED_QUICKLY, Silent
@@ -171,6 +172,7 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
     assert verdict(of).startswith("2 of 3 results are good. To repeat: Group 2.")
     assert of.quantities[0].used == tuple(group.source.name != "Group 2" for group in of.groups)
     assert of.quantities[0].mean.value == pytest.approx(2.4e-4, rel=0.03)  # the halved spins have 3.3e-4
+    assert [line.get_marker() for axes in class_figure(of).axes for line in axes.lines].count(">") == 1
     page = Page(write_class([root], tmp_path / "class.html", tell=(told := []).append).read_text("utf-8")).text
     assert "Group 5.csv: a table that could not be read: levilab open shows its columns" in page
     assert any("Group 5.csv" in text for text in told)
