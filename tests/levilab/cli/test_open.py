@@ -81,7 +81,6 @@ def test_a_sheet_without_numbers_asks_nothing():
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("nothere.csv",), "nothere.csv: there is no such file"),
         ((), "FILE: name a data file"),
         (("my.csv", "--columns", "t=1,f=9"), "has no column '9'"),
         ((str(OMEGA), "--keep"), "--keep: goes with --columns"),

@@ -1,7 +1,8 @@
-"""result.json on the disk: how it is named, and what happens to one that cannot be used."""
+"""result.json on the disk: how it is named, what is recalled from it, and what happens to one that cannot be used."""
 
 import json
 import math
+import shutil
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,6 +17,7 @@ from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Place, beside, read_result, save
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import save as save_found
+from support.equal import differences
 from support.spin_downs import spin_down_csv
 
 
@@ -165,3 +167,35 @@ def test_a_result_read_and_written_again_is_the_same_text(tmp_path):
     file = write_result(tmp_path)
     result = read_result(file, SPINDOWN.model)
     assert result.as_dict() == json.loads(file.read_text(encoding="utf-8"))
+
+
+#: Inputs of each analysis among the sample data; a folder of several is searched.
+INPUTS = (
+    ("spindown", ["spin-down-1"]),
+    ("spindown", ["spin-down-1", "spin-down-2"]),
+    ("spin", ["trace-tape"]),
+    ("spin", ["scope-files"]),
+    ("field", ["field-scan"]),
+    ("limit", ["lower-limits"]),
+    ("limit", ["lower-limits", "upper-limits"]),
+    ("precession", ["precession-sweep"]),
+    ("sway", ["sway"]),
+    ("hold", ["hold"]),
+)
+
+
+@pytest.mark.parametrize(("name", "inputs"), INPUTS)
+def test_recalling_a_result_gives_what_was_found(tmp_path, sample_data, name, inputs):
+    paths = [shutil.copytree(sample_data / one, tmp_path / "runs" / one) for one in inputs]
+    places = paths if len(paths) == 1 else [tmp_path / "runs"]
+    analysis = ANALYSES[name]
+    options = analysis.options_from({})
+    found = analysis.analyze(places, options)
+    save(analysis.result_of(found, found.place), found.place, picture=None)
+    again = analysis.recall(places, options)
+    assert all(origin.text.startswith("as levilab analyze found it") for origin in again.origins)
+    assert differences(found.runs, again.runs) == []
+    assert differences(found.combined, again.combined) == []
+    assert differences(found.budget, again.budget) == []
+    assert again.all_warnings == found.all_warnings
+    assert analysis.document(again, tmp_path) == analysis.document(found, tmp_path)

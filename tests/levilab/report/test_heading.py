@@ -41,10 +41,3 @@ def test_a_short_one_of_few_spin_downs_is_one_page_without_criteria(tmp_path, ru
     text = Page(write_report(runs, tmp_path / "short.html", short=True).read_text(encoding="utf-8")).text
     assert not re.search("AICc|Durbin|order test", text)
     assert "-o short.html" in text
-
-
-def test_the_same_heading_makes_the_same_pdf(tmp_path):
-    heading = Heading(course="a", author="b")
-    files = [tmp_path / folder / "report.pdf" for folder in "ab"]
-    made = [write_report(RUNS[:1], file, short=True, heading=heading).read_bytes() for file in files]
-    assert made[0] == made[1]

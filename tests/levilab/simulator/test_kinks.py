@@ -86,8 +86,3 @@ def test_there_is_a_state_after_each_step():
     assert each.counts.tolist() == 6 * [1]
     states = integrate_each_step(Problem(scene, model, start, scheme_for(None, model)), stops)
     assert states[:, TIME] == pytest.approx(expected)
-
-
-def test_the_spin_alone_has_no_error_of_steps():
-    accuracy = simulate(preset("friction").changed({"observed": "spin"}), 5.0).accuracy
-    assert (accuracy.position, accuracy.axis, accuracy.steps, accuracy.reached) == (0.0, 0.0, 0, True)

@@ -81,7 +81,9 @@ def test_the_spin_of_an_aligned_top_follows_its_law_whatever_the_motion(law):
 
 def test_the_spin_alone_is_not_integrated():
     motion = simulate(FRICTION.changed({"observed": "spin", "drag.law": "disc"}), 190.0, rate=0.1)
-    assert motion.accuracy.scheme == "closed form"
+    accuracy = motion.accuracy
+    assert (accuracy.scheme, accuracy.position, accuracy.axis) == ("closed form", 0.0, 0.0)
+    assert (accuracy.steps, accuracy.reached) == (0, True)
     assert motion.time == pytest.approx(np.arange(20) * 10.0)
     exact = ((2 * np.pi * 30) ** -0.5 + 0.5 * 2.34e-4 * motion.time) ** -2 / (2 * np.pi)
     assert motion.spin_hz == pytest.approx(exact, rel=1e-14)

@@ -34,11 +34,6 @@ def test_a_map_is_written_as_a_table_and_a_picture(tmp_path):
     assert document["floating_kg"] == [[pytest.approx(0.024742, abs=1e-6), pytest.approx(0.025485, abs=1e-6)]]
 
 
-def test_masses_of_a_map_in_grams_are_refused_with_the_same_in_kilograms():
-    with pytest.raises(UsageError, match=r"Were grams meant\?  25\.2 g are 0\.0252"):
-        plan_of(UNDRIVEN, spins=(20.0, 32.0, 4), masses=(25.2, 25.6, 3), duration=2.0)
-
-
 def test_a_short_map_has_a_note_and_a_long_one_has_none():
     short, long = (plan_of(UNDRIVEN, (20.0, 32.0, 2), (0.0250, 0.0252, 2), duration) for duration in (2.0, 10.0))
     assert "2 s are short: tops outside of the window may only last a while" in notes_of(short)[0]
@@ -72,6 +67,8 @@ def test_a_map_of_too_many_tops_or_of_no_masses_is_refused():
         plan_of(UNDRIVEN, spins=(20.0, 30.0, 1000), masses=(0.0250, 0.0254, 1000))
     with pytest.raises(UsageError, match="masses = from 0 kg: masses above 0"):
         plan_of(UNDRIVEN, masses=(0.0, 0.03, 2))
+    with pytest.raises(UsageError, match=r"Were grams meant\?  25\.2 g are 0\.0252"):
+        plan_of(UNDRIVEN, masses=(25.2, 25.6, 3))
 
 
 def test_the_command_maps_the_spins_and_masses_that_it_is_given(levilab, tmp_path):

@@ -77,12 +77,6 @@ def test_tables_of_names_that_are_no_sheet_s_or_alike_have_a_sheet_each(tmp_path
     assert [*sheets][:5] == ["Readings", "readings 2", "READINGS 3", "quoted", "table"]
 
 
-def test_hdf5_is_opened_by_xarray_with_what_the_extra_brings(tmp_path):
-    written(RUN, tmp_path / "run.h5")
-    with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as data:
-        assert data["spin_frequency_hz"].sel(time_s=190.0).item() == 21.75
-
-
 def test_hdf5_has_the_same_variables_over_scales(tmp_path):
     for ending in ("nc", "h5"):
         written(RUN, tmp_path / f"run.{ending}")
