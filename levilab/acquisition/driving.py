@@ -505,7 +505,7 @@ def is_over(session: Session[D]) -> bool:
     session.event(
         RunEvent.LONGEST,
         Text(
-            "{longest:g} s are over ({experiment}.longest_s)",
+            "{longest:g} s are over ({experiment:s}.longest_s)",
             longest=longest,
             experiment=session.writer.record.experiment,
         ),

@@ -347,7 +347,7 @@ def _check_readings(run: Run, request: AcquisitionRequest) -> None:
     if isinstance(settings, CounterSettings) and settings.one_top and last > settings.longest_s:
         raise CannotResume(
             "{folder}: its last reading is of {last:g} s, and it was to end after {longest_s:g} s "
-            "({name}.longest_s): there is nothing to go on with; start again",
+            "({name:s}.longest_s): there is nothing to go on with; start again",
             folder=run.folder,
             last=last,
             longest_s=settings.longest_s,

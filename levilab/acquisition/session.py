@@ -242,7 +242,7 @@ class Session(Generic[S]):
                 name = self.writer.record.experiment
                 self.event(
                     RunEvent.LONGEST,
-                    Text("{longest_s:g} s are over ({name}.longest_s)", longest_s=longest_s, name=name),
+                    Text("{longest:g} s are over ({experiment:s}.longest_s)", longest=longest_s, experiment=name),
                 )
                 return
 

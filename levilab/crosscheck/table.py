@@ -59,7 +59,7 @@ def _deviation(spread: Spread) -> str:
     if math.isnan(spread.deviation):
         return "–"
     if math.isinf(spread.wanted_deviation):
-        return f"{spread.deviation:.2f} (not judged)"
+        return Text("{deviation:.2f} (not judged)", deviation=spread.deviation)
     return f"{spread.deviation:.2f} ± {spread.u_deviation:.2f} ({digits(spread.wanted_deviation, 3)})"
 
 
@@ -79,7 +79,8 @@ def _name(quantity: str, symbols: Mapping[str, str]) -> str:
     ('C₃/₂ of one run', 'start frequency')
     """
     name = quantity.removesuffix(OF_ONE_RUN)
-    return symbols.get(name, name.replace("_", " ")) + quantity[len(name) :].replace("_", " ")
+    called = symbols.get(name, name.replace("_", " "))
+    return Text("{name} of one run", name=called) if name != quantity else called
 
 
 def failures_as_text(study: Study) -> list[str]:
@@ -117,7 +118,7 @@ def as_text(study: Study, symbols: Mapping[str, str] | None = None) -> str:
             Text("For readings such as these the analysis is not right in {wrong}: trust its u the less.", wrong=wrong)
         )
     texts += [*_about_laws(study), *_about_student(study, symbols or {})]
-    texts += [f"{text[0].upper()}{text[1:]}." for text in study.more]
+    texts += study.more
     return Sentences(*texts, *failures_as_text(study))
 
 

@@ -74,6 +74,7 @@ UNITS = (
     _row("N m s", "n_m_s"),
     # small tilts in maps are in mrad; of the moment in rad, as its uncertainty is compared with the printed one
     _row("rad", "rad", shown=("mrad", 1e3), fine=("rad", 1.0)),
+    _row("°", "deg"),
     _row("T", "t", shown=("mT", 1e3), fine=("µT", 1e6), decimals=7),
     _row("T m", "t_m", shown=("mT cm", 1e5)),
     _row("A m^2", "a_m2", "A m²"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from analysis.numbers import digits
 from levilab.present.units import split
 from levilab.texts.text import Text
 
@@ -67,8 +68,13 @@ def value_in_words(key: str, value: Any) -> str:
     for scale in (unit.fine, unit.shown) if unit and unit.fine.factor > 1 else ():
         size = abs(value) * scale.factor
         if size < _MOST and (size >= _LEAST or text == "kg"):  # its prefixes are those of the gram
-            return f"{value * scale.factor:g} {scale.unit}"
+            return _with_unit(value * scale.factor, scale.unit)
     if not text or 0.01 <= abs(value) < 1000 or value == 0:
-        return f"{value:g} {text}".strip()
+        return _with_unit(value, text)
     factor, prefix = next(((f, p) for f, p in _PREFIXES if abs(value) >= f), _PREFIXES[-1])
-    return f"{value / factor:g} {prefix}{text}"
+    return _with_unit(value / factor, f"{prefix}{text}")
+
+
+def _with_unit(value: float, unit: str) -> str:
+    """Return up to six digits and a unit, whose name in the language of the reader may be another."""
+    return Text("{number:n} {unit}", number=digits(value, 6), unit=unit) if unit else digits(value, 6)

@@ -136,7 +136,7 @@ def _report_drag(session: Session[HoldSettings], motors: Sequence[Motor]) -> Non
         )
         session.event(
             RunEvent.ENDED,
-            Text("{why} ({experiment}.longest_s)", why=text, experiment=session.writer.record.experiment),
+            Text("{why} ({experiment:s}.longest_s)", why=text, experiment=session.writer.record.experiment),
         )
         return
     time, spin, u, volts = (np.array([row[one.name] for row in rows]) for one in channels(session.settings))

@@ -39,5 +39,5 @@ def trials_of(found: SwayAnalysis) -> Own:
         about="the middle window of the first track: its swings with new phases, and new noise of the same size",
         trial=trial,
         cost_s=_COST_S,
-        more=("the shift by the size of the swings is tried by `levilab crosscheck sway`, with tops in full motion",),
+        more=("The shift by the size of the swings is tried by `levilab crosscheck sway`, with tops in full motion.",),
     )

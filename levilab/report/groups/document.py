@@ -277,6 +277,6 @@ def write_class(
     if tell:
         for text in _unread(classes):
             tell(text)
-        found = ", ".join(f"{one.analysis.name} ({len(one.groups)})" for one in classes)
-        tell(Text("groups or runs side by side: {found:s}", found=found))
+        found = tuple(Text("{subject} ({n})", subject=_subject(one), n=len(one.groups)) for one in classes)
+        tell(Text("groups or runs side by side: {found}", found=found))
     return output

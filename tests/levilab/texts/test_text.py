@@ -34,6 +34,7 @@ from levilab.present.document.blocks import in_language_of_reader
 from levilab.present.numbers import with_uncertainty
 from levilab.present.tables import table
 from levilab.present.units import split
+from levilab.present.words import settings_in_words
 from levilab.report.worksheets.document import read_language
 from levilab.report.worksheets.sheets import TOPS
 from levilab.settings import KINDS, LIMITS, WHOLE
@@ -242,6 +243,10 @@ def test_a_name_keeps_its_point_and_a_number_gets_a_comma():
     assert in_language(said, "de") == "d0.1.csv: 39,853(31) Hz"
     shown = table("", ["input", "spin"], [["z1.5.csv", "1.50"]], numbers=["spin"])
     assert in_language_of_reader(shown, "de").rows[0].cells == ("z1.5.csv", "1,50")
+    drive = settings_in_words({"output": False, "frequency_hz": 49.4925, "amplitude_vpp": 4.9654, "burst_phase_deg": 9})
+    assert in_language(drive, "de") == "Ausgang aus; letzter Antrieb 49,4925 Hz; 4,9654 Vss; Startphase des Bursts 9 °"
+    over = Text("{longest:g} s are over ({experiment:s}.longest_s)", longest=9, experiment="sway")
+    assert in_language(over, "de") == "9 s sind um (sway.longest_s)"
 
 
 def test_a_note_and_a_finding_of_several_inputs_keep_their_language():
