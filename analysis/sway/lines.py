@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,8 @@ SLOW_HZ, PRECESSION_HZ = (0.15, 1.6), (2.5, 15.0)
 _SLOPES_U = np.array([2e-3, 2e-3, 0.2])
 #: Slopes with which the precession is looked for [Hz/s].
 _SLOPES = (0.0, 0.03, 0.06, 0.1, 0.15)
+#: Spans of time in a second, over which the vertical swing is looked for in means: all its lines are slower than 5 Hz.
+_SPANS_HZ = 20.0
 #: Peaks of the spectrum that are tried for either swing, and steps of Gauss and Newton at most.
 _TRIED, _STEPS = 3, 25
 #: Rounding: the noise is no smaller a part of the places, and frequencies differ by no smaller a part of their effect.
@@ -227,7 +229,9 @@ def _expected(t: Array, heights: Array | None, slow: Array) -> Vertical:
     """Return the vertical swing that goes with the slow ones [Hz], and, where the heights are known, with them."""
     backward, forward = slow.tolist()
     expected = Vertical(vertical_swing(backward, forward), VERTICAL_U_HZ)
-    return expected if heights is None else of_heights(t - t.mean(), heights, expected, forward - backward)
+    if heights is None:
+        return expected
+    return of_heights(_in_spans(t, t - t.mean()), _in_spans(t, heights), expected, forward - backward)
 
 
 class _Precession(NamedTuple):
@@ -257,6 +261,13 @@ def mirrored(swings: Sequence[Swings]) -> bool | None:
     return back > ahead if max(ahead, back) else None
 
 
+def _in_spans(t: Array, values: NDArray[Any]) -> NDArray[Any]:
+    """Return the mean of values at times [s], shapes (n, …) and (n,), over each span that has any."""
+    first = np.flatnonzero(np.diff(np.floor((t - t[0]) * _SPANS_HZ), prepend=-1))
+    count = np.diff(first, append=t.size).reshape(-1, *[1] * (values.ndim - 1))
+    return np.add.reduceat(values, first) / count
+
+
 def _spectrum(t: Array, s: Places) -> Sequence[Line]:
     even = np.linspace(t[0], t[-1], t.size)
     regular = np.interp(even, t, s.real) + 1j * np.interp(even, t, s.imag)
@@ -280,7 +291,8 @@ class _Fit(NamedTuple):
 
     def vertical(self, t: Array, s: Places) -> Vertical:
         """Return the vertical swing by the lines beside the slow ones, wherever they are [Hz]."""
-        return of_places(t - t.mean(), s, self.waves, self.still, self.expected, rows=self.rows)
+        late, s, waves, still = (_in_spans(t, one) for one in (t - t.mean(), s, self.waves, self.still))
+        return of_places(late, s, waves, still, self.expected, rows=self.rows)
 
 
 def _fit(
