@@ -27,9 +27,9 @@ def install_wheel(session: nox.Session, *extras: str) -> None:
 
 @nox.session(python=PYTHONS)
 def tests(session: nox.Session) -> None:
-    """The tests against the installed wheel, not against the folders beside them."""
+    """The tests, but slow ones of numbers, against the installed wheel, not against the folders beside them."""
     install_wheel(session, "[dev]")
-    session.run("pytest", "tests", *session.posargs)
+    session.run("pytest", "tests", "-m", "not numbers", *session.posargs)
 
 
 @nox.session
