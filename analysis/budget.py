@@ -11,10 +11,7 @@ from dataclasses import dataclass
 from math import hypot, sqrt
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from analysis.arrays import Array
 
 #: Relative: the rows add up to u, but for rounding and the digits in which results are kept.
 ROUNDING = 1e-6

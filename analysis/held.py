@@ -17,16 +17,14 @@ from dataclasses import dataclass, replace
 from math import hypot, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.least_squares import solve
 from analysis.pulses.regression import student
 from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.selection import Statistics, statistics, weigh
 from analysis.spindown.tilt import THESIS_TOP
 from analysis.uncertainty import Estimate, curvature, propagate
-
-Array = NDArray[np.float64]
 
 #: Readings that follow each other by more than this multiple of the usual time have a loss of the top between them.
 _GAP = 1.5

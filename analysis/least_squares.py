@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
+
 Residual = Callable[[Array], Array]  # q of shape (p,) → (model − data)/u of shape (n,)
 Gradient = Callable[[Array], Array]  # q of shape (p,) → slopes of the residuals, shape (p, n)
 

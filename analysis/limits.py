@@ -13,12 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError, NotFinite, NotPositive, TooFewReadings
 from analysis.uncertainty import ROUNDING, Estimate
-
-Array = NDArray[np.float64]
 
 #: Repetitions below which nothing is said of a scatter, and below which nothing is said of outliers and a trend.
 FEWEST, FEWEST_FOR_SHAPE = 2, 5

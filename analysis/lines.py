@@ -20,10 +20,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import NotFinite, TooFewReadings
 
 Signal = NDArray[np.complex128]
-Array = NDArray[np.float64]
 Bins = NDArray[np.int64]
 
 #: Below this many samples a window leaves nothing to look at; the ratio of two bins is good to 1/n².

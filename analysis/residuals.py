@@ -12,7 +12,7 @@ from math import comb, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
 
 # Up to so many of the rarer sign the distribution is exact. Beyond, the normal one errs by less than 0.001 where
 # neither sign is much rarer, as with residuals of a fit.

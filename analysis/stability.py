@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
+
 AxialField = Callable[[Array], Array]
 
 #: Steps of the scans: heights in which a window or an equilibrium is looked for, and spins.

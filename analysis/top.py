@@ -10,12 +10,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError
 from analysis.uncertainty import Estimate
-
-Array = NDArray[np.float64]
 
 
 class ImpossibleCylinder(AnalysisError):

@@ -15,11 +15,9 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.uncertainty import Estimate
-
-Array = NDArray[np.float64]
 
 #: Relative change per kelvin of base or top, and its standard uncertainty: hard ferrite has −0.2 %/K (IEC 60404-8-1),
 #: neodymium −0.11; tops measured over 21 K gave −0.26 for both together.

@@ -7,9 +7,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
 
 #: Of the numbers: what these differ by less is the computer's, and no scatter of theirs.
 ROUNDING = 64 * float(np.finfo(float).eps)

@@ -13,8 +13,9 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from analysis.arrays import Array
 from analysis.errors import NotFinite, NotPositive, ShapesDiffer
 from analysis.field.errors import FieldStandsStill, FieldTurnsOver, ImpossibleRing, NoField, NotFitted, TooFewHeights
 from analysis.field.ring import Ring, on_axis, reversal, slopes
@@ -22,8 +23,6 @@ from analysis.least_squares import solve
 from analysis.remarks import Remark
 from analysis.residuals import durbin_watson, gross_errors, runs_test_p, studentise
 from analysis.uncertainty import Estimate, curvature
-
-Array = NDArray[np.float64]
 
 #: The parameters in the order of the covariance, and their units.
 UNITS: Mapping[str, str] = {

@@ -10,16 +10,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.field.fit import FieldScan
 from analysis.field.magnet import Disc, axial_field, stiffnesses
 from analysis.field.ring import Ring
 from analysis.remarks import Remark
 from analysis.stability import AxialField, SymmetricTop, Window, equilibria, windows
 from analysis.uncertainty import Estimate, propagate
-
-Array = NDArray[np.float64]
 
 #: Relative change of hard ferrite's remanence per kelvin (IEC 60404-8-1: −0.2 %/K), of base and top alike.
 FERRITE_PER_K = -0.002

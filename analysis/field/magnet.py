@@ -12,12 +12,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.field.ring import Ring, on_axis
 from analysis.stability import AxialField
-
-Array = NDArray[np.float64]
 
 #: The highest term.  Each is about (R/distance to the ring)² of the one before it, 1/30 for the thesis's top; so the
 #: force is good to 1e-5, and the edges of the windows to 0.01 mm.

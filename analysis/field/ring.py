@@ -9,9 +9,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
 
 #: A ring that is thinner than this part of its inner radius is a sheet with the first correction, h²/24 times the
 #: second derivative: the next term is below 1e-13 of the field, while a difference over h would lose as many digits.

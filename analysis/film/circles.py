@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.film.errors import NoTop
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.floating] | NDArray[np.uint8]
 
 

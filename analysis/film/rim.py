@@ -14,9 +14,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.film.circles import Circle
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.floating] | NDArray[np.uint8]
 
 

@@ -14,11 +14,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.film.circles import Circle, changing_part
 from analysis.film.errors import NoTop
 from analysis.film.rim import RAYS, Rim, fit_shifts, shifts_of
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.floating] | NDArray[np.uint8]
 
 

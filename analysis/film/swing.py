@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.lines import FEWEST, spectral_lines
 
-Array = NDArray[np.float64]
 Signal = NDArray[np.complex128]
 
 #: Order of the polynomial for what is slower, in a window of a second: 1.3 turns of the slow swings are left to 0.1 %.

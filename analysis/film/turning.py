@@ -11,10 +11,9 @@ import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import TooFewReadings
 from analysis.film.errors import NoMark
-
-Array = NDArray[np.float64]
 
 #: Spins with which a top floats, or is lost at, with room for a driven one [Hz].
 LOW, HIGH = 14.0, 75.0

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-
+from analysis.arrays import Array
 
 #: A shift is seen at edges, of at least this part of the steepest slope: what a codec changes in a flat part looks
 #: like one.  Fewest pixels of edges.

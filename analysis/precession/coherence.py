@@ -9,11 +9,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import TooFewReadings
-
-Array = NDArray[np.float64]
 
 #: Fewer pulses than this have no meaningful mean vector.
 FEWEST_PULSES = 5

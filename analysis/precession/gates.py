@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
 
 #: With fewer gates no swing is searched: rate, swing and its frequency are four numbers.
 FEWEST = 7

@@ -13,12 +13,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError, TooFewReadings
 from analysis.uncertainty import BELIEVED
-
-Array = NDArray[np.float64]
 
 #: Fewer points leave no degree of freedom beside two parameters.
 FEWEST = 3

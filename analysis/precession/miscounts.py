@@ -11,12 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.precession.gates import Gates, whole_counts
 from analysis.uncertainty import Estimate
-
-Array = NDArray[np.float64]
 
 #: From more points every k-th, in the order of x, is used: there are n²/2 pairs.
 MOST_PAIRED = 500

@@ -12,14 +12,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import NotFinite, NotPositive, ShapesDiffer
 from analysis.precession.gates import Gates
 from analysis.precession.line import FEWEST, NO_FIT, Line, fit_line, fit_orthogonal, influence
 from analysis.precession.miscounts import Miscount, Robust, find_miscounts, robust_line
 from analysis.precession.power import Power, power_of
 from analysis.remarks import Remark
-
-Array = NDArray[np.float64]
 
 #: A joint test below this excludes slope 1 and intercept 0.
 EXCLUDED_P = 0.01

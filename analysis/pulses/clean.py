@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.pulses.errors import TooFewPulses
 from analysis.pulses.regression import Fit, median
 from analysis.pulses.result import Finding
 from analysis.pulses.search import WIDE, find_events, noise_of, shorten
 from analysis.pulses.times import check_times, fit_train
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 #: Frequencies [Hz] and amplitudes.
 Lines = tuple[tuple[float, float], ...]

@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.pulses.matched import turn_times
 from analysis.pulses.regression import Fit, Grid, fit_turns, median, student
-
-Array = NDArray[np.float64]
 
 #: Samples on either side, as a part of the width at half height: 0.92 of the information of a Gaussian pulse.
 SIDE = 0.93

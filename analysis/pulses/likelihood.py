@@ -8,11 +8,9 @@ without their phases, which forgives a slope that is not known yet; then with th
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.pulses.regression import Fit, Scatter
-
-Array = NDArray[np.float64]
 
 #: What is searched: frequency [Hz] and slope [Hz/s].
 LOWEST, HIGHEST, STEEPEST = 5.0, 200.0, 0.6

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
+
 Kind = Literal["speeding-up", "held", "coasting", "nothing"]
 
 #: A frequency that changes by less than this part of itself in a second is held; a top that coasts loses 3e-3.

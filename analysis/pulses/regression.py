@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.pulses.jump import Jump
 from analysis.uncertainty import Estimate
-
-Array = NDArray[np.float64]
 
 #: The frequency's bend as a multiple of slope²/frequency, with its standard uncertainty.  Slower and slower: n under a
 #: drag in proportion to the n-th power of the spin, which is 1 to 2; an even ramp, 0, is three u away.

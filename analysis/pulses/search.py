@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.pulses.regression import median
-
-Array = NDArray[np.float64]
 
 #: Widths of the smoothing that are tried, in bins of the shortened trace.
 WIDTHS = (1, 2, 4, 8, 16)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
+
 Random = np.random.Generator
 
 RATE, DURATION, CHIRP, DUTY = 20_000.0, 10.0, -0.1, 0.03

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.arrays import Array
 from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing
 from analysis.pulses.errors import TooFewPulses
 from analysis.pulses.jump import Jump
 from analysis.pulses.regression import Fit, fit_turns, median, student
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.turns import Numbering, number_turns
-
-Array = NDArray[np.float64]
 
 FEWEST = 4
 #: A pulse farther from its place than this number of standard deviations of the others is no pulse of the top; with

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.arrays import Array
 from analysis.errors import NotPositive, ShapesDiffer
 from analysis.pulses import traps
 from analysis.pulses.clean import Clean, clean
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from analysis.pulses.regression import Fit
     from analysis.uncertainty import Estimate
 
-Array = NDArray[np.float64]
 Choice = Literal["auto", "edges", "matched", "likelihood"]
 
 #: Samples per second of the shortened trace in which pulses are searched for.

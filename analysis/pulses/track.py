@@ -9,14 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.arrays import Array
 from analysis.errors import NotPositive
 from analysis.pulses.errors import TooFewPulses
 from analysis.pulses.regression import median
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.times import FEWEST, check_times, spin_of_times
 from analysis.pulses.trace import Choice, spin_of_trace
-
-Array = NDArray[np.float64]
 
 #: Length of a window [s], unless given: sixty turns of a Levitron, in which its slope changes by less than 1 %.
 WINDOW = 2.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.pulses.clean import MAINS
 from analysis.pulses.matched import COARSE
 from analysis.pulses.regression import student
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from analysis.pulses.matched import Match
     from analysis.uncertainty import Estimate
 
-Array = NDArray[np.float64]
 
 #: Every second pulse differs where the means of both halves are this number of standard errors apart (with few pulses
 #: the quantile of Student's t of the same probability) ...

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.pulses.regression import median
 
-Array = NDArray[np.float64]
 Turns = NDArray[np.int64]
 
 #: A pulse farther from its turn than this [turns] belongs to none, while turns are being numbered.

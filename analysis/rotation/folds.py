@@ -15,7 +15,8 @@ import numpy as np
 from analysis.rotation.line import LineFit, fit_line
 
 if TYPE_CHECKING:
-    from analysis.rotation.record import Array, Record
+    from analysis.arrays import Array
+    from analysis.rotation.record import Record
 
 #: A free spin falls.  One record in a hundred rises, since a drive speeds the top up.
 RISING = 0.01

@@ -14,7 +14,7 @@ import numpy as np
 from analysis.rotation.record import PRIOR, Record
 
 if TYPE_CHECKING:
-    from analysis.rotation.record import Array
+    from analysis.arrays import Array
 
 #: A drag in proportion to the n-th power of the spin changes its slope by n slope²/frequency a second.  n is evenly
 #: distributed from 1 to 2: its standard deviation is 1/√12.

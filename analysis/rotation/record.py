@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewReadings
-
-Array = NDArray[np.float64]
 
 #: Least number of samples, and least duration [s].
 FEWEST, SHORTEST_S = 60, 0.5

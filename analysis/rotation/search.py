@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.rotation.record import Array, Line, Record, deviation
+from analysis.arrays import Array
+from analysis.rotation.record import Line, Record, deviation
 
 #: A top floats from 20 to 85 Hz [Hz]; other lines are searched from where the spline ends, too.
 LOWEST, HIGHEST, SLOW = 15.0, 85.0, 3.0

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
     from numpy.typing import ArrayLike
 
+    from analysis.arrays import Array
     from analysis.rotation.folds import Evidence, Weighed
-    from analysis.rotation.record import Array
 
 #: A line that is named may lie this part of the given frequency beside it.
 NEAR = 0.1

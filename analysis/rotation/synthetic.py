@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from analysis.rotation.record import Array
+from analysis.arrays import Array
 
 #: Amplitude of the line in each axis, relative.
 AXES = np.array([1.0, 0.5, 0.3])

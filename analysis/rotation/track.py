@@ -20,7 +20,7 @@ from analysis.rotation.spin import LEAST_GAIN, limits_near, result_of, strongest
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from analysis.rotation.record import Array
+    from analysis.arrays import Array
     from analysis.rotation.result import FieldSpin, Kind
 
 #: Length of a window [s], unless given.  A free top at 30 Hz loses 1 Hz meanwhile, evenly to 1 %.

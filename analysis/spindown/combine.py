@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from math import hypot
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError
 from analysis.remarks import Remark
 from analysis.residuals import durbin_watson, runs_test_p
@@ -21,8 +21,6 @@ from analysis.spindown.lawfit import LawFit
 from analysis.spindown.selection import NO_FIT, Statistics, statistics, weigh
 from analysis.spindown.verdict import Verdict, verdict
 from analysis.uncertainty import Estimate
-
-Array = NDArray[np.float64]
 
 
 class NothingToCombine(AnalysisError):

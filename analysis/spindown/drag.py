@@ -20,9 +20,9 @@ from types import MappingProxyType
 
 import numpy as np
 from numpy.polynomial.polynomial import polyval
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
 
 LARGEST_LOG = 200.0  # |ln x| is kept below this, so that squares of spins and slopes stay finite during a fit
 LARGEST_DECAY = 1e100  # the same for κτ: any larger and the spin is zero anyway

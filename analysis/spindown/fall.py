@@ -3,9 +3,8 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
 
 #: Counted spins between which a top falls [Hz]: simulated tops with a tilted moment leave the light at 23.3 Hz (scene
 #: practice) to 24.9 Hz (spindown); the ten published limits scatter by 0.25 Hz about 21.86 Hz (thesis §4.2), and the

@@ -7,6 +7,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError
 from analysis.remarks import Remark
 from analysis.residuals import Change, gross_errors, gross_limit, largest_change
@@ -21,7 +22,6 @@ from analysis.uncertainty import ROUNDING, Estimate
 
 __all__ = ["Estimate", "LawFit", "SpinDown", "Statistics", "Verdict", "fit_spin_down"]
 
-Array = NDArray[np.float64]
 
 FEWEST_FOR_OUTLIERS = 7  # with three parameters and one reading doubted, three are left to judge it by
 

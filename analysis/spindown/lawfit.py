@@ -5,8 +5,9 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from analysis.arrays import Array
 from analysis.budget import gate_bias
 from analysis.least_squares import solve
 from analysis.remarks import Remark
@@ -17,8 +18,6 @@ from analysis.spindown.readings import Readings
 from analysis.spindown.selection import Statistics, statistics
 from analysis.spindown.tilt import ACCURACY, MORE, THESIS_TOP, CountedLaw, Release, Top, count_of
 from analysis.uncertainty import ROUNDING, Estimate, propagate
-
-Array = NDArray[np.float64]
 
 #: A search ends where a step promises to move the parameters by no more of their u; it has converged where a whole
 #: step, without damping, promises no more than one: with u near the accuracy of the count no step leads closer.

@@ -19,9 +19,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
 
 #: Degrees of freedom of a stated u: it is known to 1/√16 of itself (GUM G.4.2).
 STATED_FREEDOM = 8

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError, NotFinite, NotPositive, ShapesDiffer, TimesNotIncreasing, TooFewReadings
-
-Array = NDArray[np.float64]
 
 FEWEST = 3
 

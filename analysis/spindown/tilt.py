@@ -33,11 +33,9 @@ Source: H. Goldstein, Classical Mechanics, §5.7 for the symmetric top; PHYSICS.
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.spindown.drag import DragLaw
-
-Array = NDArray[np.float64]
 
 PARAMETERS = ("moment_tilt", "resonance", "wobble")
 UNITS = ("rad", "Hz", "Hz")

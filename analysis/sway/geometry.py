@@ -17,8 +17,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import ShapesDiffer, TooFewReadings
 from analysis.sway.joint import Corrections, Joint, fit_together
 from analysis.sway.lines import COARSE
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from analysis.sway.known import Known
     from analysis.sway.lines import Swings
 
-Array = NDArray[np.float64]
 
 #: The shift at finite amplitude is known to this part of it: it is computed without a vertical swing of its own.
 SHIFT_U = 0.035

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.stability import modes
 from analysis.uncertainty import Estimate, partly_believed
 
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from analysis.sway.known import Known
     from analysis.sway.lines import Swings
 
-Array = NDArray[np.float64]
 
 #: Rounds in which a slow root is computed from itself; each gains a digit.
 _ROUNDS = 12

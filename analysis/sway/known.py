@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.field.errors import ImpossibleRing
 from analysis.field.magnet import axial_field, stiffnesses
 from analysis.stability import SymmetricTop, windows
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from analysis.stability import AxialField
     from analysis.sway.lines import Swings
 
-Array = NDArray[np.float64]
 
 #: Tops float between these heights above the upper face, in outer radii.
 _FLOATING = (0.05, 4.0)

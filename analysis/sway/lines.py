@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError, NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewReadings
 from analysis.lines import spectral_lines
 from analysis.sway.vertical import ALONE, BESIDE, VERTICAL_U_HZ, Vertical, beside, of_heights, of_places, vertical_swing
@@ -28,7 +29,6 @@ if TYPE_CHECKING:
     from analysis.lines import Line
     from analysis.sway.vertical import Beside
 
-Array = NDArray[np.float64]
 Places = NDArray[np.complex128]
 
 #: Length of a window [s]: in a longer one the precession's slope changes.  Least number of samples of a window.

@@ -14,10 +14,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError
 from analysis.stability import AxialField, SymmetricTop, modes
-
-Array = NDArray[np.float64]
 
 #: Harmonics of the beat, and phases of it at which the equations hold: the next would change no digit at 2 mm.
 _HARMONICS, _PHASES = 4, 20

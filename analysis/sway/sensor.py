@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.sway.lines import PRECESSION_HZ, SLOW_HZ
 from analysis.sway.vertical import GRADIENT_PER_M
 
 if TYPE_CHECKING:
     from analysis.sway.lines import Swings
 
-Array = NDArray[np.float64]
 Places = NDArray[np.complex128]
 
 _MU0_4PI = 1e-7  # [T m/A]

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
+
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-Array = NDArray[np.float64]
 Places = NDArray[np.complex128]
 
 #: B′/2B [1/m] that the prior of the vertical swing follows from, and that swing's standard uncertainty [Hz].

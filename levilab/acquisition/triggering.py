@@ -13,17 +13,14 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.limits import U_OF_WAY
 from analysis.uncertainty import Estimate
 from levilab.acquisition.counting import prepare_counter_again, spin_now
 from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NotHeld, Session
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
-
-Array = NDArray[np.float64]
-
 
 #: The frequency of the cycle over that of the top: a pulse comes up to 6 % of a turn early (2 % is its scatter), and
 #: the top gains 2 % until the next count is set.  The pull is 8 % less than that of a cycle as long as a turn.

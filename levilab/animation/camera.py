@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
+    from analysis.arrays import Array
     from levilab.simulator.scene import Scene
 
-    Array = NDArray[np.float64]
 
 #: Radius of the rim, of the base, and of a dot on the stem; thickness of the top, and its height above the base [m].
 RIM, BASE, DOT, THICK, HEIGHT = 0.015, 0.046, 0.001, 0.008, 0.07

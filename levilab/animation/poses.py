@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.simulator.kernels.motion import ARM, TIME, N
 from levilab.simulator.model import has_attitude, with_attitude
 from levilab.simulator.single import simulate
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
 
     from levilab.simulator.scene import Drive, Scene
 
-Array = NDArray[np.float64]
 
 #: Error of the end of the span, of place [m] and axis [rad].
 TOLERANCE = 1e-7

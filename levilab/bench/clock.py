@@ -24,12 +24,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
-    from numpy.typing import NDArray
-
+    from analysis.arrays import Array
     from levilab.bench.config import InstrumentSettings
     from levilab.bench.wiring import Wiring
 
-    Array = NDArray[np.float64]
 
 #: The phase of a tone is followed in such pieces [s], which a sound card's clock turns by less than half a turn.
 _PIECE_S = 0.05

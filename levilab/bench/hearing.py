@@ -17,9 +17,9 @@ from instruments.links.sound import inputs
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+    from analysis.arrays import Array
     from instruments.drivers.oscilloscope.sound import SoundCard
 
-    Array = NDArray[np.float64]
 
 #: How long is listened [s], and in how many parts the level is compared.
 _LISTENS_S, _PARTS = 3.0, 6

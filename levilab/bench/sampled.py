@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError
 from analysis.pulses import spin_of_trace
 from instruments.drivers import Value
@@ -16,9 +16,6 @@ from instruments.drivers.counter import LIGHT, Count, Signal
 from instruments.drivers.oscilloscope import Oscilloscope
 from instruments.drivers.oscilloscope.sound import SamplesLost
 from instruments.links.transport import Transport
-
-Array = NDArray[np.float64]
-
 
 #: Points of a record for each second, if the oscilloscope is fast enough; 12 000 place a pulse of 1 ms well.
 _POINTS_PER_S = 12_000

@@ -11,15 +11,13 @@ import math
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import betaincinv, ndtr, stdtr
 from scipy.stats import poisson
 
+from analysis.arrays import Array
 from analysis.pulses.regression import student
 from levilab.crosscheck.study import FALSE_ALARM, Spread, Verdict
-
-Array = NDArray[np.float64]
 
 
 def ranks_of(spread: Spread) -> Array:

@@ -289,7 +289,6 @@ _UNIT_FORMS = tuple(
     )
 )
 
-
 _UNIT_WITHIN = re.compile(r"(?P<name>[^\[(]+?)\s*[\[(](?P<unit>[^\[\]()]+)[\])]\s.+")  # f [Hz] mean
 
 #: A title that is longer names nothing that is known here: the forms above look at each pair of its places.

@@ -27,8 +27,9 @@ from levilab.texts.text import Text
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Mapping
 
+    from analysis.arrays import Array
     from analysis.spindown.lawfit import LawFit
-    from levilab.live.envelope import Array, Groups
+    from levilab.live.envelope import Groups
 
 #: Points of a curve.
 _POINTS = 400

@@ -23,12 +23,11 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
 
+    from analysis.arrays import Array
     from levilab.motion.lines import NamedLine
     from levilab.motion.summary import Summary
 
-    Array = NDArray[np.float64]
 
 #: A curve of more points is drawn as the envelope of this number of pieces.
 PIECES = 700

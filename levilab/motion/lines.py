@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.lines import FEWEST, LOBE, amplitude_spectrum, lines_of_signals
 from levilab.motion.lock import keeps_phase
 from levilab.simulator.energy import spin_of
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 
 #: A line gets the name of a theoretical one within NEAR_HZ plus this share of its frequency: amplitudes of some tenths
 #: of a radian shift a line that far.

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.simulator.energy import core_spin
 from levilab.simulator.kernels.motion import ARM, TIME, N
 from levilab.simulator.numbers import copysign
@@ -21,7 +22,6 @@ from levilab.simulator.numbers import copysign
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
 
-Array = NDArray[np.float64]
 
 #: The part of the motion, at its end, in which the top must not slip; before, the drive may still catch it.
 LAST_SHARE = 0.5

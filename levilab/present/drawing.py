@@ -20,9 +20,10 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from numpy.typing import ArrayLike, NDArray
+    from numpy.typing import ArrayLike
 
-    Array = NDArray[np.float64]
+    from analysis.arrays import Array
+
 
 #: Half widths of the bands that a residual in units of its u is judged by, and how dark they are.
 SIGMAS = ((2.0, 0.07), (1.0, 0.10))

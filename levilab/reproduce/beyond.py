@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.precession.sweep import Sweep, fit_sweep
 from analysis.spindown.fit import fit_spin_down
 from analysis.stability import wobble_resonance
@@ -17,7 +18,7 @@ from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import enumeration, with_sign
 from levilab.reproduce.check import Because, Finding, Found, check, statement
 from levilab.reproduce.figure import counter_figure, window_figure
-from levilab.reproduce.tops import DURATION_S, MASS_KG, THESIS, Array, known, many, preset_at, simulate_for_lines
+from levilab.reproduce.tops import DURATION_S, MASS_KG, THESIS, known, many, preset_at, simulate_for_lines
 from levilab.simulator.equilibrium import modes_at, stability_of, windows_over
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate

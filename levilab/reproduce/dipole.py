@@ -6,11 +6,12 @@ from functools import partial
 
 import numpy as np
 
+from analysis.arrays import Array
 from levilab.present.document.blocks import Picture
 from levilab.present.numbers import with_sign
 from levilab.reproduce.check import Finding, Found, check, statement
 from levilab.reproduce.figure import dipole_figure
-from levilab.reproduce.tops import THESIS, Array
+from levilab.reproduce.tops import THESIS
 from levilab.simulator.disc import nodes_of, rule_for
 from levilab.simulator.equilibrium import axial_field, stability_of
 from levilab.simulator.field import flux_density

@@ -7,13 +7,14 @@ from functools import partial
 
 import numpy as np
 
+from analysis.arrays import Array
 from levilab.motion.lines import AxisLines, lines_of
 from levilab.motion.lock import is_locked
 from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import with_decimals
 from levilab.reproduce.check import Finding, Found, Within, check, statement
 from levilab.reproduce.figure import azimuth_figure, driven_figure
-from levilab.reproduce.tops import THESIS, Array, simulate_for_lines
+from levilab.reproduce.tops import THESIS, simulate_for_lines
 from levilab.simulator.scene import preset
 from levilab.simulator.trajectory import Trajectory
 

@@ -7,11 +7,12 @@ from collections.abc import Callable
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.field.ring import Ring
 from analysis.field.ring import on_axis as ring_on_axis
 from levilab.present.document.blocks import Note
 from levilab.reproduce.check import Finding, Found, erratum
-from levilab.reproduce.tops import ESTIMATE_KG, MASS_KG, THESIS, Array, estimate_hz, known, many, preset_at, scan
+from levilab.reproduce.tops import ESTIMATE_KG, MASS_KG, THESIS, estimate_hz, known, many, preset_at, scan
 from levilab.simulator.energy import magnetic_energy
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.field import field_of, flux_density, on_axis

@@ -27,11 +27,12 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
+    from analysis.arrays import Array
     from analysis.limits import Statistics
     from analysis.pull import Driven
     from analysis.spindown.fit import SpinDown
     from levilab.motion.lines import AxisLines
-    from levilab.reproduce.tops import Array, Flags
+    from levilab.reproduce.tops import Flags
     from levilab.simulator.equilibrium import MassWindows
     from levilab.simulator.trajectory import Trajectory
 

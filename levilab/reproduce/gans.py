@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from analysis.arrays import Array
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.check import Found, statement
 from levilab.reproduce.figure import gans_figure
-from levilab.reproduce.tops import Array, known, many
+from levilab.reproduce.tops import known, many
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.published.printed import published
 from levilab.simulator.scene import Scene, preset

@@ -7,10 +7,11 @@ from functools import partial
 
 import numpy as np
 
+from analysis.arrays import Array
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.check import Among, Because, Comparison, Finding, Found, Within, check, statement
 from levilab.reproduce.figure import limits_figure
-from levilab.reproduce.tops import DURATION_S, FALL_M, MASS_KG, THESIS, Array, Flags, known, many, preset_at, scan
+from levilab.reproduce.tops import DURATION_S, FALL_M, MASS_KG, THESIS, Flags, known, many, preset_at, scan
 from levilab.simulator.equilibrium import stability_of
 from levilab.stability.scan import all_up_until, last_up, lower_limit, upper_edges
 from levilab.stability.thesis import SIMULATED_HZ, STARTS

@@ -8,12 +8,13 @@ from functools import partial
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.stability import SymmetricTop, sleeping_limit, spin_windows
 from levilab.present.document.blocks import Note, Picture
 from levilab.present.numbers import with_sign
 from levilab.reproduce.check import Among, Because, Finding, Found, check, statement
 from levilab.reproduce.figure import simon_figure
-from levilab.reproduce.tops import Array, Flags, many, scan
+from levilab.reproduce.tops import Flags, many, scan
 from levilab.simulator.field import field_of, on_axis
 from levilab.simulator.published.printed import published
 from levilab.simulator.scene import Scene, preset

@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.numbers import digits
 from analysis.spindown.combine import mean
 from analysis.spindown.fit import SpinDown, fit_spin_down
@@ -20,7 +21,7 @@ from analysis.uncertainty import Estimate
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.check import Comparison, Finding, Found, Within, check, statement
 from levilab.reproduce.figure import spindown_figure
-from levilab.reproduce.tops import THESIS, Array, known
+from levilab.reproduce.tops import THESIS, known
 from levilab.simulator.published.printed import several
 from levilab.simulator.scene import preset
 

@@ -7,12 +7,13 @@ from functools import partial
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.limits import Sample, compare, summarize
 from levilab.present.document.blocks import Picture
 from levilab.present.numbers import with_sign
 from levilab.reproduce.check import Finding, Found, check, statement
 from levilab.reproduce.figure import statistics_figure
-from levilab.reproduce.tops import THESIS, Array, known
+from levilab.reproduce.tops import THESIS, known
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.published.printed import several
 from levilab.simulator.scene import preset

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.arrays import Array
 from analysis.stability import thesis_limit
 from levilab.motion.lines import rate_for
 from levilab.simulator.ensemble import Ensemble, simulate_many
@@ -20,7 +21,6 @@ from levilab.simulator.trajectory import Trajectory
 from levilab.stability.thesis import STARTS
 
 T = TypeVar("T")
-Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 THESIS = published("thesis")

@@ -13,12 +13,10 @@ from levilab.runs.traces import INDEX, is_arriving, load_traces
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from numpy.typing import NDArray
-
+    from analysis.arrays import Array
     from levilab.runs.run import Run
     from levilab.runs.traces import StoredTrace
 
-    Array = NDArray[np.float64]
 
 #: Interval at which the drivers ask an oscilloscope whether its record is complete [s].
 SEEN_LATE_S = 0.02

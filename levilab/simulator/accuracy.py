@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.simulator.field import flux_density
 from levilab.simulator.kernels import braking
 from levilab.simulator.kernels.motion import CLOCK, L, R
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
     from levilab.simulator.kernels.motion import Model
     from levilab.simulator.scene import Scene
     from levilab.simulator.schemes import Scheme
-
-Array = NDArray[np.float64]
 
 
 #: A drift turns the axis by so much at most [rad], for which the kernels' polynomials are made.

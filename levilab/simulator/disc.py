@@ -12,14 +12,13 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.simulator.numbers import ceil, hypot, largest, log, smallest, uniform
 
 if TYPE_CHECKING:
     from levilab.simulator.parts import Base, Top
 
-Array = NDArray[np.float64]
 
 #: Relative error of force and torque that the number of nodes is chosen for.
 TARGET = 1e-11

@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.arrays import Array
 from levilab.simulator.field import flux_density
 from levilab.simulator.kernels.loads import Aligned, Disc
 from levilab.simulator.kernels.motion import ARM, LOOSE, L, Model, N, R, V
-from levilab.simulator.model import Array, gravity
+from levilab.simulator.model import gravity
 from levilab.simulator.numbers import row
 
 if TYPE_CHECKING:

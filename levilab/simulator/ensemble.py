@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.arrays import Array
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator.accuracy import NODES_ORDER, comes_near_zero, estimate, has_kink, rounding_error
 from levilab.simulator.energy import both_spins, core_spin
@@ -27,8 +28,6 @@ from levilab.simulator.scene import Scene
 from levilab.simulator.single import MIN_STEPS_FOR_DOUBLING, check, simulate, simulate_at_step
 from levilab.simulator.stops import MOST_KINKS, MOST_STEPS
 from levilab.simulator.varied import Batch, batches, broadcast, scene_at
-
-Array = NDArray[np.float64]
 
 #: The step of all tops is chosen on a few, simulated one by one: the corners of a map and so many evenly through it.
 PILOTS = 6

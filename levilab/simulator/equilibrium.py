@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis import stability
+from analysis.arrays import Array
 from levilab.simulator.disc import nodes_of, rule_for
 from levilab.simulator.field import flux_density, flux_gradient, on_axis
 from levilab.simulator.keys import SceneError
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
     from levilab.simulator.scene import Scene
 
-Array = NDArray[np.float64]
 
 #: Heights in which a top is looked for: from a tenth of the inner radius to four outer radii above the base.
 _LOW, _HIGH = 0.1, 4.0

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from analysis.arrays import Array
 from levilab.simulator.kernels.motion import TIME, R, V
 from levilab.simulator.trajectory import Event
 
-Array = NDArray[np.float64]
 #: Radius and height of the escape [m]: the same for all tops, or shape (n,) each.
 Limits = tuple[Any, Any]
 

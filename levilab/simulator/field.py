@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from analysis.arrays import Array
 from levilab.errors import LevilabError
 from levilab.simulator.kernels.fields import Field, evaluate
 from levilab.simulator.kernels.paraxial import Paraxial, Paraxial2, ParaxialThick, weights
 from levilab.simulator.kernels.ring import Sheet, Thick
 from levilab.simulator.numbers import Numbers, numbers_of, row, template_of, uniform
-
-Array = NDArray[np.float64]
 
 #: Highest power of the series.  Beyond, its terms grow again at r ~ 2 cm, and the exact field costs less.
 HIGHEST = 20

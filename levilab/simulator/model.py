@@ -5,9 +5,6 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from levilab.simulator.disc import distance_to, nodes_of, rule_for
 from levilab.simulator.field import field_of
 from levilab.simulator.kernels import braking
@@ -17,8 +14,6 @@ from levilab.simulator.numbers import cos, hypot, largest, sin
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
-
-Array = NDArray[np.float64]
 
 
 def model_of(scene: Scene, place: Any = None, more_nodes: int = 0) -> Model:

@@ -11,14 +11,12 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.simulator.accuracy import SAFETY_FACTOR
 from levilab.simulator.kernels.motion import TIME, N, R
 from levilab.simulator.problem import Problem, Stretch
 from levilab.simulator.stops import Stops
-
-Array = NDArray[np.float64]
 
 #: A pilot run lasts a tenth of the motion, and a second at least: two thirds of a turn of the slow sideways swing and
 #: seven of the precession.  In less the part of an error that swings outweighs the one that grows.

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.errors import LeftRange, SimulationError
 from levilab.simulator.energy import spin_of
 from levilab.simulator.escape import locate_escape
@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Event
 
-Array = NDArray[np.float64]
 
 #: Radius and height of no escape [m]: for coarse runs, which a fine one is compared with.
 NO_LIMITS = (math.inf, -math.inf)

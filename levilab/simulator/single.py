@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.errors import SimulationError
 from levilab.simulator.accuracy import (
     NODES_ORDER,
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.simulator.stops import Stops
 
-Array = NDArray[np.float64]
 
 #: No step is small enough for a chaotic motion: at this part of the longest step the search ends.
 SMALLEST_STEP_SHARE = 1 / 256

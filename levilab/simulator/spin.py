@@ -17,12 +17,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from analysis.arrays import Array
 from levilab.simulator.laws import LAWS
 from levilab.simulator.numbers import sqrt
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from analysis.arrays import Array
 from levilab.simulator.equilibrium import floating_height
 from levilab.simulator.field import flux_density
 from levilab.simulator.kernels.motion import L, N, R
-from levilab.simulator.model import Array, base_field
+from levilab.simulator.model import base_field
 from levilab.simulator.numbers import copysign, cos, row, sin, sqrt
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.errors import SimulationError
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
 
     from levilab.simulator.scene import Drive
 
-Array = NDArray[np.float64]
 
 #: No times at all: the kinks of a drive that has none.
 NO_TIMES: Array = np.empty(0)

@@ -7,16 +7,14 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.simulator.energy import energy, spin_of
 from levilab.simulator.kernels.motion import LOOSE, TIME, L, N, R, V
 
 if TYPE_CHECKING:
     from levilab.simulator.kernels.motion import Model
     from levilab.simulator.scene import Scene
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

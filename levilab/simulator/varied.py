@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, TypeAdapter, ValidationError
 
+from analysis.arrays import Array
 from levilab.errors import LevilabError, SimulationError
 from levilab.settings import in_one_line
 from levilab.simulator.accuracy import longest_step
@@ -32,7 +33,6 @@ from levilab.simulator.scene import RULES, Scene
 from levilab.simulator.schemes import Scheme
 from levilab.simulator.start import start_of
 
-Array = NDArray[np.float64]
 #: Keys with their values, broadcast to one shape.
 Values = dict[str, NDArray[Any]]
 

@@ -11,7 +11,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
+
 Flags = NDArray[np.bool_]
 
 

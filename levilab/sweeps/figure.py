@@ -37,12 +37,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+    from analysis.arrays import Array
     from analysis.stability import Window
     from levilab.simulator.scene import Scene
     from levilab.sweeps.plan import Axis, Plan
     from levilab.sweeps.store import Map
 
-    Array = NDArray[np.float64]
 
 SPIN, MASS, HEIGHT, DRIVE = "start.spin_hz", "top.mass_kg", "start.position_m.2", "drive.frequency_hz"
 #: Numbers, from few to many, darker to lighter all the way; blue stays for the tops that are up.

@@ -25,12 +25,13 @@ from levilab.world.spin_world import SpinScene, SpinWorld
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
+    from analysis.arrays import Array
     from instruments.clock import Clock
     from instruments.virtual.counter.edges import Thresholds
     from levilab.bench.person import Task
     from levilab.simulator.scene import Scene
     from levilab.world.motion_world import MotionWorld
-    from levilab.world.spin_world import Array, World
+    from levilab.world.spin_world import World
 
 
 def virtual_settings(kind: str, name: str) -> InstrumentSettings:

@@ -11,13 +11,11 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from instruments.virtual.counter.edges import Thresholds
 from instruments.virtual.generator.channel import Output
 from instruments.virtual.generator.voltage import fundamental
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

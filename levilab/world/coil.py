@@ -7,14 +7,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from instruments.virtual.generator.channel import Output
 from instruments.virtual.generator.voltage import voltage
 from levilab.world.bursts import burst_starts, gated_trains
 from levilab.world.timeline import Timeline
 
-Array = NDArray[np.float64]
 Edges = Callable[[float, float, bool], Array]
 #: A top that floats passes its tape in less: the edges before show whether a pulse is under way [s].
 _PULSE_S = 0.2

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.errors import LeftRange
 from levilab.simulator.kernels.motion import ARM, TIME, L, N, R, V
 from levilab.simulator.keys import SceneError
@@ -24,7 +25,6 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.simulator.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 #: The motion is simulated in pieces of this length [s], to this error of place [m] and axis [rad] at the end of each,

@@ -12,13 +12,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.simulator.parts import Top
 
 if TYPE_CHECKING:
     from levilab.simulator import parts
     from levilab.world import base
 
-Array = NDArray[np.float64]
 
 #: μ₀/4π [T m/A].
 _MU_0_OVER_4_PI = 1e-7

@@ -12,8 +12,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
     from levilab.telemetry.messages import Poses
 
-Array = NDArray[np.float64]
 
 #: Where the magnetometer's probe stands at first: about where a top floats [m above the base].
 PROBE_M = 0.072

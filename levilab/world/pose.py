@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.telemetry.messages import Poses
-
-Array = NDArray[np.float64]
 
 #: Where a top that only spins floats [m above the base].
 FLOATS_M = 0.072

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.laws import LAWS
 from levilab.simulator.parts import Top
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from instruments.virtual.generator.channel import Output
     from levilab.telemetry.messages import Poses
 
-Array = NDArray[np.float64]
 
 #: Step in which a top that triggers its drive is computed [s]; its pull and drag change in it by a per cent.
 BURST_STEP_S = 0.5

@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from typing import Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+
+from analysis.arrays import Array
 
 T = TypeVar("T")
 
-Array = NDArray[np.float64]
 
 #: Number of items that are dropped at once, because the items behind them in the list have to be moved.
 _AT_ONCE = 1000

@@ -6,14 +6,13 @@ import math
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.simulator.kernels.motion import N, R, V
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
 
-Array = NDArray[np.float64]
 
 #: A top of the usual shape lies on the rim of its magnet and the end of its stem: its axis is this far from upright
 #: [rad], and the centre of mass so high above the ground, in radii of the magnet.

@@ -10,7 +10,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 
-from analysis.limits import FEWEST_ON_PARABOLA, Array, spin_at_fall, spin_at_loss
+from analysis.arrays import Array
+from analysis.limits import FEWEST_ON_PARABOLA, spin_at_fall, spin_at_loss
 from analysis.locked import Cause, cause_of_loss, lag_before_loss, slip_of
 from levilab.acquisition.counting import AnotherTop, Missed, free_top, prepare_counter, spin_now
 from levilab.acquisition.driving import (

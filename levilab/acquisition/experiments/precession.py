@@ -28,15 +28,13 @@ from levilab.texts.text import Text
 if TYPE_CHECKING:
     from typing import Self
 
-    from numpy.typing import NDArray
-
+    from analysis.arrays import Array
     from instruments.drivers.generator import Limits as DriveLimits
     from levilab.acquisition.experiment import ModelOf
     from levilab.acquisition.session import Row, Session
     from levilab.bench.config import BenchConfig, Limits
     from levilab.simulator.scene import Scene
 
-    Array = NDArray[np.float64]
 
 #: Points of a sweep, at most.
 _MOST_POINTS = 1000

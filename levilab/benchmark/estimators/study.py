@@ -10,8 +10,8 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError
 from analysis.pulses import spin_of_times, spin_of_trace
 from analysis.pulses.synthetic import DURATION, HARD, RATE, Case, Trace, bound, make
@@ -19,8 +19,6 @@ from analysis.pulses.trace import Choice
 from levilab.benchmark.found import describe_measurement
 from levilab.errors import UsageError
 from levilab.files import finite
-
-Array = NDArray[np.float64]
 
 #: Range of the frequency, which the other methods are given [Hz].
 LOW, HIGH = 20.0, 45.0

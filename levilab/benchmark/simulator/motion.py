@@ -16,9 +16,8 @@ import levilab.simulator.kernels  # noqa: F401 - first, since its error says wha
 # isort: split
 import numba
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from analysis.arrays import Array
 
 M, A2, B2, K = 0.02526, 0.030**2, 0.055**2, 2 * math.pi * 1.40e-3
 G, I1, I3, MU = 9.82, 1.04e-6, 1.731314e-6, -0.714

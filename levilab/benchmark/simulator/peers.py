@@ -11,12 +11,11 @@ from importlib.util import find_spec
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.benchmark.simulator import motion
 from levilab.benchmark.simulator.taylor import heyoka_batch, heyoka_integrator
 
-Array = NDArray[np.float64]
 Result = TypeVar("Result")
 
 #: The true place at the end of the undriven motion [m].

@@ -16,13 +16,11 @@ from levilab.crosscheck.subject import Trial, TrialFailed, pull_of
 from levilab.texts.text import Text
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from analysis.arrays import Array
     from analysis.pulses import SpinFrequency
     from analysis.rotation import FieldSpin
     from levilab.pipelines.spin.analysis import SpinAnalysis
 
-    Array = NDArray[np.float64]
 
 #: Processor time of a trial and of a sample of it [s].
 _COST_S, _COST_OF_SAMPLE_S = 0.004, 8e-8

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from analysis.arrays import Array
 from instruments.clock import VirtualClock
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import settings_of, with_settings
@@ -19,7 +20,7 @@ from levilab.runs.waveforms import run_waveforms
 from levilab.simulator.laws import LAWS
 from levilab.world.bench import virtual_wiring
 from levilab.world.light import Tape
-from levilab.world.spin_world import Array, SpinScene, SpinWorld
+from levilab.world.spin_world import SpinScene, SpinWorld
 
 #: The chirp's truth is a difference over twice this [s].
 _APART_S = 0.05

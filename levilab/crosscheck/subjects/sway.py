@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.crosscheck.priors import PRIORS, drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.formats.device import read_device
@@ -15,9 +15,6 @@ from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import Scene, preset
 from levilab.simulator.single import simulate
 from levilab.simulator.trajectory import Trajectory
-
-Array = NDArray[np.float64]
-
 
 #: Frames per second, and length of the film [s].
 RATE, DURATION_S = 120.0, 110.0

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from levilab.animation.camera import Array, Flight
+    from analysis.arrays import Array
+    from levilab.animation.camera import Flight
     from levilab.pipelines.video.analysis import Video
 
 #: Height of the dot on the stem above the rim, and of the rim above the base [m].

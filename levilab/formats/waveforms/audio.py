@@ -13,17 +13,14 @@ from pathlib import Path
 from typing import IO
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.formats.columns import NoTable, TableError, shorten
 from levilab.formats.film import NoFilm, open_film
 from levilab.formats.kinds import AUDIO
 from levilab.formats.waveforms.wav import signals_of
 from levilab.formats.waveforms.waveform import BLOCK, Waveform, check_count
 from levilab.software import how_to_install
-
-Array = NDArray[np.float64]
-
 
 #: What a file may be, in FFmpeg's names: no list of other files, no address, no script.
 _FORMATS = "mov,mp4,m4a,3gp,3g2,mj2,mp3,ogg,flac,aac,amr,aiff,caf,matroska,webm,asf,avi"

@@ -10,13 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.waveform import BLOCK, PulseTimes, Signal, Waveform, check_count, check_step
 from levilab.texts.note import of_file
-
-Array = NDArray[np.float64]
-
 
 #: An array with more columns than this lies on its side.
 MOST_CHANNELS = 64

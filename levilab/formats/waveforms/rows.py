@@ -9,16 +9,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.numbers import how_many
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.dialect import MISSING, Dialect
 from levilab.formats.layout import EXPORT, HEAD, encoding_of, lines_of, refuse_other_kinds
 from levilab.formats.waveforms.waveform import HIGHEST
-
-Array = NDArray[np.float64]
-
 
 #: Characters of a piece: small beside memory, large beside the cost of a call of pandas.
 PIECE = 1 << 20

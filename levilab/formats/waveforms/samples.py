@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.numbers import digits
 from levilab.formats.columns import TableError, quote_names, shorten
 from levilab.formats.dialect import Dialect
@@ -25,9 +25,6 @@ from levilab.formats.waveforms.waveform import (
 )
 from levilab.texts.note import of_file
 from levilab.texts.text import Text
-
-Array = NDArray[np.float64]
-
 
 #: Scopes keep times in single precision before they print them: relative rounding, 2⁻²⁴ twice.
 SINGLE = 1.2e-7

@@ -9,15 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.waveform import Signal, Waveform, check_count, check_step
 from levilab.software import how_to_install
 from levilab.texts.note import of_file
-
-Array = NDArray[np.float64]
-
 
 #: How the names of such files end.
 SUFFIXES = frozenset({".wfm", ".bin", ".isf", ".trc", ".wvf"})

@@ -15,13 +15,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.waveform import BLOCK, Signal, Waveform, check_count, check_step
-
-Array = NDArray[np.float64]
-
 
 #: Name of the files that each capture has, and how large the second may be [bytes].
 _MEMBERS, _LARGEST_METADATA = {"version", "metadata"}, 1 << 20

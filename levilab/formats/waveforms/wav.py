@@ -11,11 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.waveforms.waveform import BLOCK, Signal, Waveform, check_count
-
-Array = NDArray[np.float64]
-
 
 #: Samples of integers → (value of silence, full scale).
 _SCALES = {"u1": (128.0, 128.0), "i2": (0.0, 32768.0), "i4": (0.0, 2147483648.0)}

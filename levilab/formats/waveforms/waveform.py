@@ -8,14 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.errors import UsageError
 from levilab.formats.columns import TableError, quote_names, shorten
 from levilab.texts.note import of_file
-
-Array = NDArray[np.float64]
-
 
 #: Samples that a block holds at most, where the format leaves the choice.
 BLOCK = 1 << 17

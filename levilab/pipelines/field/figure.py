@@ -20,11 +20,10 @@ from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
 
+    from analysis.arrays import Array
     from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun
 
-    Array = NDArray[np.float64]
 
 #: A scan each as long as there are so few: colour and marker.
 COLOURS, _MARKERS = (BLUE, VERMILION, PURPLE, SKY), "o^vD"

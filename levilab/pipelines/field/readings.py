@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.field.errors import TooFewHeights
 from analysis.field.fit import FEWEST_HEIGHTS, SAME_HEIGHT_M
 from analysis.numbers import digits
@@ -19,9 +19,6 @@ from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import Readings
 from levilab.runs.run import Run
 from levilab.texts.note import of_file
-
-Array = NDArray[np.float64]
-
 
 #: A stand is no higher [m], and no probe measures more [T]: beyond, the unit is another one.
 _HIGHEST_M, _STRONGEST_T = 2.0, 35.0

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST
@@ -18,8 +18,6 @@ from levilab.present.numbers import how_many
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run
 from levilab.texts.text import Text
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,11 +21,10 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from matplotlib.axes import Axes
-    from numpy.typing import NDArray
 
+    from analysis.arrays import Array
     from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
 
-    Array = NDArray[np.float64]
 
 #: Of runs: colours that theory does not have.
 _COLOURS = (BLACK, GREEN, SKY, ORANGE, YELLOW, GREY)

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError
 from analysis.limits import U_OF_WAY, spin_at_fall
 from analysis.rotation import track_of_field
@@ -25,9 +25,6 @@ from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run
 from levilab.texts.note import of_file
-
-Array = NDArray[np.float64]
-
 
 #: Columns that an analysis of limits looks at.
 QUANTITIES = ("spin_frequency_hz", "spin_frequency_u_hz")

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+    from analysis.arrays import Array
     from analysis.precession.sweep import SweepFit
     from levilab.pipelines.precession.analysis import PrecessionAnalysis
 
-    Array = NDArray[np.float64]
 
 #: More points have no bars.
 MOST_BARS = 200

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.numbers import digits
 from analysis.precession.gates import Gates, Rate, rates_at_point, shared_scatter
 from levilab.formats.columns import TableError
@@ -20,9 +20,6 @@ from levilab.present.numbers import how_many, pulses_too_many
 from levilab.runs.gates import gates_of
 from levilab.runs.run import Run
 from levilab.texts.note import of_file
-
-Array = NDArray[np.float64]
-
 
 #: Columns that an analysis of sweeps looks at.
 QUANTITIES = (

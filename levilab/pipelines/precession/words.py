@@ -181,7 +181,6 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(
     }
 )
 
-
 #: Of `analysis.precession.sweep.SweepFit`.
 QUANTITIES = (
     Quantity("slope", "1", "slope of precession against drive", of=slope_of),

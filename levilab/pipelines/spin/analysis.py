@@ -9,8 +9,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.budget import rest
 from analysis.errors import AnalysisError
 from analysis.pulses import (
@@ -104,8 +104,6 @@ SPIN_ROW = (
            lambda part: " ".join(note["name"] for note in part["result"]["notes"])),
 )  # fmt: skip
 
-
-Array = NDArray[np.float64]
 
 #: A longer record is cut into windows [s]: a top that coasts loses 3 % of its spin meanwhile, and a parabola of the
 #: phase still holds.

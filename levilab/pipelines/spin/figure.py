@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+    from analysis.arrays import Array
     from analysis.pulses import SpinFrequency
     from analysis.rotation import FieldSpin, LineSamples
     from levilab.formats.waveforms.waveform import Waveform
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
     from levilab.pipelines.spin.analysis import SpinAnalysis, SpinRun
     from levilab.pipelines.spin.readings import Records
 
-    Array = NDArray[np.float64]
 
 #: Points of a panel.
 MOST_POINTS = 4000

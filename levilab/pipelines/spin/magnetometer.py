@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.pulses import Finding, SpinFrequency
 from analysis.uncertainty import Estimate
 from levilab.formats.columns import TableError
@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from analysis.rotation import FieldSpin, FieldTrack
     from levilab.pipelines.options import InputOptions
 
-Array = NDArray[np.float64]
 
 #: Columns of a record; a Bz beside a Bx is a component.
 QUANTITIES = ("time_s", *COMPONENTS, "flux_density_t", MAGNITUDE)

@@ -41,9 +41,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from numpy.typing import NDArray
 
+    from analysis.arrays import Array
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 
-    Array = NDArray[np.float64]
 
 #: More points than a panel can show are thinned out evenly; up to so many have bars each; so many means of more.
 MOST_POINTS, MOST_BARS, MEANS = 600, 200, 40

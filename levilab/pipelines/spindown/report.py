@@ -58,8 +58,7 @@ from levilab.texts.text import Sentences, Text, text_from
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from analysis.arrays import Array
     from analysis.spindown.combine import CombinedLaw, Mean
     from analysis.spindown.fit import SpinDown
     from analysis.spindown.lawfit import LawFit
@@ -69,8 +68,6 @@ if TYPE_CHECKING:
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
     from levilab.pipelines.spindown.readings import SpinReadings
     from levilab.present.document.blocks import Block
-
-    Array = NDArray[np.float64]
 
 
 #: Laws of one power, and the power, in its order.

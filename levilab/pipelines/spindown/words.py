@@ -25,8 +25,7 @@ from levilab.texts.text import Sentences, Text
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
+    from analysis.arrays import Array
     from analysis.remarks import Remark
     from analysis.spindown.combine import Combined, CombinedLaw
     from analysis.spindown.drag import DragLaw
@@ -34,8 +33,6 @@ if TYPE_CHECKING:
     from analysis.spindown.lawfit import LawFit
     from analysis.spindown.verdict import Verdict
     from analysis.uncertainty import Estimate
-
-    Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -79,7 +76,6 @@ SYMBOLS = MappingProxyType(
     | {name: symbol for law in LAWS.values() for name, symbol in zip(law.constants, law.symbols, strict=True)}
     | {"moment_tilt": "δ", "resonance": "ν_r", "wobble": "K"}
 )
-
 
 #: Of `analysis.spindown.fit.SpinDown`, each with a column in the tables of runs; the constants of laws are in
 #: `analysis.spindown.drag.LAWS`.

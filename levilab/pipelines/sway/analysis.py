@@ -47,7 +47,6 @@ SWAY_ROW = (
     entry("text", "text", "what the swings say", "result.text"),
 )
 
-
 #: A split of fewer standard uncertainties excludes nothing; a ratio that is more of them from 1 disagrees.
 _ENOUGH = 3.0
 #: A tilt of the precession that adds more to the split is most likely a mark far from the centre of mass.

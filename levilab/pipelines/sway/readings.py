@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.sway import Sensor, image, slow_part, without_image
 from levilab.errors import DataError
 from levilab.formats.columns import NoSuchColumn, TableError
@@ -24,9 +24,6 @@ from levilab.pipelines.spin.magnetometer import FieldRecord
 from levilab.pipelines.spindown.readings import field_readings
 from levilab.runs.run import STATES, Run
 from levilab.texts.text import Text
-
-Array = NDArray[np.float64]
-
 
 #: Columns of a table that are looked at, and those without which it is no track.
 QUANTITIES = ("time_s", "x_m", "y_m", "height_m", "spin_frequency_hz")

@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError
 from analysis.film.circles import Circle
 from analysis.film.errors import NoMark, SlowMotion
@@ -55,7 +56,6 @@ QUANTITIES = (
 VIDEO_ROW = tuple(columns_of(QUANTITIES))
 
 
-Array = NDArray[np.float64]
 #: First bytes by which the same film is found again.
 _HEAD = 4096
 #: Steps of the time that differ by less are even [ms].

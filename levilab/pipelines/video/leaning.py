@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.film.swing import Swing, swing_of
 from analysis.film.turning import windows_of
 from analysis.uncertainty import Estimate
-
-Array = NDArray[np.float64]
 
 #: Where the precession and the vertical swing are looked for [Hz].
 PRECESSION_HZ, VERTICAL_HZ = (3.0, 20.0), (0.5, 3.0)

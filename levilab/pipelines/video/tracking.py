@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.film.circles import Circle, coarse, find_base, find_top
 from analysis.film.dot import find_dot
 from analysis.film.errors import CameraMoved, HandInView
@@ -18,9 +19,6 @@ from analysis.film.view import compare_views
 from levilab.errors import DataError
 from levilab.formats.film import Film, Picture, pictures
 from levilab.texts.text import Text
-
-Array = NDArray[np.float64]
-
 
 #: The top is looked for in the beginning of the film, in pictures at least so far apart [s].
 _FIRST_S, _APART_S = 0.6, 1 / 90

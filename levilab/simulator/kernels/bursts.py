@@ -14,12 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.simulator.kernels.compiled import aside, kernel, part
 from levilab.simulator.kernels.motion import Model, State, drift, kick, own_turn
 from levilab.simulator.kernels.splitting import load_state, renormalize, store_state
 from levilab.simulator.kernels.vectors import Vector, cross, dot, plus
-
-Array = NDArray[np.float64]
 
 
 class Trigger(NamedTuple):

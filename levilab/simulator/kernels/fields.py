@@ -11,8 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.simulator.kernels.columns import LANES, of_lane
 from levilab.simulator.kernels.compiled import by_type, kernel
 from levilab.simulator.kernels.paraxial import (
@@ -25,7 +25,6 @@ from levilab.simulator.kernels.paraxial import (
 )
 from levilab.simulator.kernels.ring import Sheet, Thick, of_sheet, of_thick_ring
 
-Array = NDArray[np.float64]
 Field = Paraxial2 | Paraxial | ParaxialThick | Sheet | Thick
 
 #: p, q, bz, s, g of a field at a height [m] and r² [m²]: (field, z, r2).

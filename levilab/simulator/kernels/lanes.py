@@ -7,14 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.simulator.kernels.columns import LANES, of_lane
 from levilab.simulator.kernels.compiled import aside, kernel, part, wide_registers
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, Model, drift, kick
 from levilab.simulator.kernels.pieces import HEIGHT, NEVER, RADIUS, next_piece
 from levilab.simulator.kernels.splitting import load_state, renormalize, store_state
 from levilab.simulator.kernels.vectors import plus
-
-Array = NDArray[np.float64]
 
 
 class Lanes(NamedTuple):

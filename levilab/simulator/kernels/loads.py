@@ -8,16 +8,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from analysis.arrays import Array
 from levilab.simulator.kernels.compiled import by_type, part
 from levilab.simulator.kernels.fields import field_functions
 from levilab.simulator.kernels.paraxial import Paraxial, Paraxial2, ParaxialThick
 from levilab.simulator.kernels.ring import Sheet, Thick
 from levilab.simulator.kernels.vectors import Vector, cross, plus, sine_of_turns
-
-Array = NDArray[np.float64]
 
 # --- the drive ---
 

@@ -11,10 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.simulator.kernels.compiled import aside, kernel, part
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, Model, State, drift, kick
-
-Array = NDArray[np.float64]
 
 
 class RunStops(NamedTuple):
