@@ -7,8 +7,9 @@ and the sweep goes on.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self, TypeVar
+from typing import Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat
@@ -16,23 +17,16 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat
 from analysis.locked import Slip, slip_of
 from instruments.errors import InstrumentError, OutOfRange
 from levilab.acquisition.counting import prepare_counter_again, spin_now
-from levilab.acquisition.experiment import CounterSettings
+from levilab.acquisition.experiment import CounterSettings, ModelOf
 from levilab.acquisition.grip import COUNTS, GRIP_GATE_S, Grip
-from levilab.acquisition.session import DidNotFollow, NoLight, NotHeld
+from levilab.acquisition.session import DidNotFollow, NoLight, NotHeld, Session
 from levilab.acquisition.triggering import CYCLE, Motor, spin_up
-from levilab.bench.config import ConfigError
+from levilab.bench.config import BenchConfig, ConfigError, Limits
 from levilab.bench.person import FloatTop
 from levilab.present.numbers import with_sign
 from levilab.present.panel import clock
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
-
-    from levilab.acquisition.experiment import ModelOf
-    from levilab.acquisition.session import Session
-    from levilab.bench.config import BenchConfig, Limits
 
 #: The drive goes up in steps; each makes a held top swing a little about it [s].
 RAMP_STEP_S = 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
@@ -13,15 +14,13 @@ from levilab.settings import Settings
 from levilab.texts.text import Text
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from instruments.catalogue import Model
     from levilab.acquisition.session import Session
     from levilab.bench.config import BenchConfig, Limits
     from levilab.simulator.scene import Scene
 
-    #: From a kind of instrument to the row of its model; None where the bench has none.
-    ModelOf = Callable[[str], Model[Any] | None]
+#: From a kind of instrument to the row of its model; None where the bench has none.
+ModelOf = Callable[[str], "Model[Any] | None"]
 
 
 class ExperimentSettings(Settings):

@@ -5,12 +5,14 @@ Nothing heavy is imported here, and of the experiments that one alone: a wrong s
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pydantic import ValidationError
 
 from levilab.acquisition import experiments
+from levilab.acquisition.experiment import ExperimentSettings
 from levilab.bench.config import Limits
 from levilab.errors import UsageError
 from levilab.formats.typed import read_masses, read_temperature
@@ -18,11 +20,6 @@ from levilab.present.units import split
 from levilab.settings import hint_about, own_words
 from levilab.simulator.keys import SceneError, parse_setting
 from levilab.texts.text import Sentences, Text, text_of
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from levilab.acquisition.experiment import ExperimentSettings
 
 _TYPES = {"number": "a number", "integer": "a whole number", "string": "a text", "boolean": "true or false"}
 #: Lists as they are typed, by the type of what stands in them.

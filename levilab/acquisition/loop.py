@@ -8,38 +8,31 @@ from __future__ import annotations
 import contextlib
 import math
 import sys
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from threading import Event
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from instruments.errors import InstrumentError
-from levilab.acquisition.onlooker import publishing
+from levilab.acquisition.onlooker import Watch, publishing
 from levilab.acquisition.session import Earlier, Session
 from levilab.acquisition.table import EXPERIMENTS, settings_of
 from levilab.bench.bench import OutputMayBeOn, open_bench
+from levilab.bench.config import BenchConfig
 from levilab.bench.kinds import GENERATOR, estimates_u
+from levilab.bench.wiring import Wiring
 from levilab.computer import utc_now
 from levilab.errors import LevilabError
 from levilab.files import CannotWrite
-from levilab.interruption import Interrupted, watching_for_interruption
+from levilab.interruption import Interrupted, Stop, watching_for_interruption
+from levilab.present.progress import Display
+from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
-from levilab.runs.run import Run, RunRecord
+from levilab.runs.run import Run, RunRecord, Status
 from levilab.runs.writer import RunWriter
 from levilab.software import software_versions
 from levilab.texts.text import Text, text_of
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-
-    from levilab.acquisition.onlooker import Watch
-    from levilab.bench.config import BenchConfig
-    from levilab.bench.wiring import Wiring
-    from levilab.interruption import Stop
-    from levilab.present.progress import Display
-    from levilab.runs.channel import Channel
-    from levilab.runs.run import Status
-
 
 #: What is said where an acquisition ends before it could see that the drive is off.
 _NOT_SEEN_OFF = Text(

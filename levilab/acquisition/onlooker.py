@@ -8,26 +8,20 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from levilab.telemetry.messages import MOST_POINTS, POSES_PER_S, Counting, Drive, Record, State
+from instruments.drivers.oscilloscope import Trace
+from levilab.acquisition.session import Session
+from levilab.bench.bench import Bench
+from levilab.bench.wiring import Wiring
+from levilab.telemetry.messages import MOST_POINTS, POSES_PER_S, Counting, Drive, Poses, Record, State
 from levilab.telemetry.publisher import Publisher
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import NDArray
-
-    from instruments.drivers.oscilloscope import Trace
-    from levilab.acquisition.session import Session
-    from levilab.bench.bench import Bench
-    from levilab.bench.wiring import Wiring
-    from levilab.telemetry.messages import Poses
 
 #: Interval at which a record is sent again [s].
 _AGAIN_EVERY_S = 1.0

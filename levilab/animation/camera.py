@@ -7,25 +7,20 @@ one beside.  Errors of lenses are not modelled.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from levilab.animation.poses import matrices, poses_of
 from levilab.formats.film import check_reader
+from levilab.simulator.scene import Scene
 from levilab.simulator.single import simulate
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-    from analysis.arrays import Array
-    from levilab.simulator.scene import Scene
-
 
 #: Radius of the rim, of the base, and of a dot on the stem; thickness of the top, and its height above the base [m].
 RIM, BASE, DOT, THICK, HEIGHT = 0.015, 0.046, 0.001, 0.008, 0.07

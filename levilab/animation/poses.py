@@ -11,23 +11,18 @@ frames along the axis' path.  How far both motions agree is the simulator's own 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.arrays import Array
 from levilab.simulator.kernels.motion import ARM, TIME, N
 from levilab.simulator.model import has_attitude, with_attitude
+from levilab.simulator.scene import Drive, Scene
 from levilab.simulator.single import simulate
 from levilab.simulator.trajectory import Trajectory
 from levilab.world.pose import quaternions
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from levilab.simulator.scene import Drive, Scene
-
 
 #: Error of the end of the span, of place [m] and axis [rad].
 TOLERANCE = 1e-7

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from levilab.animation.film import Film, as_gif, as_mp4, check_encoder
 from levilab.animation.page import (
@@ -19,17 +21,12 @@ from levilab.animation.poses import poses_of, turn_rate
 from levilab.animation.words import span_text, speed_text
 from levilab.errors import UsageError
 from levilab.files import check_writable, replace_atomically, writing
+from levilab.motion.summary import Summary
 from levilab.simulator.compilation import announce_compilation
+from levilab.simulator.scene import Scene
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from contextlib import AbstractContextManager
-    from pathlib import Path
+Progress = Callable[[float], None]
 
-    from levilab.motion.summary import Summary
-    from levilab.simulator.scene import Scene
-
-    Progress = Callable[[float], None]
 
 #: Speeds that a film may have, as parts of the real one.
 _SLOWEST, _FASTEST = 1e-4, 10.0

@@ -3,33 +3,27 @@
 from __future__ import annotations
 
 import contextlib
-from typing import TYPE_CHECKING, Any, TypeVar
+from collections.abc import Callable, Collection, Iterator
+from typing import Any, TypeVar
 
 import numpy as np
 
 from analysis.errors import TooFewReadings
 from analysis.rotation import FieldSpin, spin_of_field
 from analysis.rotation.errors import NoLine
-from instruments.drivers import Instrument
-from instruments.drivers.counter.phyphox import FieldLine, Phyphox
+from instruments.drivers import Instrument, Value
+from instruments.drivers.counter import Counter
+from instruments.drivers.counter.phyphox import Array, FieldLine, Phyphox
+from instruments.drivers.generator import Generator
+from instruments.drivers.magnetometer import Magnetometer
+from instruments.drivers.oscilloscope import Oscilloscope
 from instruments.drivers.oscilloscope.sound import SoundCard
 from instruments.errors import InstrumentError, SettingsLost
+from instruments.links.transport import TrafficLog
 from levilab.bench.config import ConfigError
-from levilab.bench.kinds import COUNTER, GENERATOR, MAGNETOMETER, OSCILLOSCOPE, transport_to
+from levilab.bench.kinds import COUNTER, GENERATOR, MAGNETOMETER, OSCILLOSCOPE, Kind, transport_to
 from levilab.bench.sampled import SampledCounter
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Collection, Iterator
-
-    from instruments.drivers import Value
-    from instruments.drivers.counter import Counter
-    from instruments.drivers.counter.phyphox import Array
-    from instruments.drivers.generator import Generator
-    from instruments.drivers.magnetometer import Magnetometer
-    from instruments.drivers.oscilloscope import Oscilloscope
-    from instruments.links.transport import TrafficLog
-    from levilab.bench.kinds import Kind
-    from levilab.bench.wiring import Wiring
+from levilab.bench.wiring import Wiring
 
 I = TypeVar("I", bound=Instrument)  # noqa: E741 - an instrument
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from instruments.drivers.oscilloscope.sound import SoundCard
 from instruments.errors import InstrumentError
@@ -13,11 +14,7 @@ from levilab.bench.config import ConfigError
 from levilab.bench.discover import scheme_of
 from levilab.bench.hearing import listen
 from levilab.bench.kinds import COUNTER, KINDS
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from levilab.bench.wiring import Wiring
+from levilab.bench.wiring import Wiring
 
 
 @dataclass(frozen=True)

@@ -5,29 +5,23 @@ from __future__ import annotations
 import math
 import re
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.uncertainty import Estimate
 from instruments.clock import WallClock
 from instruments.drivers.oscilloscope.sound import SoundCard
 from levilab.bench.bench import open_bench
-from levilab.bench.config import ConfigError
+from levilab.bench.config import ConfigError, InstrumentSettings
 from levilab.bench.kinds import OSCILLOSCOPE
+from levilab.bench.wiring import Wiring
 from levilab.errors import LevilabError
 from levilab.files import parse_toml, replace_atomically, writing
 from levilab.present.numbers import with_uncertainty
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from analysis.arrays import Array
-    from levilab.bench.config import InstrumentSettings
-    from levilab.bench.wiring import Wiring
-
 
 #: The phase of a tone is followed in such pieces [s], which a sound card's clock turns by less than half a turn.
 _PIECE_S = 0.05

@@ -5,21 +5,16 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.numbers import how_many
 from analysis.pulses.clean import mains_lines
 from analysis.pulses.search import shorten
+from instruments.drivers.oscilloscope.sound import SoundCard
 from instruments.links.sound import inputs
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    from analysis.arrays import Array
-    from instruments.drivers.oscilloscope.sound import SoundCard
-
 
 #: How long is listened [s], and in how many parts the level is compared.
 _LISTENS_S, _PARTS = 3.0, 6

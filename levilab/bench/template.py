@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from pathlib import Path
 
+from levilab.bench.config import SettingsTable
+from levilab.bench.discover import Found
 from levilab.bench.kinds import KINDS
 from levilab.errors import LevilabError
 from levilab.files import CannotWrite, replace_atomically, toml_value
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from levilab.bench.config import SettingsTable
-    from levilab.bench.discover import Found
 
 
 class WouldOverwrite(LevilabError):

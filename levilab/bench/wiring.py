@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from instruments.clock import Clock, WallClock
-from levilab.bench.config import ConfigError, InstrumentSettings, Limits
+from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, Limits
 from levilab.bench.kinds import COUNTER, GENERATOR, KINDS
 from levilab.bench.person import Person, ask_no_person
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    import numpy as np
-    from numpy.typing import NDArray
-
-    from levilab.bench.config import BenchConfig
-    from levilab.telemetry.messages import Poses
+from levilab.telemetry.messages import Poses
 
 #: Kind of instrument → what can be done without one.
 _INSTEAD = {

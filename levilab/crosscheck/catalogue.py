@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from importlib import import_module
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from levilab.crosscheck.names import ROWS
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from levilab.crosscheck.subject import Subject
+from levilab.crosscheck.subject import Subject
 
 
 def _subject(row: str) -> Subject:

@@ -5,9 +5,10 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from levilab.errors import DataError, DoesNotSuit
+from levilab.formats.kinds import Kind
 from levilab.formats.titles import (
     CANONICAL,
     COMPANIONS,
@@ -32,9 +33,6 @@ from levilab.formats.titles import (
 )
 from levilab.texts.note import of_file
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from levilab.formats.kinds import Kind
 
 SHORTHANDS = {
     "t": "time_s",

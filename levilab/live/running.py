@@ -3,33 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from scipy.special import stdtrit
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError, TooFewReadings
 from analysis.limits import U_OF_WAY, Sample, summarize
 from analysis.precession.sweep import Sweep, fit_sweep
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fall import times_of_fall
 from analysis.spindown.fit import fit_spin_down
+from analysis.spindown.lawfit import LawFit
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.uncertainty import Estimate
+from levilab.live.envelope import Groups
 from levilab.pipelines.spindown.readings import release_of
 from levilab.pipelines.spindown.words import law_names
 from levilab.present.numbers import plain, with_uncertainty
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
-
-    from analysis.arrays import Array
-    from analysis.spindown.lawfit import LawFit
-    from levilab.live.envelope import Groups
 
 #: Points of a curve.
 _POINTS = 400

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from analysis.arrays import Array
-from analysis.lines import FEWEST, LOBE, amplitude_spectrum, lines_of_signals
+from analysis.lines import FEWEST, LOBE, Line, Signal, amplitude_spectrum, lines_of_signals
 from levilab.motion.lock import keeps_phase
 from levilab.simulator.energy import spin_of
 from levilab.simulator.equilibrium import modes_at
 from levilab.simulator.kernels.motion import TIME, N, R
 from levilab.simulator.numbers import largest
+from levilab.simulator.scene import Scene
+from levilab.simulator.trajectory import Trajectory
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from analysis.lines import Line, Signal
-    from levilab.simulator.scene import Scene
-    from levilab.simulator.trajectory import Trajectory
-
 
 #: A line gets the name of a theoretical one within NEAR_HZ plus this share of its frequency: amplitudes of some tenths
 #: of a radian shift a line that far.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +14,9 @@ from levilab.motion.lines import LONGEST_S, AxisLines, lines_of, rate_for
 from levilab.motion.lock import is_locked
 from levilab.present.numbers import with_decimals
 from levilab.simulator.equilibrium import advice, stability_of
-from levilab.simulator.scene import remarks
+from levilab.simulator.scene import Scene, remarks
+from levilab.simulator.trajectory import Accuracy, Trajectory
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
-    from levilab.simulator.trajectory import Accuracy, Trajectory
 
 #: A smaller error at the end [m, rad] shows in no figure.
 SMALL = 1e-5

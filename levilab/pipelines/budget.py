@@ -5,28 +5,21 @@ from __future__ import annotations
 import math
 import re
 from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import Any, Literal
 
-from analysis.budget import Component, u_of_limit
+from analysis.budget import Budget, Component, u_of_limit
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from instruments.time_bases import TIME_BASES
-from levilab.pipelines.sources import mark_of
-from levilab.present.document.blocks import Bullets, Details, Note, Paragraph, Tabular
+from levilab.pipelines.analyzed import Analyzed
+from levilab.pipelines.sources import Source, mark_of
+from levilab.present.document.blocks import Block, Bullets, Details, Note, Paragraph, Tabular
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.tables import Row, Table, table
 from levilab.present.units import unit
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from typing import Any
-
-    from analysis.budget import Budget
-    from levilab.pipelines.analyzed import Analyzed
-    from levilab.pipelines.sources import Source
-    from levilab.present.document.blocks import Block
 
 #: No gate is longer [s]; what another program wrote beyond is none.
 _LONGEST_GATE_S = 1e4

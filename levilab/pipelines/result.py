@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from types import UnionType
 from typing import (
-    TYPE_CHECKING,
     Annotated,
     Any,
     Generic,
@@ -26,24 +25,18 @@ from typing import (
 )
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, ValidationError, model_validator
 from pydantic_core import core_schema
 
 from analysis.budget import Budget, Component
 from levilab.errors import DataError
 from levilab.files import as_json, finite, parse_json, replace_atomically, writing
 from levilab.formats.texts import locate
+from levilab.pipelines.sources import Source
 from levilab.runs.find import RECORD
 from levilab.settings import in_one_line
 from levilab.software import software_versions
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from pydantic import GetCoreSchemaHandler
-
-    from levilab.pipelines.sources import Source
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,16 @@ import math
 import os
 import re
 from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
+from typing import Any, ClassVar, Generic, Self, TypeVar
 
 import numpy as np
 
+from analysis.remarks import Remark
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
 from levilab.formats.columns import NoSuchColumn
 from levilab.formats.kinds import AUDIO, OTHER, Kind, kind_of
@@ -24,6 +27,7 @@ from levilab.formats.waveforms.audio import advice_on_sound
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.record import SEARCHED
 from levilab.pipelines.correction import corrected_parts, describe, place_of_correction, read_correction
+from levilab.pipelines.options import InputOptions
 from levilab.present.clock import local
 from levilab.present.numbers import how_many, list_in_words, short_name
 from levilab.runs.find import RECORD, find_runs, no_such_path
@@ -31,14 +35,6 @@ from levilab.runs.run import READINGS, Run
 from levilab.texts.note import Note, of_file
 from levilab.texts.note import kind_of as kind_of_text
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-    from datetime import datetime
-
-    from analysis.remarks import Remark
-    from levilab.pipelines.options import InputOptions
-
 
 #: A file of this name keeps its folder out of searches of the folders above.
 SKIP = ".levilab-skip"

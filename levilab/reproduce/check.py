@@ -6,21 +6,18 @@ A number is compared by `check`, an equation with a slip by `erratum`, a sentenc
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from levilab.files import finite
+from levilab.present.document.blocks import Block
 from levilab.present.numbers import with_uncertainty
 from levilab.present.units import unit as unit_row
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping
-
-    from levilab.present.document.blocks import Block
-    from levilab.simulator.published.printed import Printed
+from levilab.simulator.published.printed import Printed
 
 #: What a float loses in a difference of two numbers with few digits.
 _FLOAT = 1e-9

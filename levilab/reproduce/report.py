@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from levilab.present.document.blocks import (
     Banner,
+    Block,
     Code,
     Document,
     Fact,
@@ -16,15 +15,11 @@ from levilab.present.document.blocks import (
     Verdict,
     Warnings,
 )
-from levilab.reproduce.chapters import CHAPTERS
+from levilab.reproduce.chapters import CHAPTERS, Chapter
+from levilab.reproduce.check import Found
+from levilab.reproduce.run import Reproduction
 from levilab.reproduce.table import HEADS, findings_table, in_words, overview
 from levilab.software import software_versions
-
-if TYPE_CHECKING:
-    from levilab.present.document.blocks import Block
-    from levilab.reproduce.chapters import Chapter
-    from levilab.reproduce.check import Found
-    from levilab.reproduce.run import Reproduction
 
 HOW_TO_READ = (
     "A published number has the precision of its print: it agrees if ours lies within half a unit of its last digit, "

@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 from levilab.present.tables import Row, Table, table
-from levilab.reproduce.check import Comparison, Kind, Verdict, agreeing, counts
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from levilab.reproduce.check import Finding
-    from levilab.reproduce.run import Reproduction
+from levilab.reproduce.check import Comparison, Finding, Kind, Verdict, agreeing, counts
+from levilab.reproduce.run import Reproduction
 
 HEADS = ("", "compared with", "here", "agreement")
 #: Heads of the overview for those that agree.

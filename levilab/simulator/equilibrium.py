@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,13 +17,8 @@ from levilab.simulator.field import flux_density, flux_gradient, on_axis
 from levilab.simulator.keys import SceneError
 from levilab.simulator.model import base_field
 from levilab.simulator.numbers import Numbers, uniform
+from levilab.simulator.scene import Scene
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from levilab.simulator.scene import Scene
-
 
 #: Heights in which a top is looked for: from a tenth of the inner radius to four outer radii above the base.
 _LOW, _HIGH = 0.1, 4.0

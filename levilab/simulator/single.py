@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,15 +36,11 @@ from levilab.simulator.problem import (
     one_step_map,
     scheme_for,
 )
+from levilab.simulator.scene import Scene
 from levilab.simulator.spin import DECAYS, since_infinity
 from levilab.simulator.start import start_of
-from levilab.simulator.stops import NO_TIMES, corners, kinks, stop_after_each_step
+from levilab.simulator.stops import NO_TIMES, Stops, corners, kinks, stop_after_each_step
 from levilab.simulator.trajectory import Accuracy, Event, Trajectory
-
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
-    from levilab.simulator.stops import Stops
-
 
 #: No step is small enough for a chaotic motion: at this part of the longest step the search ends.
 SMALLEST_STEP_SHARE = 1 / 256

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,9 +13,7 @@ from levilab.simulator.field import flux_density
 from levilab.simulator.kernels.motion import L, N, R
 from levilab.simulator.model import base_field
 from levilab.simulator.numbers import copysign, cos, row, sin, sqrt
-
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
+from levilab.simulator.scene import Scene
 
 
 def start_of(scene: Scene) -> Array:

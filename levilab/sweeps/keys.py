@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import UsageError
 from levilab.simulator.keys import SceneError, UnknownKey
-
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
+from levilab.simulator.scene import Scene
 
 
 def value_at(scene: Scene, key: str, tried: Any, option: str = "sweep") -> Any:

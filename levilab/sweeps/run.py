@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
+
+from numpy.typing import NDArray
 
 from levilab.errors import LevilabError
 from levilab.interruption import interruption_postponed
@@ -12,17 +15,10 @@ from levilab.simulator.compilation import announce_compilation
 from levilab.simulator.ensemble import grid, simulate_many, step_share_of
 from levilab.sweeps.axes import first_error
 from levilab.sweeps.observables import observe, seconds_per_point
-from levilab.workers import cluster, processes, results_of, this_process
+from levilab.sweeps.plan import Chunk, Plan
+from levilab.sweeps.store import Store
+from levilab.workers import Workers, cluster, processes, results_of, this_process
 from levilab.workers.ways import cores as available_cores
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
-
-    from numpy.typing import NDArray
-
-    from levilab.sweeps.plan import Chunk, Plan
-    from levilab.sweeps.store import Store
-    from levilab.workers import Workers
 
 #: A plan that one core computes in this time [s] is computed without starting other processes.
 QUICK_S = 4.0

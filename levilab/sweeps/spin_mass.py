@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,14 +14,10 @@ from levilab.formats.ranges import problem_of
 from levilab.formats.typed import read_number
 from levilab.settings import hint_about
 from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.scene import Scene
 from levilab.sweeps.observables import cut
 from levilab.sweeps.plan import Axis, Plan
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from levilab.simulator.scene import Scene
-    from levilab.sweeps.store import Map
+from levilab.sweeps.store import Map
 
 #: Tops that a map may have: some minutes of 30 s each.
 MOST_TOPS = 250_000

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +13,9 @@ from levilab.files import finite
 from levilab.present.tables import Table, table
 from levilab.present.units import unit
 from levilab.sweeps.axes import in_words
-from levilab.sweeps.plan import unit_of
-from levilab.sweeps.quantities import columns_of
-
-if TYPE_CHECKING:
-    from levilab.sweeps.plan import Plan
-    from levilab.sweeps.quantities import Observable
-    from levilab.sweeps.store import Map, Store
+from levilab.sweeps.plan import Plan, unit_of
+from levilab.sweeps.quantities import Observable, columns_of
+from levilab.sweeps.store import Map, Store
 
 
 @dataclass(frozen=True)

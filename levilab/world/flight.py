@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,16 +15,12 @@ from levilab.errors import LeftRange
 from levilab.simulator.kernels.motion import ARM, TIME, L, N, R, V
 from levilab.simulator.keys import SceneError
 from levilab.simulator.model import with_attitude
+from levilab.simulator.scene import Scene
 from levilab.simulator.single import simulate
 from levilab.simulator.start import start_of
+from levilab.simulator.trajectory import Trajectory
 from levilab.world.timeline import Timeline
 from levilab.world.tumble import tumble
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-
-    from levilab.simulator.scene import Scene
-    from levilab.simulator.trajectory import Trajectory
 
 T = TypeVar("T")
 

@@ -4,19 +4,14 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.virtual.counter.edges import Thresholds
-
+from instruments.virtual.counter.edges import Thresholds
 
 #: The laser's light is computed in such steps [s]; a straight line in between misses 6e-4 of a wobble at 42 Hz.
 GRID_S = 2.5e-4

@@ -7,18 +7,14 @@ The drive coil's field is left out, since its winding is not known, and so are t
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
+from levilab.simulator import parts
 from levilab.simulator.parts import Top
-
-if TYPE_CHECKING:
-    from levilab.simulator import parts
-    from levilab.world import base
-
+from levilab.world import base
 
 #: μ₀/4π [T m/A].
 _MU_0_OVER_4_PI = 1e-7

@@ -8,15 +8,21 @@ cuts the laser's beam.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from analysis.arrays import Array
+from instruments.clock import Clock
+from instruments.virtual.counter.edges import Thresholds
+from instruments.virtual.generator.channel import Output
 from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
+from levilab.simulator.scene import Scene
+from levilab.telemetry.messages import Poses
 from levilab.world.base import Stand
 from levilab.world.bursts import TriggerWire
 from levilab.world.coil import Coil
@@ -25,16 +31,6 @@ from levilab.world.light import Laser, Tape
 from levilab.world.magnetic_field import field_beside, moment_of
 from levilab.world.pose import poses_of
 from levilab.world.spin_world import KEPT_S
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from instruments.clock import Clock
-    from instruments.virtual.counter.edges import Thresholds
-    from instruments.virtual.generator.channel import Output
-    from levilab.simulator.scene import Scene
-    from levilab.telemetry.messages import Poses
-
 
 #: Where the magnetometer's probe stands at first: about where a top floats [m above the base].
 PROBE_M = 0.072

@@ -6,14 +6,23 @@ import asyncio
 import contextlib
 import errno
 import sys
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from instruments.clock import WallClock
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.servers.clients import first_of
-from instruments.virtual.servers.server import BY_SCHEME, LOOPBACK, PORTS_PER_INSTRUMENT, ListenAt, serve_bench
+from instruments.virtual.servers.server import (
+    BY_SCHEME,
+    LOOPBACK,
+    PORTS_PER_INSTRUMENT,
+    Endpoints,
+    ListenAt,
+    serve_bench,
+)
 from levilab.errors import LevilabError, UsageError
-from levilab.interruption import end_with_standard_input, watching_for_end
+from levilab.interruption import End, end_with_standard_input, watching_for_end
+from levilab.simulator.scene import Scene
 from levilab.world.bench import (
     PUT_BACK_AFTER_S,
     VIRTUAL_MODELS,
@@ -23,15 +32,7 @@ from levilab.world.bench import (
     virtual_instruments,
     virtual_settings,
 )
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.virtual.bench.bench import VirtualBench
-    from instruments.virtual.servers.server import Endpoints
-    from levilab.interruption import End
-    from levilab.simulator.scene import Scene
-    from levilab.world.spin_world import World
+from levilab.world.spin_world import World
 
 #: A top in full motion is simulated some 700 times faster than it moves; more than half of the time is left for the
 #: clients.

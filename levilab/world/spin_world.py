@@ -9,17 +9,21 @@ from __future__ import annotations
 import enum
 import math
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
+from instruments.clock import Clock
+from instruments.virtual.counter.edges import Thresholds
+from instruments.virtual.generator.channel import Output
 from instruments.virtual.generator.voltage import fundamental
 from levilab.simulator.laws import LAWS
 from levilab.simulator.parts import Top
 from levilab.simulator.published.printed import published
 from levilab.simulator.spin import DECAYS
+from levilab.telemetry.messages import Poses
 from levilab.world.base import Base, Stand, random_base
 from levilab.world.bursts import TriggerWire, mean_pull
 from levilab.world.coil import Coil
@@ -27,13 +31,6 @@ from levilab.world.light import Laser, Tape
 from levilab.world.magnetic_field import MOMENT_A_M2, MOMENT_TILT, field_beside, moment_of
 from levilab.world.pose import FLOATS_M, poses_of
 from levilab.world.timeline import Timeline
-
-if TYPE_CHECKING:
-    from instruments.clock import Clock
-    from instruments.virtual.counter.edges import Thresholds
-    from instruments.virtual.generator.channel import Output
-    from levilab.telemetry.messages import Poses
-
 
 #: Step in which a top that triggers its drive is computed [s]; its pull and drag change in it by a per cent.
 BURST_STEP_S = 0.5

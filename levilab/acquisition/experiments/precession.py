@@ -4,37 +4,29 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_validator
 
+from analysis.arrays import Array
 from analysis.precession.gates import FEWEST, Gates, Rate, Swing, rates_at_point, swing_of
 from instruments.drivers.counter import LIGHT
+from instruments.drivers.generator import Limits as DriveLimits
 from instruments.errors import InstrumentError
 from levilab.acquisition.counting import gate_began, prepare_counter, prepare_counter_again
 from levilab.acquisition.driving import DriveSettings, PointFailed, check_drive, held_spin, sweep_drive
-from levilab.acquisition.experiment import Experiment
-from levilab.acquisition.session import ExperimentFailed, NotHeld
-from levilab.bench.config import ConfigError
+from levilab.acquisition.experiment import Experiment, ModelOf
+from levilab.acquisition.session import ExperimentFailed, NotHeld, Row, Session
+from levilab.bench.config import BenchConfig, ConfigError, Limits
 from levilab.bench.person import Task
 from levilab.computer import computer
 from levilab.present.numbers import pulses_too_many
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.runs.gates import gates_event
+from levilab.simulator.scene import Scene
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from typing import Self
-
-    from analysis.arrays import Array
-    from instruments.drivers.generator import Limits as DriveLimits
-    from levilab.acquisition.experiment import ModelOf
-    from levilab.acquisition.session import Row, Session
-    from levilab.bench.config import BenchConfig, Limits
-    from levilab.simulator.scene import Scene
-
 
 #: Points of a sweep, at most.
 _MOST_POINTS = 1000

@@ -6,24 +6,20 @@ Films of a real top are files, which `levilab analyze video` follows; the virtua
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 import numpy as np
 from pydantic import Field, PositiveFloat
 
 from levilab.acquisition.counting import free_top, prepare_counter
-from levilab.acquisition.experiment import CounterSettings, Experiment
-from levilab.bench.config import ConfigError
+from levilab.acquisition.experiment import CounterSettings, Experiment, ModelOf
+from levilab.acquisition.session import Session
+from levilab.bench.config import BenchConfig, ConfigError
 from levilab.bench.person import FloatTop
 from levilab.formats.table import read_run_readings
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.runs.run import STATES
-
-if TYPE_CHECKING:
-    from levilab.acquisition.experiment import ModelOf
-    from levilab.acquisition.session import Session
-    from levilab.bench.config import BenchConfig
 
 #: Columns of the track.
 _TRACK = ("time_s", "x_m", "y_m", "height_m")

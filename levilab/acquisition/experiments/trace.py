@@ -4,31 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, Field, PositiveFloat, PositiveInt
 
 from analysis.errors import AnalysisError
 from analysis.pulses.trace import spin_of_trace
-from instruments.drivers.oscilloscope import NeverTriggered
+from instruments.drivers.oscilloscope import NeverTriggered, Trace
 from instruments.drivers.oscilloscope.sound import SilentInput
 from instruments.errors import CommandRefused, InstrumentError, OutOfRange
 from levilab.acquisition.driving import HELD_WITHIN_HZ, check_drive
-from levilab.acquisition.experiment import Experiment, ExperimentSettings
-from levilab.acquisition.session import ExperimentFailed
-from levilab.bench.config import ConfigError
+from levilab.acquisition.experiment import Experiment, ExperimentSettings, ModelOf
+from levilab.acquisition.session import ExperimentFailed, Row, Session
+from levilab.bench.config import BenchConfig, ConfigError, Limits
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.runs.traces import INDEX, described_times, undescribed_codes
+from levilab.simulator.scene import Scene
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from instruments.drivers.oscilloscope import Trace
-    from levilab.acquisition.experiment import ModelOf
-    from levilab.acquisition.session import Row, Session
-    from levilab.bench.config import BenchConfig, Limits
-    from levilab.simulator.scene import Scene
 
 #: A signal that moves by fewer codes than this is none: nothing is plugged in, or it is far too small for the scale.
 _FEWEST_CODES = 3

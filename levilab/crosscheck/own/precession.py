@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from analysis.precession.sweep import EXCLUDED_P, Sweep, fit_sweep
 from levilab.crosscheck.own.model import Own
 from levilab.crosscheck.subject import Trial, pull_of
+from levilab.pipelines.precession.analysis import PrecessionAnalysis
 from levilab.pipelines.precession.words import intercept_of, slope_of
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from levilab.pipelines.precession.analysis import PrecessionAnalysis
 
 #: Processor time of a trial [s].
 _COST_S = 0.003

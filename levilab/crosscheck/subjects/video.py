@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.uncertainty import Estimate
-from levilab.animation.camera import BESIDE, RIM, THICK, Camera, film, flight_of, phone_times
+from levilab.animation.camera import BESIDE, RIM, THICK, Camera, Flight, film, flight_of, phone_times
 from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.crosscheck.subjects.sway import draw_scene
 from levilab.pipelines.catalogue import ANALYSES
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
-    from pathlib import Path
-
-    from analysis.arrays import Array
-    from levilab.animation.camera import Flight
-    from levilab.pipelines.video.analysis import Video
+from levilab.pipelines.video.analysis import Video
 
 #: Height of the dot on the stem above the rim, and of the rim above the base [m].
 STEM_M, RIM_M = 0.02, 0.07

@@ -4,24 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from instruments.errors import InstrumentError
 from levilab.acquisition.grip import Grip
 from levilab.acquisition.onlooker import drive_of
-from levilab.live.practice.commands import CommandRefused, TuneDrive
+from levilab.bench.bench import Bench
+from levilab.bench.config import Limits
+from levilab.live.practice.commands import CommandRefused, TuneDrive, Voice
 from levilab.telemetry.messages import Drive
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from levilab.bench.bench import Bench
-    from levilab.bench.config import Limits
-    from levilab.live.practice.commands import Voice
 
 #: Between runs the counter counts for so long [s], as the light of the tape passes this level [V].
 GATE_S, TRIGGER_V = 0.5, 0.6

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.numbers import digits
+from analysis.precession.sweep import Point, SweepFit
 from analysis.uncertainty import Estimate
+from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.part import (
     VALUE_U,
     FigureText,
@@ -21,9 +23,12 @@ from levilab.pipelines.part import (
     size_of_u,
     title_of,
 )
+from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
+from levilab.pipelines.precession.readings import SweepReadings
 from levilab.pipelines.precession.words import at_most, intercept_of, slope_of, verdict
+from levilab.pipelines.sources import Source
 from levilab.present.clock import with_clock
-from levilab.present.document.blocks import Note, Paragraph, Tabular
+from levilab.present.document.blocks import Block, Note, Paragraph, Tabular
 from levilab.present.numbers import (
     column,
     how_many,
@@ -38,17 +43,6 @@ from levilab.present.numbers import (
 from levilab.present.tables import Row, Table, table
 from levilab.simulator.published.printed import published
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from analysis.precession.sweep import Point, SweepFit
-    from levilab.pipelines.options import PrecessionOptions
-    from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
-    from levilab.pipelines.precession.readings import SweepReadings
-    from levilab.pipelines.sources import Source
-    from levilab.present.document.blocks import Block
-
 
 #: Points that a terminal shows; more stand in result.json.
 MOST_IN_TERMINAL = 60

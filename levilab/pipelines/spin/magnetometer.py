@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
 
 from analysis.arrays import Array
 from analysis.pulses import Finding, SpinFrequency
+from analysis.rotation import FieldSpin, FieldTrack
 from analysis.uncertainty import Estimate
 from levilab.formats.columns import TableError
 from levilab.formats.table import read_table
 from levilab.formats.titles import COMPONENTS, MAGNITUDE
 from levilab.formats.understanding import Request, SeveralRuns, plan_of
+from levilab.pipelines.options import InputOptions
 from levilab.texts.note import of_file
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from analysis.rotation import FieldSpin, FieldTrack
-    from levilab.pipelines.options import InputOptions
-
 
 #: Columns of a record; a Bz beside a Bx is a component.
 QUANTITIES = ("time_s", *COMPONENTS, "flux_density_t", MAGNITUDE)

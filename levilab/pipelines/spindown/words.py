@@ -3,36 +3,31 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from math import floor, log10
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.numbers import digits
-from analysis.spindown.drag import LAWS
+from analysis.remarks import Remark
+from analysis.spindown.combine import Combined, CombinedLaw
+from analysis.spindown.drag import LAWS, DragLaw
+from analysis.spindown.fit import SpinDown
+from analysis.spindown.lawfit import LawFit
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
-from analysis.spindown.verdict import is_simple
+from analysis.spindown.verdict import Verdict, is_simple
+from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, estimate, statistic
 from levilab.pipelines.sources import Doubting, note_of
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.units import name_with_unit
 from levilab.texts.note import reword
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-
-    from analysis.arrays import Array
-    from analysis.remarks import Remark
-    from analysis.spindown.combine import Combined, CombinedLaw
-    from analysis.spindown.drag import DragLaw
-    from analysis.spindown.fit import SpinDown
-    from analysis.spindown.lawfit import LawFit
-    from analysis.spindown.verdict import Verdict
-    from analysis.uncertainty import Estimate
 
 
 @dataclass(frozen=True)

@@ -7,17 +7,13 @@ a character that LaTeX's own fonts lack is spelled as `levilab.present.character
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from levilab.present.characters import for_encoding, printable
 from levilab.present.document.typesetting import typeset
+from levilab.present.tables import Table
 from levilab.present.units import is_unit
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from levilab.present.tables import Table
 
 #: ASCII characters with a meaning of their own in LaTeX, or in a table, or that join with a neighbour.
 _ASCII = {
