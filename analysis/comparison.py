@@ -5,8 +5,6 @@ deviation τ that the values tell themselves (R. C. Paule & J. Mandel, J. Res. N
 agree within their u, τ is zero.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

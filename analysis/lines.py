@@ -10,8 +10,6 @@ takes its length.  Many signals go through side by side.  Each gives the same bi
 products, and sums over lines and bins are written out or run over the first axis, so that their order is fixed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -9,8 +9,6 @@ And how did the drive lose it?  Where drag takes more than the drive can give, t
 turn and runs away.  A top that leaves the window of its spin takes its lock along until it falls.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

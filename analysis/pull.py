@@ -8,8 +8,6 @@ quarter turn, and no top is held.  One that swings about the drive is lost earli
 its swing.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -8,8 +8,6 @@ Sources: Berry, Proc. R. Soc. A 452, 1207 (1996) (adiabatic); Simon, Heflinger &
 Gans, Jones & Washizu, J. Phys. D 31, 671 (1998) (linear).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ row.  tests/instruments/test_catalogue.py takes each row: it is named in the doc
 driver prepares and reads it, its settings survive a round trip; test_fuzz.py sends it any message.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Time on the bench: the wall's, or a virtual one that jumps."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable

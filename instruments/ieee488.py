@@ -4,8 +4,6 @@ A block is ``#``, one digit n, n digits that say how many bytes follow, and thes
 included (IEEE 488.2-1992, 8.7.9).
 """
 
-from __future__ import annotations
-
 import functools
 import io
 import re

@@ -4,8 +4,6 @@ Everything that is to survive a crash is written through `computer()`.  The labo
 another one in its place, whose disk fills up, whose clock jumps and which loses its power.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import secrets

@@ -1,7 +1,5 @@
 """Failures that a user can mend: each is one line, never a traceback."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 from difflib import get_close_matches

@@ -1,7 +1,5 @@
 """Files: read with every surprise as a ValueError, replaced whole or not at all."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import glob

@@ -9,8 +9,6 @@ ends when its event loop has its turn (`watching_for_end`).  Work that must not 
 an exit status (`let_the_status_count`).
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import signal

@@ -1,7 +1,5 @@
 """Frozen tables of settings, and what is wrong with one in a line."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from typing import Any, get_args

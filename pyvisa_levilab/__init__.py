@@ -5,8 +5,6 @@ own.  Time-outs cost virtual time only; ``"realtime@levilab"`` keeps to the wall
 their kind stand there, too: ``"CNT-91,DSOX1000@levilab"``, ``"realtime,CNT-91@levilab"``.
 """
 
-from __future__ import annotations
-
 from instruments.catalogue import CATALOGUE
 from instruments.clock import WallClock
 from instruments.virtual.bench.bench import VirtualBench

@@ -1,7 +1,5 @@
 """A light dot on the stem of a top, in one picture: the middle of what is brighter than half of its height."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -4,8 +4,6 @@ The pattern is the mean of the pictures, each turned back by its phase, and the 
 best: both are found in turn.  Light that stands still is the median over the pictures.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,8 +5,6 @@ that a mark or a shadow, which change a and b, do not pull the edge.  The shifts
 top tilts, of an ellipse.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

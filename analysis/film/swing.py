@@ -3,8 +3,6 @@
 What is slower than the line is a polynomial of time, and its mirror image is fitted beside it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

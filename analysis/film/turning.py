@@ -3,8 +3,6 @@
 Times at even distances fold it: the spins that describe the phases as well are choices, which the result names.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

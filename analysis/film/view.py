@@ -1,7 +1,5 @@
 """Whether camera and view stay as they were: shift of what stands still, and how much of it is covered."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -3,8 +3,6 @@
 Source: Mardia & Jupp, Directional Statistics (2000), §2.3 (mean direction), §6.3 (Rayleigh's test).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ Everything is computed about the weighted mean of x, where slope and height are 
 a sweep from 26 to 40 Hz, they would be correlated by −0.99.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ Source: Theil, Proc. R. Neth. Acad. Sci. 53, 386 (1950), Sen, J. Am. Stat. Assoc
 slopes between all pairs of points withstands up to 29 % of outliers.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

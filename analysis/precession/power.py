@@ -4,8 +4,6 @@ Source: Cohen, Statistical Power Analysis (1988), §9.  The difference that a tw
 probability p is the sum of the quantiles 0.975 and p of Student's distribution, in units of u(slope).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

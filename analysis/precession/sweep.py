@@ -4,8 +4,6 @@ A top that is locked to its drive wobbles at the drive's frequency, and its stem
 period: ν_p = ν_d, slope 1, intercept 0.  The two are tested jointly.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

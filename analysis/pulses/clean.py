@@ -1,7 +1,5 @@
 """Clean a trace: remove hum of the mains and a wandering baseline, and find times without a signal."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

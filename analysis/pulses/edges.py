@@ -1,7 +1,5 @@
 """Edges: place each turn's pulse by the signal right of its middle minus the signal left of it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A jump of a record's time, where a recorder lost or repeated samples."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from analysis.arrays import Array

@@ -5,8 +5,6 @@ Caprio & Parks, IEEE Trans. Acoust. Speech Signal Process. 24, 418 (1976)). Firs
 without their phases, which forgives a slope that is not known yet; then with them, at ever more harmonics.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from analysis.arrays import Array

@@ -5,8 +5,6 @@ a constant. The slope's share is the turn's shift, which is regressed with the w
 learned again; and so on until nothing moves. To first order that is the maximum of the likelihood.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial

@@ -1,7 +1,5 @@
 """A record cut into its phases: speeding up, held, coasting, nothing."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal, Protocol
 

@@ -1,7 +1,5 @@
 """Pulses of a trace, found roughly: a shorter trace, smoothed as its pulses ask for, and where that stands out."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

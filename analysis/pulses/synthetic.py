@@ -1,7 +1,5 @@
 """Traces of a top's light pulses, as easy and as hard as they come, with the frequency that is in them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

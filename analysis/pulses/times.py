@@ -1,7 +1,5 @@
 """Spin frequency from a list of pulse times."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A long record in windows: frequency against time, with the turns counted through the whole record."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace

@@ -4,8 +4,6 @@ Clean lists are numbered from their intervals. Where that does not fit, the peri
 most pairs of pulses share, its phase is where most pulses lie, and windows are joined by counting turns between them.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The result of a magnetometer's record."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """Where the line of the spin is, about: the greatest power over frequencies and slopes that a top may have."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from analysis.arrays import Array

@@ -1,7 +1,5 @@
 """Synthetic records of a phone's magnetometer, for tests and studies: no physics of a bench, numbers alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from analysis.arrays import Array

@@ -9,8 +9,6 @@ the shift large: −5 % of the split for amplitudes of 1 mm.
 Source of the method: Krack & Gross, Harmonic Balance for Nonlinear Vibration Problems (2019), §2.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

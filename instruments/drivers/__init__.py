@@ -1,7 +1,5 @@
 """The drivers: the near end of the wire."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, ClassVar, Protocol
 

@@ -3,8 +3,6 @@
 Source: IEEE 488.2-1992; SCPI-1999 volumes 1 and 2.
 """
 
-from __future__ import annotations
-
 import contextlib
 import difflib
 import functools

@@ -1,7 +1,5 @@
 """Advice for an instrument that cannot be reached, by the words of the error."""
 
-from __future__ import annotations
-
 import re
 
 #: What to try, by the words of an error (regular expressions).

@@ -4,8 +4,6 @@ Each question has a connection of its own, so no late answer is taken for that t
 lost needs no care: the next question finds the instrument again, or does not.
 """
 
-from __future__ import annotations
-
 import http.client
 import io
 import re

@@ -1,7 +1,5 @@
 """The link to an address: one of its scheme's where it has one, pyserial's where it is a port, else PyVISA's."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """The way to an instrument on a serial port: pyserial's as a port of bytes."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import re

@@ -4,8 +4,6 @@ An address is ``sound://``, the system's default input, or ``sound://NAME?rate=4
 input's name, or its number in the list of `levilab bench check`.
 """
 
-from __future__ import annotations
-
 import contextlib
 import queue
 import re

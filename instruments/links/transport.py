@@ -1,7 +1,5 @@
 """Links: what a driver needs of one, and the one implementation, messages over a port of bytes."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import re

@@ -1,7 +1,5 @@
 """Counting the light of a spinning top: what the counter sees now, and the readings of a free top until it falls."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

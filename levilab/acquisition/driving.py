@@ -4,8 +4,6 @@ A sweep takes a held top from one frequency of the drive to the next; a point at
 and the sweep goes on.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Nothing heavy is imported here, and of the experiments that one alone: a wrong setting is refused at once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any

@@ -8,8 +8,6 @@ drag and pull no motion is left in which it turns over: the drive takes hold at 
 is damped comes back to zero voltage for the same reason: Stewart, Appl. Phys. Lett. 12, 277 (1968).)
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The keys of an experiment's settings, for lists."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from typing import Any

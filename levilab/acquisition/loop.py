@@ -3,8 +3,6 @@
 Whatever ends it, the outputs are off, the run is kept and says how it ended.
 """
 
-from __future__ import annotations
-
 import contextlib
 import math
 import sys

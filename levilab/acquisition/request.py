@@ -1,7 +1,5 @@
 """From what a person asks for to what is to be acquired: the one place where a mock differs from hardware."""
 
-from __future__ import annotations
-
 import secrets
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The table of experiments, and the bench file with a table for each of them."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Iterator
 from typing import Any

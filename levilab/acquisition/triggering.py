@@ -5,8 +5,6 @@ moment is not known, so the start phase that speeds the top up is found by trial
 pulse, which would be ignored otherwise; so it is CYCLE times as fast as the top, and follows it count by count.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field

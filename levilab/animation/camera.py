@@ -4,8 +4,6 @@ It draws a dark base, and a lighter top with a light mark: a strip on its face f
 one beside.  Errors of lenses are not modelled.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

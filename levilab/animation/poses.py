@@ -8,8 +8,6 @@ frames along the axis' path.  How far both motions agree is the simulator's own 
 (`tests/levilab/motion/test_animation.py`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What is to be animated → the file, in one of three formats."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from contextlib import AbstractContextManager

@@ -1,7 +1,5 @@
 """Where three.js lies, which draws in a browser: it comes inside of nicegui, of which nothing is imported."""
 
-from __future__ import annotations
-
 from importlib.util import find_spec
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Opens the instruments of a bench.  Outputs are off on every way out."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Collection, Iterator
 from typing import Any, TypeVar

@@ -1,7 +1,5 @@
 """Whether the bench is there: each instrument connected to, asked who it is, and one reading taken."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

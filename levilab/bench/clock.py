@@ -1,7 +1,5 @@
 """The clock of a sound card, compared with a tone of known frequency or with the computer's clock, and kept."""
 
-from __future__ import annotations
-
 import math
 import re
 import time

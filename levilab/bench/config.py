@@ -1,7 +1,5 @@
 """bench.toml → frozen, validated settings.  Keys end in their unit; a wrong key or value is named with its path."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, TypeVar

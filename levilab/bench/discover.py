@@ -1,7 +1,5 @@
 """Which instruments answer: every address that PyVISA lists, and those that are named, asked who they are."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

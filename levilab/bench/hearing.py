@@ -1,7 +1,5 @@
 """What a sound card hears now: level, clipping, hum, and whether something changes its gain."""
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The kinds of instruments on a bench: what each is for, its models, and over which link a driver speaks."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar

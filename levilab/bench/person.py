@@ -1,7 +1,5 @@
 """The person at the bench: what an experiment may have to ask of one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A counter made of an oscilloscope and an estimator: each count is the frequency of the pulses in a record."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, ClassVar

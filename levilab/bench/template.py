@@ -1,7 +1,5 @@
 """A commented bench.toml from what was found."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

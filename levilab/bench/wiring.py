@@ -1,7 +1,5 @@
 """How a program reaches the instruments of a bench: the one thing in which a virtual bench and a real one differ."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """How the commands end: the only place that knows exit statuses."""
 
-from __future__ import annotations
-
 FAILED = 1
 WRONG_USAGE = 2
 INSTRUMENT = 3

@@ -1,7 +1,5 @@
 """Ctrl-C while a command imports its modules, before it does anything."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 
 from levilab.cli.exit_codes import INTERRUPTED

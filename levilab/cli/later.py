@@ -1,7 +1,5 @@
 """Commands that are made when they are called: a start need not read the options of those that it does not call."""
 
-from __future__ import annotations
-
 import re
 from functools import cached_property
 from typing import Any

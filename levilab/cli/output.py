@@ -1,7 +1,5 @@
 """Where a command writes: results on standard output, progress and messages on standard error."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import sys

@@ -1,7 +1,5 @@
 """Messages name quantities, as `duration`; on the command line they have the names of options, as --duration."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from functools import cache

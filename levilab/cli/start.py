@@ -1,7 +1,5 @@
 """The console script and `python -m levilab`: Ctrl-C ends them in one line from their first import on."""
 
-from __future__ import annotations
-
 import atexit
 import sys
 

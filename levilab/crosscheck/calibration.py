@@ -5,8 +5,6 @@ Their distribution function lies within a simultaneous band, each of whose point
 (Aldor-Noiman et al. 2013, doi:10.1080/00031305.2013.847865; Säilynoja et al. 2022, doi:10.1007/s11222-022-10090-6).
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

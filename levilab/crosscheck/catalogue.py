@@ -1,7 +1,5 @@
 """The subjects of a cross-check."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from importlib import import_module
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """`levilab crosscheck`: makes the trials, prints the table, writes JSON and the figure."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path

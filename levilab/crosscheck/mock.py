@@ -1,7 +1,5 @@
 """Runs of mock experiments, which load the bench: trials of a report do without."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The subjects of a cross-check by their names; nothing heavy is imported, so that a wrong one is refused at once."""
 
-from __future__ import annotations
-
 from types import MappingProxyType
 
 #: Name → the row of a subject in `levilab.crosscheck.subjects`.

@@ -4,8 +4,6 @@ A study is of a world whose numbers are drawn at random, or of readings that are
 (`levilab.crosscheck.own`).  Both have the same spreads, the same criterion and the same document.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import tempfile

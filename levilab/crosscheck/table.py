@@ -1,7 +1,5 @@
 """A cross-check as people see it: the table, its meaning as text, the blocks of a report."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

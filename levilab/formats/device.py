@@ -3,8 +3,6 @@
 All of it may be left out; what is not there is taken from the run, or is not known.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Self
 

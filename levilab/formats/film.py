@@ -1,7 +1,5 @@
 """Films: the brightness of each picture with the time that the file gives it, through PyAV, an extra."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass

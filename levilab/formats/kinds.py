@@ -1,7 +1,5 @@
 """Kinds of files by their first bytes or the ends of their names, and what to do with those that are not read."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

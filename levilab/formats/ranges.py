@@ -3,8 +3,6 @@
 Wide enough for any top that floats and its bench.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """Many laboratories, one a seed, in processes on all cores."""
 
-from __future__ import annotations
-
 import itertools
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What happens in a laboratory, step by step: each message, each write and each wait is a step, and may be struck."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field

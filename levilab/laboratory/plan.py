@@ -1,7 +1,5 @@
 """From one number to a laboratory: its bench, its top, its person, and what is to go wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from random import Random

@@ -1,7 +1,5 @@
 """A laboratory that failed, with everything left out that it does not need to fail."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 

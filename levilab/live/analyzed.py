@@ -1,7 +1,5 @@
 """The analysis of a run or a data file, as the command line makes it, in a process of its own: no frame waits."""
 
-from __future__ import annotations
-
 import contextlib
 import glob
 import json

@@ -1,7 +1,5 @@
 """Which run is shown: the one that is named, else the newest that is running, else the newest."""
 
-from __future__ import annotations
-
 import heapq
 import os
 from collections.abc import Collection, Iterator

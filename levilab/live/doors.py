@@ -9,8 +9,6 @@ A guest comes by another socket, at the machine's address in its network, to an 
 of its requests carries a token as the first part of its path.
 """
 
-from __future__ import annotations
-
 import hmac
 import secrets
 from collections.abc import Iterable

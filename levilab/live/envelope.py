@@ -1,7 +1,5 @@
 """Any number of readings in a bounded memory: exact while they are few, else by lowest, highest and mean."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

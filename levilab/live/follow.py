@@ -1,7 +1,5 @@
 """A run folder as it grows: its record, readings and events, read beside the process that writes them."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

@@ -1,7 +1,5 @@
 """Data files that a person opens in the view: named on the command line, or dropped into a page."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import hashlib

@@ -1,7 +1,5 @@
 """What the readings so far say: the running fit, from the analyses themselves, at a low rate."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace

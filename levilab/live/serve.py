@@ -1,7 +1,5 @@
 """`levilab live`: serve the view until a signal ends it."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import socket

@@ -1,7 +1,5 @@
 """`levilab live --share`: where phones in the same room find the view, and the code that their cameras read."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import ipaddress

@@ -1,7 +1,5 @@
 """A file that grows line by line, read as it grows."""
 
-from __future__ import annotations
-
 import os
 import stat
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Which washers today, as `levilab tune` says it: a page sends all answers so far with each question."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the page draws of each experiment's readings: one row an experiment."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from levilab.present.units import split

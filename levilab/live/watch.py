@@ -1,7 +1,5 @@
 """One run, or one bench, as the page sees it: the run folder, what the bench publishes, and the running fit."""
 
-from __future__ import annotations
-
 import contextlib
 import time
 from collections import deque

@@ -1,7 +1,5 @@
 """The pages in the language of a person: what they say in HTML is looked up as everywhere."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable

@@ -5,8 +5,6 @@ at most LONGEST seconds.  Their mean heights, precession frequencies and spins a
 effect: the simulator is fast enough to compute it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

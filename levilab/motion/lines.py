@@ -1,7 +1,5 @@
 """The lines of a motion: the spectrum of the axis, n_x + i n_y, and what each of its lines is."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The one simulation of the command: an request → the motion, its summary, and a run folder."""
 
-from __future__ import annotations
-
 import math
 import sys
 import time

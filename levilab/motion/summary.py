@@ -1,7 +1,5 @@
 """A simulated motion in a few numbers: its end, heights, spin, lines and errors."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

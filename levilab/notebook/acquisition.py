@@ -1,7 +1,5 @@
 """Experiments from scripts and notebooks, and the runs of earlier ones."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """From runs, files and DataFrames to the one analysis that is made for them, and its result."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 import warnings

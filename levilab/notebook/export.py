@@ -1,7 +1,5 @@
 """Export of what scripts and notebooks have: runs, results, maps, paths."""
 
-from __future__ import annotations
-
 import sys
 from os import PathLike
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Reports from scripts and notebooks."""
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Scenes as scripts and notebooks name and change them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Uncertainty budgets of results: the rows that analyses share, and how people are shown a budget."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter

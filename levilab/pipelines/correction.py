@@ -1,7 +1,5 @@
 """How a data file is read, kept beside it in FILE.levilab.toml: `levilab open` writes it, every analysis reads it."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Mapping
 from contextlib import suppress

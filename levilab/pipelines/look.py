@@ -1,7 +1,5 @@
 """How a data file is understood, whatever it holds, for a person to see and to correct."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from itertools import islice

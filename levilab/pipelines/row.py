@@ -3,8 +3,6 @@
 A column of a table of many runs is read from the input's part of result.json, so that both say the same.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """The way from paths on the command line to the readings of an analysis."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

@@ -5,8 +5,6 @@ the analyses that read it; where one of them reads it by columns that no other a
 folder is for the analyses of the runs and files in it.  A result that was written before says itself what suits.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """The calculator for the top: a device's parts → mass and moments of inertia, for people and for programs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

@@ -3,8 +3,6 @@
 Nothing is lost by it: 3.262(23)×10⁻³ s⁻¹ becomes 3.262(23)e-3 s^-1.
 """
 
-from __future__ import annotations
-
 import codecs
 import re
 import unicodedata

@@ -1,7 +1,5 @@
 """Times on the clock of the person who reads: local, with the offset from UTC."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 

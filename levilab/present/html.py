@@ -1,7 +1,5 @@
 """Facts, tables and parts that fold as HTML, for notebooks: plain elements, which take the notebook's own style."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from html import escape
 

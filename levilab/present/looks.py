@@ -5,8 +5,6 @@ things than colours: two things may share one if they never stand in one figure 
 what stands together differs in its dashes, markers or hatch as well, for print without colours.
 """
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """A table as data: the terminal and the report draw the same one, each in its way."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

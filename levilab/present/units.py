@@ -1,7 +1,5 @@
 """Units: one row a unit, from which results, names of columns and keys, tables, figures and messages take it."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cache

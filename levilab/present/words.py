@@ -1,7 +1,5 @@
 """An instrument's settings, from run.json, in the words of a lab book."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

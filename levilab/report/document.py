@@ -1,7 +1,5 @@
 """Results → a document: what the data say, the figure, notes, then with what they were measured."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from functools import partial

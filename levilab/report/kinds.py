@@ -3,8 +3,6 @@
 What simulates is imported where one of them was found: a report of measurements needs no compiled kernels.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

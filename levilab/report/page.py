@@ -3,8 +3,6 @@
 Nothing is fetched when it is opened, what a person typed is never markup, and the same inputs give the same bytes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace

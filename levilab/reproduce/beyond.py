@@ -1,7 +1,5 @@
 """What the thesis could not do: the exact window, the disc's law, what a counter counts, the joint test of the lock."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import partial

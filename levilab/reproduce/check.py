@@ -3,8 +3,6 @@
 A number is compared by `check`, an equation with a slip by `erratum`, a sentence that can be tried by `statement`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

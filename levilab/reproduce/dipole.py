@@ -1,7 +1,5 @@
 """What the dipole approximation costs: the top's magnet as a disc of finite size instead of a point."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

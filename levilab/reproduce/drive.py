@@ -4,8 +4,6 @@ The numbers that were computed apart are those of a top that only spins, so they
 said about the thesis is of a top that leans in step with its moment, as the simulated one does.
 """
 
-from __future__ import annotations
-
 import math
 from functools import cache, partial
 

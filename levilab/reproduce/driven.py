@@ -1,7 +1,5 @@
 """The driven top: its spin swings about the drive's frequency, and its φ̇ looks chaotic though the motion is not."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The slips of the thesis, each tried on a number that neither the printed nor the corrected equation decides."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -4,8 +4,6 @@ The numbers of the paper's edges could not be had (see the data file).  What can
 with its model, and the parameters of a program written after it.
 """
 
-from __future__ import annotations
-
 import math
 from functools import partial
 from typing import Any

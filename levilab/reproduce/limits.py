@@ -1,7 +1,5 @@
 """The limits of the spin that the thesis simulated from four starts, without and with drag, and IC3's misprint."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Motions that the thesis shows as figures: paths, the tilt at the fall, a tilted moment beside an aligned one."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The report of a reproduction: a document of blocks."""
 
-from __future__ import annotations
-
 from levilab.present.document.blocks import (
     Banner,
     Block,

@@ -1,7 +1,5 @@
 """The chapters, one after the other: which are wanted, what each found, and all of it as one JSON document."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any

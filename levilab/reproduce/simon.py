@@ -1,7 +1,5 @@
 """Simon, Heflinger & Ridgway 1997, Table I: the quartic's window, and simulated limits, of three tops and bases."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import partial

@@ -5,8 +5,6 @@ from about 40 Hz, a reading each 10 s, with noise; start and constant are solved
 them return the printed constants.  They are not the author's data.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import partial

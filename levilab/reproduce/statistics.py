@@ -1,7 +1,5 @@
 """The ten lower limits that the thesis measured: their mean, what their rounding does, and whether they are normal."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The table of findings: what is published, what was found here, whether they agree."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from levilab.present.tables import Row, Table, table

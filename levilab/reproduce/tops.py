@@ -1,7 +1,5 @@
 """The thesis's tops as scenes, many of them at once, and the facts about its device that several chapters need."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, TypeVar

@@ -1,7 +1,5 @@
 """Where a top can float: heights, masses, the effective mass, contours of the potential, and the least spin."""
 
-from __future__ import annotations
-
 import math
 from functools import partial
 

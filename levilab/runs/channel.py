@@ -1,7 +1,5 @@
 """What a run measures: the columns of its readings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """Find what a person names: a run by its path or its name, the runs below a folder; nothing of it is read."""
 
-from __future__ import annotations
-
 import difflib
 import os
 import re

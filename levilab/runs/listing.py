@@ -1,7 +1,5 @@
 """The list of runs: when, what, status, length."""
 
-from __future__ import annotations
-
 import math
 import os
 import stat

@@ -1,7 +1,5 @@
 """datapackage.json: the description of a folder of data that any program for Data Packages reads (datapackage.org)."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Iterable, Mapping, Sequence

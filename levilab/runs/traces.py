@@ -5,8 +5,6 @@ to `traces/arriving.codes` as they come; both go once the record has its own fil
 killed leaves them behind, and with them what had come.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import io

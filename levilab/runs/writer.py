@@ -5,8 +5,6 @@ a process that is killed between two rows loses nothing that it has shown. A fol
 written again, beside, from what this process holds in memory.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import json

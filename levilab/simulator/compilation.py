@@ -1,7 +1,5 @@
 """The simulator's code is compiled when it is first used: a message says so to those who wait."""
 
-from __future__ import annotations
-
 import contextlib
 import time
 

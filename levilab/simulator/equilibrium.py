@@ -1,7 +1,5 @@
 """Where the top of a scene floats, and how fast it may spin: the scene's own field in the theory of stability."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

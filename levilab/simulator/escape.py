@@ -1,7 +1,5 @@
 """Escapes: the moment at which a top leaves the limits, of one motion or of many, located within a step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

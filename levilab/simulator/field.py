@@ -1,7 +1,5 @@
 """The field of the base as functions of places: which kind it is, B, its gradient, and its derivatives on the axis."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Dotted keys: nested tables, changed and checked by paths such as top.mass_kg or start.position_m.0."""
 
-from __future__ import annotations
-
 import difflib
 import re
 import tomllib

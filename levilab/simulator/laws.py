@@ -3,8 +3,6 @@
 `spin` has their closed forms, `kernels.braking` what the kernels compute.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -6,8 +6,6 @@ and `split` calls the formula anew with each of the two groups.  So tops are gro
 a list of what makes a kind.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from typing import Any, TypeVar

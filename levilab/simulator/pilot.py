@@ -5,8 +5,6 @@ other frequencies: it grows in proportion to the time.  Two short runs at the st
 with the order the step at which the whole motion has the error that is wanted.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

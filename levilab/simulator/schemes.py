@@ -10,8 +10,6 @@ ours: of the compositions of order 6 with ten kicks the one that benchmarks/comp
 smallest error on the Levitron's motion.  The tests fit every order on every kind of scene, and check its conditions.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

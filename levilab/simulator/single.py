@@ -1,7 +1,5 @@
 """One top from its start to its end: the tolerance decides the step, and the result carries its error."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace

@@ -10,8 +10,6 @@ so a law is a row of functions.  The laws share no algebra with the ones that ar
  `analysis.spindown.drag`.  Spins in rad/s, angles in rad, times in s.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

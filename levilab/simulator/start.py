@@ -1,7 +1,5 @@
 """The state in which a scene begins."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

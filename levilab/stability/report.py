@@ -1,7 +1,5 @@
 """Where a top floats, as `levilab stability` printed it as JSON → a section of a report."""
 
-from __future__ import annotations
-
 import shlex
 from collections.abc import Iterator, Mapping
 from pathlib import Path

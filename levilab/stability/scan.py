@@ -4,8 +4,6 @@ Near the upper edge survival is not monotone in the spin: there are holes and is
 of the scan.  So a scan, never a bisection alone, and its step beside every limit.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The axes of a sweep from KEY=FROM:TO:N, values or a table of points, checked in the scene before any simulation."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence

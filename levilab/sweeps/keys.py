@@ -1,7 +1,5 @@
 """The keys of a scene that a sweep can vary; light, so that the command refuses another one at once."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from levilab.errors import UsageError

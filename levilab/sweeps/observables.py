@@ -4,8 +4,6 @@ The definitions are those of `levilab simulate`: survival, the spin at the fall 
 and lock from `levilab.motion`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

@@ -15,8 +15,6 @@ Only an island on which no computed point lies may be missed.  An island that ho
 every axis holds a point of the coarse grid, and is sure to be seen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

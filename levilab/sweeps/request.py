@@ -1,7 +1,5 @@
 """The request for a sweep → its plan, and its store: a new one, or an existing one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Run a sweep: workers compute chunks in any order, and this process writes each result as it comes."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

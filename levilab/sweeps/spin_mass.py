@@ -1,7 +1,5 @@
 """The map of survival over spin and mass, `levilab stability SCENE --map`: a sweep with usual axes, and its files."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

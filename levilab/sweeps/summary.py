@@ -1,7 +1,5 @@
 """The summary of a store, computed chunk by chunk, so that memory does not grow with the map, and its tables."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -12,8 +12,6 @@ the arrays            little-endian, row by row, each filled up to a multiple of
 `levilab/live/page/connection.js` reads the same bytes.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

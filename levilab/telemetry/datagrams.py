@@ -15,8 +15,6 @@ up to 8000 bytes      the part
 ====================  ===================================================================
 """
 
-from __future__ import annotations
-
 import hmac
 import struct
 from collections import OrderedDict

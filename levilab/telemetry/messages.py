@@ -4,8 +4,6 @@ A message is one of three dataclasses.  Its bytes are those of a document (`levi
 and its ``kind``: ``state``, ``record`` or ``poses``.  A value that is not known has no key in `State.last`.
 """
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass, field, replace
 from typing import Annotated, Any, ClassVar
 

@@ -1,7 +1,5 @@
 """The bench's end: sends messages to the views that asked for some, and costs next to nothing where none did."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
 import time

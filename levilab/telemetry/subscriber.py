@@ -1,7 +1,5 @@
 """A view's end: asks a bench for messages every second, and reads what has come."""
 
-from __future__ import annotations
-
 import contextlib
 import socket
 import time

@@ -1,7 +1,5 @@
 """Notes on data as data: of which kind, whether a doubt, and whether their text names the input."""
 
-from __future__ import annotations
-
 from typing import Any, Self
 
 from levilab.texts.text import Text

@@ -4,8 +4,6 @@ English stands in the program where it is used, and is the key: `in_language` lo
 and returns it as it is where it is not there.  A sentence with values is a `Text`.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import tomllib

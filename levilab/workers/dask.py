@@ -4,8 +4,6 @@ Dask submits a dead worker's tasks to other workers by itself.  Where it would w
 for a lost scheduler, for a cluster without workers, and for workers with other software.
 """
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import time

@@ -3,8 +3,6 @@
 An executor pickles by itself, but if a worker cannot unpickle a call, the worker dies and breaks the whole pool.
 """
 
-from __future__ import annotations
-
 import pickle
 import platform
 import traceback

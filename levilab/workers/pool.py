@@ -5,8 +5,6 @@ they do not run the main script again (one without ``if __name__ == "__main__"``
 to the parent, and each has one thread for linear algebra, because there is a process for each core.
 """
 
-from __future__ import annotations
-
 import contextlib
 import multiprocessing
 import os

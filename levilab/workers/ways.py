@@ -1,7 +1,5 @@
 """Kinds of workers: this process, threads, processes, or any executor of a caller."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from concurrent.futures import Executor, Future, ThreadPoolExecutor

@@ -5,8 +5,6 @@ vertical.  A burst of whole cycles begins at the same ψ in every turn, so its m
 a product of two sines, in closed form: with a start phase a quarter behind or ahead of the moment it drives or brakes.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

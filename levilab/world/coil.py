@@ -1,7 +1,5 @@
 """The drive coil's field in time, as a generator puts it there."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """The motion of a top under a drive that changes, simulated as far as an instrument needs it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass

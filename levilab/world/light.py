@@ -1,7 +1,5 @@
 """What the phototransistors see of a top: white tape that a lamp lights once a turn, and a laser cut by the stem."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable

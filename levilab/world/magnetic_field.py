@@ -4,8 +4,6 @@ The top is a dipole at its centre of mass: for its disc (radius 1.44 cm) the fie
 The drive coil's field is left out, since its winding is not known, and so are the earth's and the mains'.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

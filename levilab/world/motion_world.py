@@ -5,8 +5,6 @@ top: a top that stands 1 mm aside shifts the pulse of its tape by a hundredth of
 cuts the laser's beam.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

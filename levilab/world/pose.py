@@ -1,7 +1,5 @@
 """Where a top is and how it is turned, for a view: no instrument measures that."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """`levilab bench serve`: offer the virtual bench to other programs until a signal ends it."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import errno

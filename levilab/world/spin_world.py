@@ -4,8 +4,6 @@
 is exact at any time, and nothing is integrated.  `motion_world` has the whole motion.
 """
 
-from __future__ import annotations
-
 import enum
 import math
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """What holds from when on: a list in time, as cheap to look into when it is long."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Iterator

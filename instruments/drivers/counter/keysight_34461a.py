@@ -1,7 +1,5 @@
 """The driver of Keysight's multimeters as counters: 34401A, and 34460A, 34461A, 34465A, 34470A (Truevolt)."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The driver of Keysight's 53210A, 53220A and 53230A."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

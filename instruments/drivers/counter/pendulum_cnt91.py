@@ -1,7 +1,5 @@
 """The driver of Pendulum's CNT-91, which Tektronix sells as FCA3000 and FCA3100."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The driver of phyphox, an app that reads a phone's magnetometer: the top's tilted moment turns past the phone."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import math

@@ -1,7 +1,5 @@
 """What reciprocal counters have in common."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """Function generators: the drive.  Waveform, frequency, amplitude, offset, output, whatever the model."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol

@@ -1,7 +1,5 @@
 """The driver of Agilent's 33220A."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from instruments.drivers.generator.drive import (

@@ -1,7 +1,5 @@
 """A generator as the drive of a coil: its limits, its settings, its output."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Any, ClassVar, cast

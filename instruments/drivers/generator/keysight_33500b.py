@@ -1,7 +1,5 @@
 """The driver of Keysight's 33500B series."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from instruments.drivers.generator.drive import (

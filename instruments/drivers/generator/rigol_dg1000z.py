@@ -1,7 +1,5 @@
 """The driver of Rigol's DG800 and DG1000Z generators."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from instruments.drivers.generator.drive import (

@@ -1,7 +1,5 @@
 """The driver of Siglent's SDG1000X generators."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar

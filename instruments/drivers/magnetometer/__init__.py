@@ -3,8 +3,6 @@
 Facts and their sources stand with each driver.
 """
 
-from __future__ import annotations
-
 from typing import Protocol
 
 from instruments.drivers import Instrument

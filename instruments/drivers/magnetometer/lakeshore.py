@@ -1,7 +1,5 @@
 """What Lake Shore's gaussmeters have in common."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The driver of Lake Shore's 425."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, ClassVar
 

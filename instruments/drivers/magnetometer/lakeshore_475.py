@@ -1,7 +1,5 @@
 """The driver of Lake Shore's 455 and 475."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, ClassVar
 

@@ -4,8 +4,6 @@ What the drivers share is in scope.py and setup.py; facts and their sources stan
 rigol_ds1000z.py and keysight_dsox.py.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The driver of Keysight's oscilloscopes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import ClassVar
 

@@ -5,8 +5,6 @@ voltage ten times too large, its level lets no pulse trigger.  So the driver kee
 it hands a record out and before it says that the signal never triggered.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import math

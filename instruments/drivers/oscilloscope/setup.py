@@ -1,7 +1,5 @@
 """What an oscilloscope was asked for, and its inputs' settings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, ClassVar, NoReturn
 

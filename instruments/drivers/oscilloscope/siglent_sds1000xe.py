@@ -1,7 +1,5 @@
 """The driver of Siglent's SDS1000X-E oscilloscopes."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """The driver of Tektronix's teaching oscilloscopes: TDS1000, TDS2000, TBS1000."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import ClassVar
 

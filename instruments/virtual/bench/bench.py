@@ -1,7 +1,5 @@
 """The virtual bench: instruments by their addresses, and the sessions that programs open with them."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

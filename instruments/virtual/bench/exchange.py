@@ -4,8 +4,6 @@ Source: IEEE 488.2-1992, 6.3 and figure 6-4, with its states READ, QUERY and SEN
 apart, and with DONE in IDLE.
 """
 
-from __future__ import annotations
-
 from enum import Enum, auto
 
 

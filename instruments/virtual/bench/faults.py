@@ -4,8 +4,6 @@ A fault changes answers (see :class:`Fault`); `FAULTS` is the table of them.  Th
 onto the wire, so they are the same for the PyVISA backend, for a serial line and for the servers.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -5,8 +5,6 @@ pyserial imports this module by its name; :func:`plug_in` registers this package
 ``ASRLlevilab://magnetometer::INSTR``.
 """
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import math

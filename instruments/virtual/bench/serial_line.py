@@ -4,8 +4,6 @@ When both ends are set alike the bytes arrive as they were sent; when baud rate,
 receiver samples the sender's bits at the wrong places, as a UART does, and gets garbage, the same each time.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

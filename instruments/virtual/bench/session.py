@@ -1,7 +1,5 @@
 """A session: one program's connection to one instrument of the bench."""
 
-from __future__ import annotations
-
 import math
 import threading
 from collections import deque

@@ -1,7 +1,5 @@
 """A serial line: its settings, and the bytes that a receiver with other settings gets."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 #: The parity bit behind an even and behind an odd number of ones.

@@ -4,8 +4,6 @@ Source: SCPI-1999, volume 1, 6.2.4 (compound messages with path memory); IEEE 48
 (blocks).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """The parameters of a command: numbers with units, words, booleans."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -6,8 +6,6 @@ volume 2, chapter 21: the error numbers.  The answer to a message with an error 
 nothing else, so the program at the other side runs into its time-out, as on the bench.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable
 from typing import Any

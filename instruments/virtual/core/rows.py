@@ -8,8 +8,6 @@ function that depends on the channel takes its number as well.
 'CHANnel2:SCALe'
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace

@@ -1,7 +1,5 @@
 """The signal at an input, a voltage as a function of time, and where a Schmitt trigger fires in it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The status registers of IEEE 488.2, chapter 11: the state of an instrument in bits."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 #: Bits of the standard event status register (11.5.1.1).

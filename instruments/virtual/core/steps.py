@@ -5,8 +5,6 @@ then: a program in the same process runs it to its end, a server runs it in slic
 between.
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Generator
 from typing import TypeVar

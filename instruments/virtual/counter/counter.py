@@ -1,7 +1,5 @@
 """What the virtual counters share: inputs, one run at a time, and a memory for its readings."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Sequence

@@ -5,8 +5,6 @@ A search may go through hours of a signal, of which only a piece is in memory at
 the voltage shows them.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

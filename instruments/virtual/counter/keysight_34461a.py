@@ -8,8 +8,6 @@ It has frequency and period and no other function; it takes commands in local mo
 line.
 """
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER

@@ -1,7 +1,5 @@
 """A virtual 53230A: counts what crosses its trigger level in the light it is shown."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, ClassVar
 

@@ -4,8 +4,6 @@ A measurement is a Python generator: it yields the input and the time up to whic
 run has looked that far.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Generator
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """A virtual CNT-91: back-to-back frequencies with time stamps, from the light it is shown."""
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Generator

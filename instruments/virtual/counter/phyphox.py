@@ -4,8 +4,6 @@ A message is a request, ``GET /get?mag_time=full HTTP/1.1``, without its head; t
 Sources: as of the driver.  Left out: bodies of POST, other experiments, Excel, the web page, countdowns.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import math

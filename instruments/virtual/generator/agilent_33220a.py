@@ -1,7 +1,5 @@
 """A virtual 33220A: one channel, 20 MHz, 14 bits; an older dialect of the same language."""
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar
 

@@ -3,8 +3,6 @@
 Source: Keysight 33500 Series Operating and Service Guide, DATA subsystem; Agilent 33220A User's Guide, chapter 4.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field

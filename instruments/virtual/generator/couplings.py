@@ -3,8 +3,6 @@
 Sources: see channel.py.
 """
 
-from __future__ import annotations
-
 import math
 
 from instruments.virtual.generator.channel import INFINITE, Channel

@@ -1,7 +1,5 @@
 """Virtual function generators: what both families share.  A listener gets their output."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """A virtual 33522B: two channels, 30 MHz, 250 MSa/s."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import ClassVar

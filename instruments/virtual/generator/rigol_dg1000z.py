@@ -6,8 +6,6 @@ Sources: see the driver; answers of ``APPLy?`` as in PyMeasure's tests of its DG
 endless bursts and arbitrary waveforms are missing.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import ClassVar

@@ -3,8 +3,6 @@
 Sources: Keysight 33500 Series Operating and Service Guide; Agilent 33220A User's Guide, chapter 4.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field

@@ -12,8 +12,6 @@ record of SWWV has it); PLRT of a gate as a public record of the guide's §3.7
 has it.  Modulation and sweep are always off, arbitrary waveforms are missing.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

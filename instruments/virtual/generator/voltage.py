@@ -4,8 +4,6 @@ The phase of a waveform is counted in turns from its start: there sine, square a
 (33220A User's Guide, BURSt:PHASe), pulses begin, and an arbitrary waveform has its first sample.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cache

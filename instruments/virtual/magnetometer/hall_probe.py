@@ -1,7 +1,5 @@
 """A Hall probe in its place, and how a gaussmeter looks at the field there: steady, r.m.s., peaks and frequency."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

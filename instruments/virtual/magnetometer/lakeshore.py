@@ -7,8 +7,6 @@ the answers OL and NO PROBE).  What had to be assumed is said where it stands.
 There is no error queue.  What is not understood is ignored: a question gets no answer.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable

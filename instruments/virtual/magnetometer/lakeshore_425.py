@@ -1,7 +1,5 @@
 """A virtual Lake Shore 425.  Sources: see lakeshore.py."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from instruments.virtual.core.line import LineSettings

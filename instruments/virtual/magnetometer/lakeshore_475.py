@@ -1,7 +1,5 @@
 """A virtual Lake Shore 475 or 455.  Sources: see lakeshore.py."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import ClassVar
 

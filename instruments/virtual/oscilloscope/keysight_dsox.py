@@ -7,8 +7,6 @@ is 199 codes for the eight divisions; codes 0, 1 and 255 for no sample, clipped 
 operation register; a single acquisition and a digitize begin with an empty memory.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, ClassVar
 

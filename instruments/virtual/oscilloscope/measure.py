@@ -4,8 +4,6 @@ Levels as in IEEE 181: top and base are the most frequent voltages of the upper 
 middle between them, with a hysteresis; rise and fall go from 10 % to 90 %.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property

@@ -3,8 +3,6 @@
 Acquiring is a matter of its own, see acquisition.py; the record is in record.py.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Mapping

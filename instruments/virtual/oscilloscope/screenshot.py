@@ -1,7 +1,5 @@
 """The picture of an oscilloscope's screen, as PNG or BMP."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Mapping
 

@@ -5,8 +5,6 @@ from a TDS2024C.  Assumed: a scale may have any value, as with the knob's fine a
 levels; the state after ``*RST``.  ``SYST:ERR?`` is answered, too, which the real one does not know.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

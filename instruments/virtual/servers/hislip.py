@@ -5,8 +5,6 @@ connections (both may be left out by a server), no service requests.  A client h
 one go messages and answers, on the asynchronous one what must not wait behind them.
 """
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 import struct

@@ -5,8 +5,6 @@ the port of VXI-11's core channel.  It registers no programs for others and forw
 section 3, version 2.
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import socket

@@ -3,8 +3,6 @@
 XDR is the form in which they write numbers and strings of bytes (RFC 4506).
 """
 
-from __future__ import annotations
-
 import asyncio
 import struct
 from collections.abc import Awaitable, Callable, Mapping

@@ -5,8 +5,6 @@ parity, and Linux refuses 7 data bits there.  Serial instruments are served over
 (``ASRLsocket://host:port::INSTR``), where such settings mean nothing.
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import os

@@ -7,8 +7,6 @@ Source: VXI-11 revision 1.0, TCP/IP Instrument Protocol (section numbers below a
 polls the status byte.
 """
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """The Hall scan: flux density on the base's axis, at one height after the other."""
 
-from __future__ import annotations
-
 import math
 import re
 from itertools import pairwise

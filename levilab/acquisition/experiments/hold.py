@@ -1,7 +1,5 @@
 """A spin held for as long as one likes: the amplitude of a triggered drive follows the counts, and shows the drag."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from contextlib import suppress

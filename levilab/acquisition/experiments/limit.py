@@ -1,7 +1,5 @@
 """The limits of the spin: how slow a top is when it falls, and how fast a drive can make it spin; again and again."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """The precession: sweep the drive, and count at each of its frequencies how often the stem cuts a laser beam."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 from typing import Any, ClassVar, Literal, Self

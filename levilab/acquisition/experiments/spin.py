@@ -1,7 +1,5 @@
 """The spin-down: drive the top up, switch the drive off, and count its spin until it falls."""
 
-from __future__ import annotations
-
 import math
 from typing import ClassVar
 

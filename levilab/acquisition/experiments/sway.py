@@ -3,8 +3,6 @@
 Films of a real top are files, which `levilab analyze video` follows; the virtual bench has a camera.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Self
 

@@ -1,7 +1,5 @@
 """Records of the oscilloscope: raw codes into the run folder, written as they come."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self

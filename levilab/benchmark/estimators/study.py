@@ -1,7 +1,5 @@
 """Many traces of each kind, and what the estimates of their frequency are worth: ours, and a user's otherwise."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections import Counter

@@ -4,8 +4,6 @@ In place, velocity, axis and angular momentum (12 numbers; with the direction of
 15), and in Euler angles, as the master's thesis on the Levitron has them (12 numbers, singular at θ = 0).
 """
 
-from __future__ import annotations
-
 import json
 import math
 from importlib.resources import files

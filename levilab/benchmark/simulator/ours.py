@@ -1,7 +1,5 @@
 """The kernels' own points: each scheme at fixed steps, without an error estimate; one top, and lanes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Other people's integrators on the same motion, each with the settings from loose to tight."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Iterator

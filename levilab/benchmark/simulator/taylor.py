@@ -4,8 +4,6 @@ It is taken at its best.  Its code is compiled with `fast_math`, which is 9 to 4
 no less exact here.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Any
 

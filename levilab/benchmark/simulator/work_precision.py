@@ -1,7 +1,5 @@
 """All points of a run, the speeds at a wanted error that they come to, and their ratios."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass

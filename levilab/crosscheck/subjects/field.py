@@ -1,7 +1,5 @@
 """The Hall scan of a base that is drawn: its strength and place, and what follows for the tops above it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

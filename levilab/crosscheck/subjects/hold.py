@@ -1,7 +1,5 @@
 """A top that only spins, held by a drive that it triggers: the drag that the amplitude balances."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

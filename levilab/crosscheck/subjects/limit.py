@@ -1,7 +1,5 @@
 """The limits of tops that only spin, lower and upper, with a drive that creeps and with one that the top triggers."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType

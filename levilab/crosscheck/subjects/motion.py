@@ -1,7 +1,5 @@
 """The spin-down of a top in full motion, which the drive has brought to its spin: constant of the drag and fall."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

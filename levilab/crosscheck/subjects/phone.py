@@ -1,7 +1,5 @@
 """A phone's magnetometer beside the top: it counts over Wi-Fi, and records until the top has fallen."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The sweep of the drive: a locked top wobbles at the drive's frequency, so the line has slope 1 and meets 0."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from levilab.crosscheck.mock import acquire_mock

@@ -1,7 +1,5 @@
 """A record of the tape's light: frequency and chirp, by the pulses of some tenths of a second to some seconds."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The spin-down of a top that only spins: the law of drag, its constants and the fall."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import partial

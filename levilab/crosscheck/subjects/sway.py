@@ -1,7 +1,5 @@
 """The slow swings of a top in full motion, filmed, and recorded by a phone above it: geometric magnetism."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -3,8 +3,6 @@
 The window of masses is the simulator's, at the temperature of the magnets; a hand that lets go floats a part of it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

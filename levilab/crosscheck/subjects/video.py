@@ -1,7 +1,5 @@
 """A top in full motion that phones film from above and from beside: its spin and its place."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Sound of phones and recorders, m4a, mp3, ogg, flac and the sound track of a film, through FFmpeg, an extra."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """NumPy arrays of samples, whose rate is given beside them, or of pulse times."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from tokenize import TokenError

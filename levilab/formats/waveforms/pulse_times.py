@@ -1,7 +1,5 @@
 """Lists of pulse times: one number a line, with a title or without."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Any file with samples or pulse times, recognised by its first bytes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

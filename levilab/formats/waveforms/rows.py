@@ -1,7 +1,5 @@
 """The numbers in the rows of a text file, piece by piece: by pandas where every line is plain, else line by line."""
 
-from __future__ import annotations
-
 import io
 import warnings
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Tables of samples as waveforms: the step from the header, checked against the printed times."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Binary records of oscilloscopes, through RigolWFM, an extra."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import warnings

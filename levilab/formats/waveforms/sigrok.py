@@ -4,8 +4,6 @@ The format: https://sigrok.org/wiki/File_format:Sigrok/v2.  Levels are bits of `
 logic-1-2 and so on; voltages are floats, in analog-1-N-1 and so on, N the number of the channel.
 """
 
-from __future__ import annotations
-
 import configparser
 import re
 import zipfile

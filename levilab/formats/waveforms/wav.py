@@ -1,7 +1,5 @@
 """WAV recordings, as a sound card or a logger writes them."""
 
-from __future__ import annotations
-
 import struct
 import warnings
 from collections.abc import Iterator

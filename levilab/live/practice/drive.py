@@ -1,7 +1,5 @@
 """The drive on the bench for practice: as a person sets it, on its ramp, and while it takes hold of a top."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 from collections.abc import Callable

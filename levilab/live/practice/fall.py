@@ -1,7 +1,5 @@
 """Why a top fell, in a sentence."""
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 

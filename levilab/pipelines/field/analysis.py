@@ -1,7 +1,5 @@
 """Scans of the base's field at some paths: each by itself and together."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

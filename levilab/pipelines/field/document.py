@@ -1,7 +1,5 @@
 """Scans of a field → uncertainty budgets and result.json."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """What a table of readings must fulfil before it is taken for a scan of a field."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

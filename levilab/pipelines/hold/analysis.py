@@ -1,7 +1,5 @@
 """Held spins at some paths: each by itself, the drag laws through all of them, and a spin-down beside these."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

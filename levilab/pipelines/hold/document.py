@@ -1,7 +1,5 @@
 """Held spins → uncertainty budgets and result.json."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Readings of a held spin, and the gain at the full amplitude that was measured before and after it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar

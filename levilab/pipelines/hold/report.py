@@ -1,7 +1,5 @@
 """Held spins → tables, and their part of a report."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Limits at some paths: each run by itself, and those of the same conditions together."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

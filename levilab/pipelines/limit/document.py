@@ -1,7 +1,5 @@
 """Limits → uncertainty budgets and result.json."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

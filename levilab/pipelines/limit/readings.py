@@ -1,7 +1,5 @@
 """What a table of limits must fulfil before an analysis may trust it."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass, replace

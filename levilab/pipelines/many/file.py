@@ -4,8 +4,6 @@ Beside the table FILE lies FILE.json: what it was made with, and what its column
 rows are in FILE.part.csv, in the order in which they came, so that a process that is killed loses at most the last row.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import json

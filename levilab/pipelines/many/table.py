@@ -1,7 +1,5 @@
 """Many inputs → one table, in parallel; an input that fails has a row with its problem."""
 
-from __future__ import annotations
-
 import os
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Sweeps of the drive at some paths: each by itself and together."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Sweeps → uncertainty budgets and result.json."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, Literal
 

@@ -1,7 +1,5 @@
 """What a table must fulfil to be a sweep of the drive."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

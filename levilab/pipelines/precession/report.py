@@ -1,7 +1,5 @@
 """Sweeps → tables, and their part of a report."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace

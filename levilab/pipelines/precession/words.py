@@ -1,7 +1,5 @@
 """Quantities of a sweep, the sentences that it says, and remarks on its numbers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType

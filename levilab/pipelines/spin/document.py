@@ -1,7 +1,5 @@
 """Spin frequencies → uncertainty budgets and result.json."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """A magnetometer's record: components of the field against time, as a phone writes them, and the spin in it."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Spin frequencies → tables, the meaning of the numbers, and their part of a report."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Spin-downs at some paths: each by itself and together."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Spin-downs → uncertainty budgets and result.json."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

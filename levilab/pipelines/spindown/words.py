@@ -1,7 +1,5 @@
 """Quantities of a spin-down, symbols of the drag laws, the verdict and remarks on the numbers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass

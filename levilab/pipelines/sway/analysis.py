@@ -1,7 +1,5 @@
 """Tracks of a swaying top at some paths, each by itself."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 

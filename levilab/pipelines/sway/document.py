@@ -1,7 +1,5 @@
 """Tracks of swaying tops → uncertainty budgets and result.json."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from analysis.budget import Budget

@@ -1,7 +1,5 @@
 """Places of a top over time, seen from above: of a file, of a simulated motion, or of the field above the top."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path

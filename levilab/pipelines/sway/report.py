@@ -1,7 +1,5 @@
 """Slow swings → tables, and their part of a report."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Which washers to take next, with what chances, and why: for people and for programs."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

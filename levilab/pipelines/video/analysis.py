@@ -1,7 +1,5 @@
 """Rim or side, and mark, in the pictures of a film → place and spin in SI, with a scale and notes on doubts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path

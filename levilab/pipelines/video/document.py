@@ -1,7 +1,5 @@
 """Films of tops ↔ result.json."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 from analysis.budget import Budget

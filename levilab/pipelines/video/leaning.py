@@ -1,7 +1,5 @@
 """The dot on the stem or the turn of the side, and the height → how the top leans, precesses and rises."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

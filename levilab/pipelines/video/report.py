@@ -1,7 +1,5 @@
 """Films → tables, and their part of a report."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterator, Mapping
 

@@ -1,7 +1,5 @@
 """A film → where the rim or the side is in each picture, and the light along the bands of the top."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any

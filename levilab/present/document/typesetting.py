@@ -4,8 +4,6 @@ Plain text says 10⁻³, s⁻¹, (rad/s)^−½ and C₃/₂, so that a terminal 
 asks here, and gets a minus for a hyphen before a number, which a person may have typed; nothing else is ever changed.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Literal

@@ -1,7 +1,5 @@
 """What is exported of a run, a data file or a sweep: tables with units, the result, and where all of it comes from."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence

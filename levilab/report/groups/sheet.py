@@ -1,7 +1,5 @@
 """A class → a spreadsheet: all digits, the numbers as numbers, every reading with its residual."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime

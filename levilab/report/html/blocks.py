@@ -1,7 +1,5 @@
 """Blocks as HTML, built of elements, so that no text can become markup; a table of functions, one a kind of block."""
 
-from __future__ import annotations
-
 import base64
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """A document → one HTML page with everything in it: nothing is fetched when it is opened."""
 
-from __future__ import annotations
-
 import base64
 import json
 from collections.abc import Iterable

@@ -3,8 +3,6 @@
 Texts reach typst as strings of a JSON file and never as markup, so nothing in them has to be escaped.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping

@@ -4,8 +4,6 @@ All of it is ASCII, so that it compiles with every engine and every input encodi
 a character that LaTeX's own fonts lack is spelled as `levilab.present.characters` spells it.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Worksheets and their keys, in the language of a class: texts, documents, files."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches

@@ -1,7 +1,5 @@
 """The experiments that have a worksheet; nothing heavy is imported, so that a wrong name is refused at once."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from types import MappingProxyType
 

@@ -6,8 +6,6 @@ Nyström compositions demand.  With a tilted dipole the field changes the spin a
 exact too, in the middle of the kick, and only compositions for any split keep their order (`any_split`).
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -6,8 +6,6 @@ one: the last step before the light ends where the tape is expected by its prese
 there.  So the order of the scheme is kept.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Models whose numbers differ from top to top: the numbers of each in a column, beside those that all share."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from numba.core import types

@@ -5,8 +5,6 @@ together from several files, so they are kept in a folder that is named by the s
 lies: a second environment, or the same version installed anew, compiles nothing.
 """
 
-from __future__ import annotations
-
 import contextlib
 import gc
 import hashlib

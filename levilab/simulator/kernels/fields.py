@@ -6,8 +6,6 @@ With cylindrical symmetry five functions of height and r² = x² + y², smooth o
     ∂xBx = p + q x²,  ∂yBy = p + q y²,  ∂xBy = q x y,  ∂xBz = ∂zBx = s x,  ∂yBz = ∂zBy = s y,  ∂zBz = g
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Many tops at once: each lane of a SIMD register its own top, and the next one in as soon as a lane is free."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

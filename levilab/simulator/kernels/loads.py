@@ -4,8 +4,6 @@ Fields come multiplied by the moment's size, so they are energies [J] and their 
 directions in the body.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from analysis.arrays import Array

@@ -11,8 +11,6 @@ kind, and the functions are chosen by type when a kernel is compiled (numba's `o
 Source: Simon, Heflinger & Ridgway, Am. J. Phys. 65, 286 (1997); Landau & Lifshitz, Mechanics, § 33, 36.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from levilab.simulator.kernels.braking import clock_after, momentum_after

@@ -6,8 +6,6 @@ so that a truncated field has an energy, too.  The derivatives of (z² + R²)^(�
 (z² + R²) g⁽ⁿ⁺¹⁾ + (2n + 3) z g⁽ⁿ⁾ + n(n + 2) g⁽ⁿ⁻¹⁾ = 0, Leibniz' rule applied to (z² + R²) g′ = −3 z g.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -3,8 +3,6 @@
 A drive of 30 Hz has 3600 corners a minute: a list of them for each of a million tops would not fit into memory.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

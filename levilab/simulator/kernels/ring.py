@@ -5,8 +5,6 @@ Near the axis they divide what cancels by r²: there the series about the axis t
 has converged to 1e-17; beyond, the closed forms have lost three digits at most.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -4,8 +4,6 @@ A call may hold several runs of the same top at different steps, as an estimate 
 register, and take about the time of the longest one alone.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

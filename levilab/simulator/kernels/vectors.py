@@ -1,7 +1,5 @@
 """Vectors, turns and the sine inside the kernels: straight-line code, so that lanes stay lanes."""
 
-from __future__ import annotations
-
 import math
 
 from levilab.simulator.kernels.compiled import part

@@ -1,7 +1,5 @@
 """A number as a source prints it, and the sources."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
