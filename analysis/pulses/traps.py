@@ -8,12 +8,11 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.pulses.clean import MAINS
-from analysis.pulses.matched import COARSE
+from analysis.pulses.matched import COARSE, Match
 from analysis.pulses.regression import student
 from analysis.pulses.result import Finding
 
 if TYPE_CHECKING:
-    from analysis.pulses.matched import Match
     from analysis.uncertainty import Estimate
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.rotation.errors import NoLine
-from analysis.rotation.folds import evidence_of, images_between, weigh
+from analysis.rotation.folds import Evidence, Weighed, evidence_of, images_between, weigh
 from analysis.rotation.line import LineFit, fit_line
 from analysis.rotation.record import MAINS_HZ, Line, Record, read_samples
 from analysis.rotation.result import FieldSpin, Fold, Kind
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from analysis.arrays import Array
-    from analysis.rotation.folds import Evidence, Weighed
 
 #: A line that is named may lie this part of the given frequency beside it.
 NEAR = 0.1

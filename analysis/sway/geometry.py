@@ -12,7 +12,7 @@ Source: Berry, Proc. R. Soc. A 452, 1207 (1996).
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -21,16 +21,13 @@ import numpy as np
 from analysis.arrays import Array
 from analysis.errors import ShapesDiffer, TooFewReadings
 from analysis.sway.joint import Corrections, Joint, fit_together
-from analysis.sway.lines import COARSE
+from analysis.sway.lines import COARSE, Swings
 from analysis.sway.orbit import NoSwing, slow_swings, small_swings
 from analysis.sway.vertical import vertical_swing
 from analysis.uncertainty import Estimate, partly_believed, propagate
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from analysis.sway.known import Known
-    from analysis.sway.lines import Swings
 
 
 #: The shift at finite amplitude is known to this part of it: it is computed without a vertical swing of its own.

@@ -14,13 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.arrays import Array
-from analysis.stability import modes
+from analysis.stability import SymmetricTop, modes
 from analysis.uncertainty import Estimate, partly_believed
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from analysis.stability import SymmetricTop
     from analysis.sway.known import Known
     from analysis.sway.lines import Swings
 

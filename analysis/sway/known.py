@@ -11,14 +11,12 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.field.errors import ImpossibleRing
-from analysis.field.magnet import axial_field, stiffnesses
-from analysis.stability import SymmetricTop, windows
+from analysis.field.magnet import Disc, axial_field, stiffnesses
+from analysis.stability import AxialField, SymmetricTop, windows
 from analysis.sway.orbit import NoSwing, small_swings
 
 if TYPE_CHECKING:
-    from analysis.field.magnet import Disc
     from analysis.field.ring import Ring
-    from analysis.stability import AxialField
     from analysis.sway.lines import Swings
 
 

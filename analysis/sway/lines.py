@@ -20,14 +20,22 @@ from numpy.typing import NDArray
 
 from analysis.arrays import Array
 from analysis.errors import AnalysisError, NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewReadings
-from analysis.lines import spectral_lines
-from analysis.sway.vertical import ALONE, BESIDE, VERTICAL_U_HZ, Vertical, beside, of_heights, of_places, vertical_swing
+from analysis.lines import Line, spectral_lines
+from analysis.sway.vertical import (
+    ALONE,
+    BESIDE,
+    VERTICAL_U_HZ,
+    Beside,
+    Vertical,
+    beside,
+    of_heights,
+    of_places,
+    vertical_swing,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from analysis.lines import Line
-    from analysis.sway.vertical import Beside
 
 Places = NDArray[np.complex128]
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from instruments.errors import NoAnswer, NotConnected, Occupied, SilentLine
 from instruments.links.advice import advice, one_line
-from instruments.links.transport import LONGEST_ANSWER, Failure, MessageLink, Resynchronising
+from instruments.links.transport import LONGEST_ANSWER, Failure, MessageLink, Resynchronising, TrafficLog
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from pyvisa.highlevel import VisaLibraryBase
 
     from instruments.clock import Clock
-    from instruments.links.transport import TrafficLog
 
 
 #: How the names of bare TCP connections end, and those of serial lines begin.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from instruments.errors import InstrumentError, SettingsLost
-from levilab.bench.person import ask_no_person
+from levilab.bench.person import Person, Task, ask_no_person
 from levilab.computer import utc_now
 from levilab.errors import LevilabError
 from levilab.present.units import unit
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from instruments.drivers.oscilloscope import Trace
     from levilab.bench.bench import Bench
-    from levilab.bench.person import Person, Task
     from levilab.interruption import Stop
     from levilab.present.progress import Display
     from levilab.runs.channel import Channel

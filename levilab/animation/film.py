@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.animation.paint import Painter, Pose, font
+from levilab.animation.paint import Colour, Painter, Pose, font
 from levilab.animation.parts import COLOURS, parts_of
-from levilab.animation.poses import height_for_camera, matrices
+from levilab.animation.poses import Poses, height_for_camera, matrices
 from levilab.animation.words import readout, span_text, speed_text
 from levilab.errors import LevilabError
 from levilab.software import how_to_install
@@ -26,9 +26,6 @@ if TYPE_CHECKING:
     from PIL.Image import Image
     from PIL.ImageDraw import ImageDraw
     from PIL.ImageFont import FreeTypeFont, ImageFont
-
-    from levilab.animation.paint import Colour
-    from levilab.animation.poses import Poses
 
     BaseFont = FreeTypeFont | ImageFont
     Progress = Callable[[float], None]

@@ -22,7 +22,7 @@ import numpy as np
 from analysis.numbers import digits
 from levilab.animation.film import Film, millimetres, nice_length, still, table_of_colours
 from levilab.animation.parts import COLOURS, parts_of
-from levilab.animation.poses import height_for_camera
+from levilab.animation.poses import Poses, height_for_camera
 from levilab.animation.three import MissingThree, three_js
 from levilab.animation.words import bind_units, short_speed, span_text, speed_text
 from levilab.errors import UsageError
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
     from PIL.Image import Image
 
-    from levilab.animation.poses import Poses
     from levilab.motion.summary import Summary
 
 #: The largest page [bytes].

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from levilab.crosscheck.calibration import band_of, by_ranks, ranks_of
-from levilab.crosscheck.study import FALSE_ALARM, Verdict, by_pulls
+from levilab.crosscheck.study import FALSE_ALARM, Judge, Spread, Study, Verdict, by_pulls
 from levilab.present.drawing import SMALL, headline, panel, write
 from levilab.present.looks import BLUE, VERMILION
 from levilab.present.numbers import with_sign
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from levilab.crosscheck.study import Judge, Spread, Study
 
 _COLUMNS = 3
 #: Left edge of the first panel, a panel's size, and from one to the next [inch].

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from levilab.crosscheck.study import Study
+from levilab.crosscheck.study import Spread, Study
 from levilab.errors import DataError
 from levilab.files import as_json as to_json
 from levilab.files import finite, parse_json, replace_atomically, writing
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from pathlib import Path
 
-    from levilab.crosscheck.study import Spread
     from levilab.pipelines.result import Place
 
 NAME = "crosscheck.json"

@@ -9,7 +9,7 @@ from instruments.clock import VirtualClock
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.status import POWER_ON
-from levilab.bench.person import FloatTop, PlaceProbe, ShieldProbe
+from levilab.bench.person import FloatTop, PlaceProbe, ShieldProbe, Task
 from levilab.world.bench import virtual_bus, virtual_wiring
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from instruments.virtual.bench.session import Session
     from instruments.virtual.core.device import VirtualInstrument
     from levilab.bench.config import Limits
-    from levilab.bench.person import Task
     from levilab.bench.wiring import Wiring
     from levilab.laboratory.disk import SimulatedComputer
     from levilab.laboratory.fate import Fate

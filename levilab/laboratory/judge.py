@@ -15,7 +15,7 @@ from levilab.errors import LevilabError
 from levilab.laboratory.events import out_s
 from levilab.runs.run import Run
 from levilab.simulator.laws import LAWS
-from levilab.world.spin_world import SpinWorld
+from levilab.world.spin_world import SpinWorld, World
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Iterator, Sequence
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from levilab.acquisition.session import Row, Session
     from levilab.laboratory.bench import LaboratoryBench
     from levilab.laboratory.plan import Plan
-    from levilab.world.spin_world import World
 
 #: An analysed value further from the truth than this [u] needs a warning; a single reading may be a little further,
 #: since there are a thousand times as many of them.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from levilab.animation.parts import parts_of
 from levilab.computer import utc_now
 from levilab.errors import LevilabError
-from levilab.live.practice.commands import command_of
+from levilab.live.practice.commands import PracticeEvent, command_of
 from levilab.live.practice.experiments import PRACTICE
 from levilab.live.practice.tasks import TASKS
 from levilab.live.practice.what_if import WHAT_IF
@@ -19,7 +19,6 @@ from levilab.simulator.scene import read_scene, scene_of
 
 if TYPE_CHECKING:
     from levilab.live.practice.bench import PracticeBench
-    from levilab.live.practice.commands import PracticeEvent
     from levilab.telemetry.address import Address
 
 #: What is kept of what the bench says.

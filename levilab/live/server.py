@@ -20,15 +20,15 @@ from urllib.parse import unquote
 
 from starlette.applications import Starlette
 from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response
-from starlette.routing import Route, WebSocketRoute
-from starlette.websockets import WebSocketDisconnect
+from starlette.routing import BaseRoute, Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from levilab.animation.three import three_js
 from levilab.errors import LevilabError, UsageError
 from levilab.errors import unquote as unquote_names
 from levilab.live.analyzed import Analyses, is_shown
-from levilab.live.choice import choices, newest, running_run
-from levilab.live.desk import parts_for, scene_of_run
+from levilab.live.choice import Choice, choices, newest, running_run
+from levilab.live.desk import Desk, parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
 from levilab.live.opened import Opened
 from levilab.live.tuning import advice_on
@@ -43,11 +43,7 @@ if TYPE_CHECKING:
     from collections.abc import AsyncIterator, Callable, Iterator
 
     from starlette.requests import Request
-    from starlette.routing import BaseRoute
-    from starlette.websockets import WebSocket
 
-    from levilab.live.choice import Choice
-    from levilab.live.desk import Desk
     from levilab.live.practice.commands import PracticeEvent
     from levilab.live.running import Running
 

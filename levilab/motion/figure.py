@@ -12,7 +12,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from analysis.numbers import digits
-from levilab.motion.summary import changing_energy
+from levilab.motion.summary import Summary, changing_energy
 from levilab.present.drawing import SMALL, curve, headline, panel
 from levilab.present.looks import GREY, LOOKS
 from levilab.present.numbers import enumeration, with_decimals
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
 
     from analysis.arrays import Array
     from levilab.motion.lines import NamedLine
-    from levilab.motion.summary import Summary
 
 
 #: A curve of more points is drawn as the envelope of this number of pieces.

@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import DataError, LevilabError, unquote
 from levilab.motion.effects import KINDS, field_kinds
 from levilab.motion.simulation import COLUMNS, FIGURE, SimulationRequest, run_simulation
-from levilab.motion.summary import as_document
+from levilab.motion.summary import Summary, as_document
 from levilab.present.document.blocks import (
     Banner,
+    Block,
     Code,
     Details,
     Fact,
@@ -33,17 +34,14 @@ from levilab.present.document.blocks import (
 from levilab.present.numbers import plain, with_decimals
 from levilab.present.tables import table
 from levilab.runs.run import STATES, Run
-from levilab.simulator.scene import SceneError, changes, scene_of
+from levilab.simulator.scene import Scene, SceneError, changes, scene_of
 from levilab.texts.text import Sentences, Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence
     from pathlib import Path
 
-    from levilab.motion.summary import Summary
-    from levilab.present.document.blocks import Block
     from levilab.present.style import Figure
-    from levilab.simulator.scene import Scene
 
 #: Motions that took longer to compute are not computed again for a figure [s].
 LONGEST_S = 10.0

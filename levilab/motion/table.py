@@ -9,11 +9,11 @@ import numpy as np
 from rich.markup import escape
 
 from analysis.numbers import with_minus
-from levilab.motion.effects import LEAST_HZ, LEAST_M
+from levilab.motion.effects import LEAST_HZ, LEAST_M, Effect
 from levilab.motion.lock import is_locked
-from levilab.motion.summary import changing_energy, start_and_end
+from levilab.motion.summary import Summary, changing_energy, start_and_end
 from levilab.present.numbers import with_decimals
-from levilab.present.tables import table
+from levilab.present.tables import Table, table
 from levilab.present.terminal import draw, terminal
 from levilab.texts.text import Sentences, Text, in_language
 
@@ -21,10 +21,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from rich.console import Console
-
-    from levilab.motion.effects import Effect
-    from levilab.motion.summary import Summary
-    from levilab.present.tables import Table
 
 
 def print_motion(summary: Summary, console: Console | None = None) -> None:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError
 from levilab.present.html import table_as_html
-from levilab.report.export.contents import attributes_of, variables_of
+from levilab.report.export.contents import Contents, attributes_of, variables_of
 from levilab.software import how_to_install
 
 if TYPE_CHECKING:
@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
     import pandas as pd
     import xarray
-
-    from levilab.report.export.contents import Contents
 
 
 def head_as_html(frame: pd.DataFrame, rows: int, texts: int = 1) -> str:

@@ -16,7 +16,7 @@ import numpy as np
 from levilab.animation.request import AnimationRequest, animate, check_request
 from levilab.errors import UsageError
 from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation, write_motion
-from levilab.motion.summary import as_document
+from levilab.motion.summary import Summary, as_document
 from levilab.motion.table import headline, print_motion
 from levilab.notebook.labels import dataset_of_contents
 from levilab.notebook.names import Exportable, bare, meant
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     import pandas as pd
     import xarray
 
-    from levilab.motion.summary import Summary
     from levilab.notebook.figure import Axes
     from levilab.present.style import Figure
     from levilab.simulator.scene import Scene

@@ -23,7 +23,7 @@ from levilab.notebook.labels import dataset_of_contents, head_as_html
 from levilab.notebook.names import Exportable, bare, meant
 from levilab.notebook.quantity import Named, Quantity, correlate
 from levilab.pipelines.catalogue import ANALYSES, print_analysis
-from levilab.pipelines.result import Place
+from levilab.pipelines.result import Place, Result, Value
 from levilab.pipelines.suits import save as save_result
 from levilab.present.html import facts_as_html, fold, paragraphs, table_as_html
 from levilab.present.numbers import plain, without_unit
@@ -43,7 +43,6 @@ if TYPE_CHECKING:
 
     from levilab.notebook.figure import Axes
     from levilab.pipelines.document import Analysis
-    from levilab.pipelines.result import Result, Value
     from levilab.present.style import Figure
 
 TableName = Literal["values", "models", "readings"]

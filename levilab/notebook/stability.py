@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from levilab.notebook.names import Helpful, bare
 from levilab.present.html import facts_as_html, paragraphs
-from levilab.simulator.equilibrium import stability_of
+from levilab.simulator.equilibrium import Stability, stability_of
 from levilab.stability.table import as_document, headline, print_stability, remarks
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from levilab.notebook.figure import Axes
     from levilab.present.style import Figure
-    from levilab.simulator.equilibrium import Stability
     from levilab.simulator.scene import Scene
 
 

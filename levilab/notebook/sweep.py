@@ -19,7 +19,7 @@ from levilab.report.export.contents import attributes_of, contents_of
 from levilab.sweeps.adaptive import is_adaptive, run_adaptive
 from levilab.sweeps.axes import axis_of, parse_axis
 from levilab.sweeps.keys import value_at
-from levilab.sweeps.plan import ROWS
+from levilab.sweeps.plan import ROWS, Axis
 from levilab.sweeps.request import SweepRequest, store_for
 from levilab.sweeps.run import compile_for, run, workers_for
 from levilab.sweeps.store import Store
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
     from levilab.present.style import Figure
     from levilab.simulator.scene import Scene
-    from levilab.sweeps.plan import Axis
 
 #: Rows of a table that a notebook's cell shows.
 _MOST_ROWS = 10

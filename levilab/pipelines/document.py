@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from importlib import import_module
@@ -16,7 +16,7 @@ from levilab.formats.device import Device
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, NOW, A, Origin
 from levilab.pipelines.budget import budgets_of_result
 from levilab.pipelines.correction import read_correction
-from levilab.pipelines.options import OF_FILES, options_of
+from levilab.pipelines.options import OF_FILES, InputOptions, options_of
 from levilab.pipelines.result import (
     AGAIN,
     SCHEMA,
@@ -30,24 +30,21 @@ from levilab.pipelines.result import (
     place_of,
     relative,
 )
-from levilab.pipelines.sources import Needs, Skipped, collect
+from levilab.pipelines.sources import Found, Needs, Skipped, Source, collect
 from levilab.present.units import name_with_unit, split
 from levilab.runs.find import find_run
 from levilab.software import software_versions
 from levilab.texts.text import Sentences, Text, as_tables
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Sequence
     from pathlib import Path
 
     import numpy as np
 
     from analysis.budget import Budget
     from analysis.uncertainty import Estimate
-    from levilab.pipelines.options import InputOptions
     from levilab.pipelines.part import ReportPart
     from levilab.pipelines.row import Column
-    from levilab.pipelines.sources import Found, Source
     from levilab.present.document.blocks import Block
     from levilab.present.style import Figure
     from levilab.present.tables import Table

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from analysis.numbers import digits
-from levilab.present.document.blocks import Points
+from levilab.present.document.blocks import Block, Points
 from levilab.present.numbers import how_many, short_name
 from levilab.texts.text import Text
 
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from levilab.pipelines.analyzed import Analyzed
     from levilab.pipelines.sources import Source
-    from levilab.present.document.blocks import Block
 
 #: How an estimate is written.
 VALUE_U = "value(u): the digits in parentheses are the standard uncertainty of the last digits."

@@ -5,11 +5,11 @@ from __future__ import annotations
 import io
 import shutil
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.cells import cell_len
-from rich.console import Console, Group
+from rich.console import Console, ConsoleOptions, Group, RenderableType
 from rich.markup import escape
 from rich.measure import Measurement, measure_renderables
 from rich.padding import Padding
@@ -20,9 +20,7 @@ from levilab.present.document.blocks import in_language_of_reader
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
-    from typing import Any
 
-    from rich.console import ConsoleOptions, RenderableType
     from rich.text import Text
 
     from levilab.present.tables import Table

@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING, Any
 from levilab.errors import LevilabError
 from levilab.formats.table import parse_columns
 from levilab.pipelines.options import OF_REPORT, OPTIONS, options_of, typed_name
-from levilab.present.document.blocks import Code, Details, Fact, Facts, Note, Paragraph, Section, Tabular
+from levilab.present.document.blocks import (
+    Block,
+    Code,
+    Details,
+    Document,
+    Fact,
+    Facts,
+    Note,
+    Paragraph,
+    Section,
+    Tabular,
+)
 from levilab.present.numbers import how_many
 from levilab.present.tables import table
 from levilab.software import software_versions
@@ -21,7 +32,6 @@ if TYPE_CHECKING:
 
     from levilab.pipelines.document import Analysis
     from levilab.pipelines.sources import Source
-    from levilab.present.document.blocks import Block, Document
 
 
 @dataclass(frozen=True)

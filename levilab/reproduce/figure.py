@@ -17,8 +17,8 @@ from levilab.present.drawing import SMALL
 from levilab.present.looks import BLACK, BLUE, GREEN, GREY, LOOKS, ORANGE, SERIES, VERMILION
 from levilab.present.numbers import with_decimals
 from levilab.present.style import STYLE, WIDE
-from levilab.reproduce.tops import MASS_KG, known
-from levilab.simulator.equilibrium import stability_of
+from levilab.reproduce.tops import MASS_KG, Flags, known
+from levilab.simulator.equilibrium import MassWindows, stability_of
 from levilab.simulator.scene import preset
 from levilab.stability.thesis import HIGHEST_HZ, LOOSE_HZ, SIMULATED_HZ, WITH_DRAG_HZ
 
@@ -32,8 +32,6 @@ if TYPE_CHECKING:
     from analysis.pull import Driven
     from analysis.spindown.fit import SpinDown
     from levilab.motion.lines import AxisLines
-    from levilab.reproduce.tops import Flags
-    from levilab.simulator.equilibrium import MassWindows
     from levilab.simulator.trajectory import Trajectory
 
 #: A curve of more points is drawn as the band between its least and greatest values in so many pieces.

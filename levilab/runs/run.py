@@ -17,20 +17,18 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from levilab.computer import computer
 from levilab.errors import DataError
 from levilab.files import as_json, parse_json
-from levilab.formats.table import read_run_readings
+from levilab.formats.table import Table, read_run_readings
 from levilab.present.html import facts_as_html, table_as_html
 from levilab.runs.events import RunEvent
 from levilab.runs.find import RECORD
-from levilab.runs.traces import load_traces
+from levilab.runs.traces import StoredTrace, load_traces
 from levilab.settings import in_one_line
 from levilab.texts.text import Text, text_from
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from levilab.formats.table import Table
     from levilab.present.style import Figure
-    from levilab.runs.traces import StoredTrace
 
 SCHEMA: Literal["levilab-run/1"] = "levilab-run/1"
 READINGS, STATES, EVENTS, LOCK, WIRE, PACKAGE = (

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from levilab.formats.waveforms.waveform import Signal, Waveform
-from levilab.runs.traces import INDEX, is_arriving, load_traces
+from levilab.runs.traces import INDEX, StoredTrace, is_arriving, load_traces
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from analysis.arrays import Array
     from levilab.runs.run import Run
-    from levilab.runs.traces import StoredTrace
 
 
 #: Interval at which the drivers ask an oscilloscope whether its record is complete [s].

@@ -10,13 +10,12 @@ from numpy.typing import NDArray
 from analysis.arrays import Array
 from levilab.simulator.field import flux_density
 from levilab.simulator.kernels import braking
-from levilab.simulator.kernels.motion import CLOCK, L, R
+from levilab.simulator.kernels.motion import CLOCK, L, Model, R
 from levilab.simulator.laws import LAWS
 from levilab.simulator.numbers import largest, length, smallest, sqrt
 from levilab.simulator.spin import DECAYS
 
 if TYPE_CHECKING:
-    from levilab.simulator.kernels.motion import Model
     from levilab.simulator.scene import Scene
     from levilab.simulator.schemes import Scheme
 

@@ -10,10 +10,9 @@ import numpy as np
 
 from analysis.arrays import Array
 from levilab.simulator.energy import energy, spin_of
-from levilab.simulator.kernels.motion import LOOSE, TIME, L, N, R, V
+from levilab.simulator.kernels.motion import LOOSE, TIME, L, Model, N, R, V
 
 if TYPE_CHECKING:
-    from levilab.simulator.kernels.motion import Model
     from levilab.simulator.scene import Scene
 
 

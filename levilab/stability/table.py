@@ -9,9 +9,9 @@ from rich.markup import escape
 
 from levilab.files import finite
 from levilab.present.numbers import with_decimals
-from levilab.present.tables import table
+from levilab.present.tables import Table, table
 from levilab.present.terminal import draw, terminal
-from levilab.simulator.equilibrium import advice
+from levilab.simulator.equilibrium import Stability, advice
 from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
 from levilab.texts.text import Text, in_language
 
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from rich.console import Console
 
-    from levilab.present.tables import Table
-    from levilab.simulator.equilibrium import Stability
     from levilab.simulator.scene import Scene
 
 

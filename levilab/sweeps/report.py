@@ -11,6 +11,7 @@ import numpy as np
 from levilab.files import writing
 from levilab.motion.report import SYNTHETIC, command_text, scene_blocks
 from levilab.present.document.blocks import (
+    Block,
     Bullets,
     Code,
     Fact,
@@ -24,19 +25,15 @@ from levilab.present.document.blocks import (
 )
 from levilab.sweeps.adaptive import in_words, report_in
 from levilab.sweeps.axes import in_words as axis_in_words
-from levilab.sweeps.quantities import GROUPS, columns_of
-from levilab.sweeps.store import Store
-from levilab.sweeps.summary import columns_table, headline, points_table, summarise
+from levilab.sweeps.quantities import GROUPS, Observable, columns_of
+from levilab.sweeps.store import Map, Store
+from levilab.sweeps.summary import Summary, columns_table, headline, points_table, summarise
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-    from levilab.present.document.blocks import Block
     from levilab.present.style import Figure
-    from levilab.sweeps.quantities import Observable
-    from levilab.sweeps.store import Map
-    from levilab.sweeps.summary import Summary
 
 #: Columns that are drawn; a store with more has its figures beside it.
 MOST_FIGURES = 6

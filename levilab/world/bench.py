@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -10,28 +10,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from instruments.catalogue import CATALOGUE
-from instruments.clock import VirtualClock
+from instruments.clock import Clock, VirtualClock
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.protocol_levilab import plug_in
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import VirtualInstrument
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
-from levilab.bench.person import FloatTop, PlaceProbe, ShieldProbe
+from levilab.bench.person import FloatTop, PlaceProbe, ShieldProbe, Task
 from levilab.bench.wiring import Wiring
 from levilab.errors import list_known
 from levilab.world.pose import FLOATS_M
-from levilab.world.spin_world import SpinScene, SpinWorld
+from levilab.world.spin_world import SpinScene, SpinWorld, World
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
-
     from analysis.arrays import Array
-    from instruments.clock import Clock
     from instruments.virtual.counter.edges import Thresholds
-    from levilab.bench.person import Task
     from levilab.simulator.scene import Scene
     from levilab.world.motion_world import MotionWorld
-    from levilab.world.spin_world import World
 
 
 def virtual_settings(kind: str, name: str) -> InstrumentSettings:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from pyvisa import constants, rname
 from pyvisa.constants import EventAttribute, ResourceAttribute, StatusCode
-from pyvisa.highlevel import VisaLibraryBase
+from pyvisa.highlevel import ResourceInfo, VisaLibraryBase
 from pyvisa.util import LibraryPath
 
 from instruments.virtual.bench.serial_line import SerialLine
@@ -18,7 +18,6 @@ from instruments.virtual.core.line import LineSettings
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable
 
-    from pyvisa.highlevel import ResourceInfo
     from pyvisa.typing import VISARMSession, VISASession
 
     from instruments.virtual.bench.bench import VirtualBench

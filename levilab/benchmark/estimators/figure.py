@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from levilab.benchmark.estimators.study import AIMS, OURS
+from levilab.benchmark.estimators.study import AIMS, OURS, Score, Study
 from levilab.present.drawing import SMALL, headline, panel
 from levilab.present.looks import BLACK, BLUE, GREEN, PURPLE, SKY, VERMILION
 from levilab.present.style import STYLE, WIDE
@@ -16,7 +16,6 @@ from levilab.present.style import STYLE, WIDE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-    from levilab.benchmark.estimators.study import Score, Study
 
 #: Methods: colour, marker, line.
 LINES = {

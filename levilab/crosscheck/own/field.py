@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.field.fit import PARAMETERS, Prior, fit_scan
+from analysis.field.fit import PARAMETERS, FieldScan, Known, Prior, fit_scan
 from analysis.field.ring import on_axis
 from levilab.crosscheck.own.model import Own
 from levilab.crosscheck.subject import Trial, pull_of
 from levilab.texts.text import Text
 
 if TYPE_CHECKING:
-    from analysis.field.fit import FieldScan, Known
     from levilab.pipelines.field.analysis import FieldAnalysis
 
 #: Processor time of a trial, for each scan [s].

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from analysis.budget import rest
-from analysis.pulses import spin_of_times, spin_of_trace
-from analysis.rotation import spin_of_field
+from analysis.pulses import SpinFrequency, spin_of_times, spin_of_trace
+from analysis.rotation import FieldSpin, spin_of_field
 from analysis.uncertainty import Estimate
 from levilab.crosscheck.own.model import Own
 from levilab.crosscheck.subject import Trial, TrialFailed, pull_of
@@ -17,8 +17,6 @@ from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from analysis.arrays import Array
-    from analysis.pulses import SpinFrequency
-    from analysis.rotation import FieldSpin
     from levilab.pipelines.spin.analysis import SpinAnalysis
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from levilab.errors import LevilabError
-from levilab.live.practice.commands import PracticeEvent, RecordRun
+from levilab.live.practice.commands import Command, PracticeEvent, RecordRun
 from levilab.live.practice.process import PracticeOptions, work
 from levilab.telemetry.address import Address
 from levilab.workers.pool import Apart
@@ -17,7 +17,6 @@ from levilab.workers.pool import Apart
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from levilab.live.practice.commands import Command
 
 #: How long the process is waited for at the end [s].  A run under way ends with its reading; then the process is asked
 #: by a signal, and at last killed.  Without a run nothing can be lost, since the outputs are virtual: where it does not

@@ -17,10 +17,10 @@ from instruments.errors import InstrumentError
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.onlooker import Sent, counting_of, state_of
 from levilab.acquisition.request import AcquisitionOptions, request_at
-from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NoLight, last_count
-from levilab.bench.bench import open_bench
+from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NoLight, Session, last_count
+from levilab.bench.bench import Bench, open_bench
 from levilab.errors import LevilabError
-from levilab.interruption import watching_for_end
+from levilab.interruption import End, watching_for_end
 from levilab.live.practice import commands as ask
 from levilab.live.practice.commands import CommandRefused, Voice
 from levilab.live.practice.drive import GATE_S, TRIGGER_V, PracticeDrive
@@ -29,8 +29,8 @@ from levilab.live.practice.fall import cause_of_fall
 from levilab.live.practice.seeds import keys_of_seed, seed_of_group
 from levilab.live.practice.tasks import TASKS, Look, Tasks
 from levilab.live.practice.top import PracticeTop
-from levilab.simulator.scene import read_scene
-from levilab.telemetry.messages import State
+from levilab.simulator.scene import Scene, read_scene
+from levilab.telemetry.messages import Count, State
 from levilab.telemetry.publisher import Publisher
 from levilab.texts.text import Text, text_of
 from levilab.world.bench import scene_world
@@ -39,12 +39,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
     from multiprocessing.connection import Connection
 
-    from levilab.acquisition.session import Session
-    from levilab.bench.bench import Bench
     from levilab.bench.wiring import Wiring
-    from levilab.interruption import End
-    from levilab.simulator.scene import Scene
-    from levilab.telemetry.messages import Count
     from levilab.world.motion_world import MotionWorld
 
 #: Experiments for which a top has to be up when they begin; for `limit` the virtual person puts one back.

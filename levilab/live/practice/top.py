@@ -10,7 +10,7 @@ from levilab.live.practice.drive import GATE_S
 from levilab.live.practice.seeds import keys_of_seed
 from levilab.live.practice.what_if import USUAL, keys_of
 from levilab.simulator.compilation import announce_compilation
-from levilab.simulator.scene import read_scene
+from levilab.simulator.scene import Scene, read_scene
 from levilab.world.bench import scene_world, virtual_wiring
 
 if TYPE_CHECKING:
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from levilab.live.practice.commands import Voice
     from levilab.live.practice.experiments import PracticeExperiment
-    from levilab.simulator.scene import Scene
     from levilab.world.motion_world import MotionWorld
 
 #: Experiments that move the magnetometer's probe: where it stands, their readings say.

@@ -8,7 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
-from levilab.pipelines.hold.analysis import text_of
+from levilab.pipelines.hold.analysis import HoldAnalysis, text_of
 from levilab.present.drawing import headline, panel, synthetic_mark
 from levilab.present.looks import LOOKS
 from levilab.present.style import STYLE, WIDE
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from levilab.pipelines.hold.analysis import HoldAnalysis
 
 #: Where the drag over that of the best law is drawn: laws that are excluded leave it.
 _RATIOS = (0.9, 1.1)

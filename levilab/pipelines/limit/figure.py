@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from levilab.pipelines.limit.analysis import ISLANDS, LOWER_EDGE, RESONANCE, UPPER_EDGE
+from levilab.pipelines.limit.analysis import ISLANDS, LOWER_EDGE, RESONANCE, UPPER_EDGE, LimitAnalysis, Limits
 from levilab.present.drawing import SMALL, headline, panel, synthetic_mark
 from levilab.present.looks import BLACK, GREEN, GREY, LOOKS, MARKERS, ORANGE, PURPLE, SKY, VERMILION, YELLOW
 from levilab.present.numbers import with_uncertainty
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from analysis.arrays import Array
-    from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
 
 
 #: Of runs: colours that theory does not have.

@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from analysis.numbers import digits, with_minus
-from analysis.rotation import samples_of_line
-from levilab.pipelines.spin.analysis import MOST_DRAWN
+from analysis.rotation import FieldSpin, LineSamples, samples_of_line
+from levilab.pipelines.spin.analysis import MOST_DRAWN, SpinAnalysis, SpinRun
 from levilab.present.drawing import SMALL, band, headline, panel, synthetic_mark, write
 from levilab.present.looks import LOOKS
 from levilab.present.numbers import short_name, with_uncertainty
@@ -26,10 +26,8 @@ if TYPE_CHECKING:
 
     from analysis.arrays import Array
     from analysis.pulses import SpinFrequency
-    from analysis.rotation import FieldSpin, LineSamples
     from levilab.formats.waveforms.waveform import Waveform
     from levilab.pipelines.sources import Source
-    from levilab.pipelines.spin.analysis import SpinAnalysis, SpinRun
     from levilab.pipelines.spin.readings import Records
 
 

@@ -36,7 +36,7 @@ from levilab.pipelines.spindown.words import (
     verdict_of_run,
 )
 from levilab.present.clock import with_clock
-from levilab.present.document.blocks import Details, Listing, Note, Paragraph, Points, Tabular
+from levilab.present.document.blocks import Block, Details, Listing, Note, Paragraph, Points, Tabular
 from levilab.present.numbers import (
     column,
     enumeration,
@@ -67,7 +67,6 @@ if TYPE_CHECKING:
     from levilab.pipelines.sources import Source
     from levilab.pipelines.spindown.analysis import SpinDownAnalysis
     from levilab.pipelines.spindown.readings import SpinReadings
-    from levilab.present.document.blocks import Block
 
 
 #: Laws of one power, and the power, in its order.

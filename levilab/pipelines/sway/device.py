@@ -17,7 +17,7 @@ from levilab.errors import DataError
 from levilab.formats.device import Device
 from levilab.pipelines.field.device import inertias, parts_of
 from levilab.pipelines.field.document import FIELD
-from levilab.pipelines.options import FieldOptions
+from levilab.pipelines.options import FieldOptions, SwayOptions
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import scene_of
 from levilab.texts.text import Text
@@ -25,7 +25,6 @@ from levilab.texts.text import Text
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from levilab.pipelines.options import SwayOptions
     from levilab.pipelines.sources import Source
     from levilab.pipelines.sway.readings import SwayReadings
 

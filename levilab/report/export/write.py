@@ -16,7 +16,7 @@ import numpy as np
 
 from levilab.errors import LevilabError, UsageError
 from levilab.files import CannotWrite, check_writable, replace_atomically, writing
-from levilab.report.export.contents import attributes_of, variables_of
+from levilab.report.export.contents import Column, Contents, Table, attributes_of, variables_of
 from levilab.report.export.endings import ENDINGS
 from levilab.runs.package import field, package, resource
 from levilab.software import how_to_install
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     import pandas as pd
-
-    from levilab.report.export.contents import Column, Contents, Table
 
 
 class MissingH5py(LevilabError):

@@ -13,6 +13,7 @@ from levilab.files import check_writable
 from levilab.pipelines.sources import OTHER_COLUMNS, LeftOut
 from levilab.pipelines.suits import recall_suiting, remarks
 from levilab.present.document.blocks import (
+    Block,
     Details,
     Document,
     Fact,
@@ -34,6 +35,8 @@ from levilab.report.groups.beside import (
     GOOD,
     LOOK,
     REPEAT,
+    Class,
+    Compared,
     agreement,
     class_of,
     count_readings,
@@ -52,9 +55,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from analysis.uncertainty import Estimate
-    from levilab.present.document.blocks import Block
     from levilab.present.style import Figure
-    from levilab.report.groups.beside import Class, Compared
 
 
 #: Rows of groups by their marks.

@@ -12,7 +12,7 @@ from levilab.present.drawing import SMALL, headline, in_mathtext, panel, synthet
 from levilab.present.looks import BLUE, GREEN, VERMILION
 from levilab.present.style import STYLE, WIDE, label_of_run
 from levilab.present.units import unit
-from levilab.report.groups.beside import finding
+from levilab.report.groups.beside import Class, Compared, Group, finding
 from levilab.texts.text import in_language
 
 if TYPE_CHECKING:
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
     from matplotlib.axes import Axes
 
-    from levilab.report.groups.beside import Class, Compared, Group
 
 #: Left edge of the panels, their right edge, from panel to panel, above them, below them, and a group's row [inch].
 _LEFT, _RIGHT, _GAP, _HEAD, _FOOT, _ROW = 1.75, 6.85, 0.25, 0.85, 0.55, 0.135

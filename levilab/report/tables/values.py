@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from levilab.files import replace_atomically, writing
-from levilab.pipelines.row import Column, plain, text_of
-from levilab.present.document.blocks import Banner, Details, Section, Tabular
+from levilab.pipelines.row import Cell, Column, plain, text_of
+from levilab.present.document.blocks import Banner, Block, Details, Document, Section, Tabular
 from levilab.present.units import split
 from levilab.report.tables.latex import as_latex, title_of
 
@@ -19,9 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from levilab.pipelines.document import Analysis
-    from levilab.pipelines.row import Cell
     from levilab.pipelines.sources import Source
-    from levilab.present.document.blocks import Block, Document
 
 
 #: A spreadsheet takes a text that begins with one of these for a formula.
