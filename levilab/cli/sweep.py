@@ -11,7 +11,7 @@ import typer
 from levilab.cli.options import SCENES, Json, Settings, argument, flag, named_scene, option, place, quantity
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.errors import DataError, UsageError, WorkersLost
-from levilab.texts.text import Text
+from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
@@ -154,10 +154,10 @@ def _compute(store: Store, cores: int | None, scheduler: str | None) -> bool:
 
     total = store.plan.chunk_count
     if store.done == total:
-        message(f"{store.path} is complete: nothing is left to compute")
+        message(Text("{path:s} is complete: nothing is left to compute", path=store.path))
         return False
     if store.done:
-        message(f"going on: {store.done} of {total} chunks are done")
+        message(Text("going on: {n} of {all} chunks are done", n=store.done, all=total))
     for note in store.notes():
         message(f"note: {note}")
 
@@ -205,13 +205,18 @@ def _show(store: Store, *, as_json: bool) -> list[Path]:
 
     result(headline(summary))
     for line in axes_lines(summary):
-        result(f"  {line}")
+        result(Text("  {line}", line=line))
     console = terminal()
     console.print(draw(columns_table(summary)))
     if len(store.plan.shape) == 1 and store.plan.size <= FEW_POINTS:
         console.print(draw(points_table(store.load())))
     for sentence in in_words(report, store.plan) if report else ():
-        console.print(f"• {sentence}", markup=False)
+        console.print(f"• {in_language(sentence)}", markup=False)
     if summary.points < store.plan.size:
-        message(f"{summary.points} of {store.plan.size} points are known; levilab sweep {store.path} --resume goes on")
+        message(
+            Text(
+                "{n} of {all} points are known; levilab sweep {path:s} --resume goes on",
+                n=summary.points, all=store.plan.size, path=store.path,
+            )
+        )  # fmt: skip
     return pictures

@@ -35,6 +35,7 @@ from levilab.sweeps.refinement import (
 )
 from levilab.sweeps.run import Task, compute
 from levilab.sweeps.store import COMPUTED, DONE, FILLED, STATUS, Store, as_text
+from levilab.texts.text import Sentences, Text
 from levilab.workers import Done, Workers, results_of
 
 #: Attributes of the store: the settings of the refinement, and its report.
@@ -258,22 +259,31 @@ def in_words(report: dict[str, Any], plan: Plan) -> list[str]:
     *_, judge = report["audits"]
     wrong = sum(audit["wrong"] for audit in report["audits"])
     count = sum(audit["computed"] for audit in report["audits"])
-    size = " by ".join(
+    sides = (
         step_in_words(axis.key, axis.values, stride, logarithmic=axis.scale == "log")
         for stride, axis in zip(report["strides"], plan.axes, strict=True)
     )
-    share, limit = f"{100 * report['saved']:.0f} %", f"{100 * report['most_wrong_share']:.2g} %"
-    checked = f"{count} of those filled in were checked at random: {wrong} {'was' if wrong == 1 else 'were'} wrong"
-    sure = (
-        f"with {100 * report['confidence']:.0f} % confidence at most {report['most_wrong']} ({limit}) of the "
-        f"{report['filled']} filled in are wrong: {judge['wrong']} of {judge['computed']} were in the last check"
-    )
     return [
-        f"{report['computed']} of {report['points']} points were computed, {share} were filled in",
-        checked + (", and their surroundings were computed" if wrong else ""),
-        sure,
-        f"an island that holds a box of {size} is sure to be seen, a smaller one by chance alone",
-    ]
+        Text(
+            "{computed} of {points} points were computed, {share:.0f} % were filled in.",
+            computed=report["computed"], points=report["points"], share=100 * report["saved"],
+        ),
+        Text(
+            "{count} points that were filled in were checked at random, {wrong} of them wrong{then}.",
+            count=count, wrong=wrong, then=", and their surroundings were computed" if wrong else "",
+        ),
+        Text(
+            "With {confidence:.0f} % confidence at most {most} ({limit:n} %) of the {filled} filled in are wrong: "
+            "{wrong} of {computed} were in the last check.",
+            confidence=100 * report["confidence"], most=report["most_wrong"],
+            limit=f"{100 * report['most_wrong_share']:.2g}", filled=report["filled"], wrong=judge["wrong"],
+            computed=judge["computed"],
+        ),
+        Text(
+            "An island that holds a box of {size} is sure to be seen, a smaller one by chance alone.",
+            size=Sentences(*sides, between=" × "),
+        ),
+    ]  # fmt: skip
 
 
 def report_in(store: Store) -> dict[str, Any] | None:

@@ -19,6 +19,7 @@ from levilab.simulator.start import start_of
 from levilab.simulator.varied import broadcast
 from levilab.sweeps.keys import value_at
 from levilab.sweeps.plan import Axis, Scale, unit_of
+from levilab.texts.text import Text
 
 #: Dimensions of a map: one with more can neither be drawn nor computed in reasonable time.
 MOST_AXES = 3
@@ -314,11 +315,14 @@ def in_words(axis: Axis) -> str:
     >>> in_words(parse_axis("top.mass_kg=0.025:0.0255:11"))
     'top.mass_kg from 0.025 to 0.0255 kg, 11 values'
     """
-    count = "1 value" if len(axis.values) == 1 else f"{len(axis.values)} values"
+    count = Text("{n} values", n=len(axis.values)) if len(axis.values) > 1 else "1 value"
     if axis.values.dtype.kind != "f":
-        return f"{axis.key}: {', '.join(sorted(set(axis.values.tolist())))}; {count}"
+        names = ", ".join(sorted(set(axis.values.tolist())))
+        return Text("{key:s}: {names:s}; {count}", key=axis.key, names=names, count=count)
     unit = unit_of(axis.key)
-    spaced = ", logarithmic" if axis.scale == "log" else ""
+    spaced = Text("{count}, logarithmic", count=count) if axis.scale == "log" else count
     least, most = axis.values.min(), axis.values.max()
-    ends = f"from {least:g} to {most:g}" if most > least else f"{least:g}"
-    return f"{axis.key} {ends}{'' if unit == '1' else ' ' + unit}, {count}{spaced}"
+    ends = Text("from {least:g} to {most:g}", least=least, most=most) if most > least else f"{least:g}"
+    return Text(
+        "{key:s} {ends:n}{unit}, {count}", key=axis.key, ends=ends, unit="" if unit == "1" else f" {unit}", count=spaced
+    )

@@ -20,6 +20,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
 
+from analysis.numbers import digits
 from levilab.errors import UsageError
 from levilab.motion.lock import LAST_SHARE
 from levilab.motion.summary import changing_energy
@@ -29,6 +30,7 @@ from levilab.present.style import STYLE, WIDE
 from levilab.simulator.equilibrium import stability_of, windows_over
 from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
 from levilab.sweeps.quantities import quantity_of, step_in_words
+from levilab.texts.text import Sentences, Text, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -341,7 +343,7 @@ def _draw_spin_at_the_start(axes: Axes, scene: Scene) -> list[Artist]:
     if not low < spin < high:
         return []
     _draw_rim(axes, x=spin)
-    return [axes.axvline(spin, label=f"spin at the start, {spin:g} Hz", **DASHED)]
+    return [axes.axvline(spin, label=Text("spin at the start, {spin:g} Hz", spin=spin), **DASHED)]
 
 
 def _draw_window(axes: Axes, theory: _Theory) -> list[Artist]:
@@ -366,10 +368,10 @@ def _draw_adiabatic(axes: Axes, theory: _Theory, view: _View) -> list[Artist]:
     """Draw where the masses, or the heights, end at which a fast top floats."""
     if view.y.key == MASS:
         regions = [(window.light, window.heavy) for window in theory.lifted]
-        label = "masses that float (adiabatic)"
+        label = "masses that float (adiabatic): {said} {unit}"
     elif view.y.key == HEIGHT:
         regions = [(window.low, window.high) for window in theory.lifted]
-        label = "heights that are stable (adiabatic)"
+        label = "heights that are stable (adiabatic): {said} {unit}"
     else:
         return []
     quantity, (low, high) = quantity_of(view.y.key), axes.get_ylim()
@@ -378,8 +380,8 @@ def _draw_adiabatic(axes: Axes, theory: _Theory, view: _View) -> list[Artist]:
     for place in [place for region in shown for place in region if low < place < high]:
         _draw_rim(axes, y=place)
         axes.axhline(place, **DASHED)
-    said = " and ".join(f"{a:.2f} to {b:.2f}" for a, b in shown)
-    return [Line2D([], [], **DASHED, label=f"{label}: {said} {quantity.unit}")] if shown else []
+    said = tuple(Text("{a:.2f} to {b:.2f}", a=a, b=b) for a, b in shown)
+    return [Line2D([], [], **DASHED, label=Text(label, said=said, unit=quantity.unit))] if shown else []
 
 
 def _draw_rim(axes: Axes, *, x: float | None = None, y: float | None = None) -> None:
@@ -398,19 +400,21 @@ def _draw_thesis(axes: Axes, plan: Plan) -> list[Artist]:
     low, high = axes.get_xlim()
     artists: list[Artist] = []
     for spin, dashes, label in (
-        (MEASURED_HZ, "dashdot", f"thesis, measured: lower limit {MEASURED_HZ} ± {MEASURED_U_HZ} Hz"),
-        (HIGHEST_HZ, "dotted", f"thesis, measured: highest locked spin, about {HIGHEST_HZ:g} Hz"),
+        (MEASURED_HZ, "dashdot", "thesis, measured: lower limit {spin} ± {u} Hz"),
+        (HIGHEST_HZ, "dotted", "thesis, measured: highest locked spin, about {spin:g} Hz"),
     ):
         if low < spin < high:
             _draw_rim(axes, x=spin)
-            artists.append(axes.axvline(spin, color=PURPLE, linewidth=1.3, linestyle=dashes, label=label))
+            said = Text(label, spin=spin, u=MEASURED_U_HZ)
+            artists.append(axes.axvline(spin, color=PURPLE, linewidth=1.3, linestyle=dashes, label=said))
     simulated = [spin for pair in SIMULATED_HZ.values() for spin in pair if low < spin < high]
     if simulated:
         style: Any = {"color": PURPLE, "marker": "v", "markersize": 5, "linestyle": "none"}
         axes.plot(
             simulated, np.full(len(simulated), 1.02), transform=axes.get_xaxis_transform(), clip_on=False, **style
         )
-        artists.append(Line2D([], [], **style, label=f"thesis, simulated: limits of {', '.join(SIMULATED_HZ)}"))
+        said = Text("thesis, simulated: limits of {names:s}", names=", ".join(SIMULATED_HZ))
+        artists.append(Line2D([], [], **style, label=said))
     return artists
 
 
@@ -446,7 +450,7 @@ def _draw_colour_bar(figure: Figure, box: tuple[float, float, float], norm: Norm
 
 def _kind_patches(kinds: NDArray[Any], numbers: Array, column: str, plan: Plan) -> list[Artist]:
     meanings = {kind: one.meaning for kind, one in KINDS.items()}
-    meanings[UP] = f"still up after {plan.duration_s:g} s"
+    meanings[UP] = Text("still up after {seconds:g} s", seconds=plan.duration_s)
     if column == "locked":
         meanings |= {UP: "locked to the drive", LOST: "not locked"}
         meanings |= {UP_FILLED: "filled in: locked", LOST_FILLED: "filled in: not locked"}
@@ -462,25 +466,28 @@ def _kind_patches(kinds: NDArray[Any], numbers: Array, column: str, plan: Plan) 
 
 
 def _headline(found: Map, column: str) -> str:
-    name = (found.plan.scene.name or "the scene").replace("$", r"\$")[:50]
-    size, after = found.computed.size, f"after {found.plan.duration_s:g} s"
-    if column == "survived":
-        return f"{name}: {np.count_nonzero(found.values[column])} of {size} tops are still up {after}"
-    if column == "locked":
-        return f"{name}: {np.count_nonzero(found.values[column])} of {size} tops are locked to the drive {after}"
-    return f"{name}: {quantity_of(column).name}, of {size} tops in {found.plan.duration_s:g} s"
+    name = (found.plan.scene.name or "scene").replace("$", r"\$")[:50]
+    said = {
+        "survived": "{scene:s}: {n} of {size} tops are still up after {seconds:g} s",
+        "locked": "{scene:s}: {n} of {size} tops are locked to the drive after {seconds:g} s",
+    }.get(column, "{scene:s}: {quantity}, of {size} tops in {seconds:g} s")
+    n, called = np.count_nonzero(found.values[column]), quantity_of(column).name
+    size, seconds = found.computed.size, found.plan.duration_s
+    return Text(said, scene=name, n=n, quantity=called, size=size, seconds=seconds)
 
 
 def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) -> list[str]:
     wide, high = (_step(axis) for axis in (view.x, view.y))
-    cell = f"Each cell is one top, simulated for {found.plan.duration_s:g} s, and spans {wide} by {high}"
-    said = [f"{cell}: a limit is known no better."]
-    if view.panels is not None and len(view.chosen) < len(view.panels.values):
-        said.append(f"{len(view.chosen)} of {len(view.panels.values)} values of the third axis are shown.")
-    said += [f"{text[0].upper()}{text[1:]}".removesuffix(".") + "." for text in sentences]
-    if found.filled is None and not found.computed.all():
-        said.append(f"{np.count_nonzero(~found.computed)} of {found.computed.size} points are not computed yet.")
-    text = " ".join(said).replace(" %", "\N{NO-BREAK SPACE}%")
+    cell = Text(
+        "Each cell is one top, simulated for {seconds:g} s, and spans {wide} × {high}: a limit is known no better.",
+        seconds=found.plan.duration_s, wide=wide, high=high,
+    )  # fmt: skip
+    said = [cell, *sentences]
+    if view.panels is not None and len(view.chosen) < (values := len(view.panels.values)):
+        said.append(Text("{n} of {all} values of the third axis are shown.", n=len(view.chosen), all=values))
+    if found.filled is None and (left := np.count_nonzero(~found.computed)):
+        said.append(Text("{left} of {all} points are not computed yet.", left=left, all=found.computed.size))
+    text = in_language(Sentences(*said)).replace(" %", "\N{NO-BREAK SPACE}%")
     return textwrap.wrap(text, round(15.6 * width))
 
 
@@ -491,13 +498,18 @@ def _step(axis: Axis) -> str:
 def _reading_sentences(plan: Plan, view: _View, column: str, lines: Sequence[Artist]) -> list[str]:
     if column == "locked":
         slowest = 1 / (LAST_SHARE * plan.duration_s)
-        said = "Locked: the top is up, and its body slipped by no turn behind the drive in the last half of the time"
-        return [f"{said}; a slip slower than {slowest:.2g} Hz would not show"]
+        return [
+            Text(
+                "Locked: the top is up, and its body slipped by no turn behind the drive in the last half of the time; "
+                "a slip slower than {slowest:n} Hz would not show.",
+                slowest=digits(slowest),
+            )
+        ]
     if view.x.key != SPIN or not lines:
         return []
     said = (
         "Between the orange lines small motions stay small. A top that is lost there started too far from its place "
-        "for its spin; one that is up outside would take longer to be lost, or swings on a wider path"
+        "for its spin; one that is up outside would take longer to be lost, or swings on a wider path."
     )
     left_out = changing_energy(plan.scene)
-    return [said, *([f"The lines leave out what the scene has: {', '.join(left_out)}"] if left_out else [])]
+    return [said, *([Text("The lines leave out effects of the scene: {names}.", names=left_out)] if left_out else [])]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from levilab.errors import UsageError
 from levilab.present.units import split, unit
 from levilab.simulator.keys import nearest
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -179,6 +180,8 @@ def step_in_words(key: str, values: NDArray[Any], count: int = 1, *, logarithmic
     """
     quantity, steps = quantity_of(key), len(values) - 1
     if logarithmic:
-        return f"a factor {(values[-1] / values[0]) ** (count / steps):.3g} ({quantity.name})"
+        factor = (values[-1] / values[0]) ** (count / steps)
+        return Text("a factor {factor:.3g} ({quantity})", factor=factor, quantity=quantity.name)
     step = abs(values[-1] - values[0]) * quantity.factor * count / steps
-    return f"{f'{step:.3g} {quantity.unit}'.strip()} ({quantity.name})"
+    unit = f" {quantity.unit}" if quantity.unit else ""
+    return Text("{step:.3g}{unit} ({quantity})", step=step, unit=unit, quantity=quantity.name)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from analysis.numbers import digits
 from levilab.files import writing
 from levilab.motion.report import SYNTHETIC, command_text, scene_blocks
 from levilab.present.document.blocks import (
@@ -28,6 +29,7 @@ from levilab.sweeps.axes import in_words as axis_in_words
 from levilab.sweeps.quantities import GROUPS, Observable, columns_of
 from levilab.sweeps.store import Map, Store
 from levilab.sweeps.summary import Summary, columns_table, headline, points_table, summarise
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -54,17 +56,17 @@ def sweep_section(path: Path) -> Section:
     explained: tuple[Block, ...] = (Note("Points that were filled in:"), Bullets(tuple(filled))) if filled else ()
     blocks: list[Block] = [
         SYNTHETIC,
-        Verdict(f"{headline(summary)}."),
+        Verdict(Text("{what}.", what=headline(summary))),
         *_warnings(store, summary),
         *_figures(store, filled),
-        Tabular("sweep-columns", columns_table(summary), "least, mean and greatest over the points that have a value"),
+        Tabular("sweep-columns", columns_table(summary), "Least, mean and greatest over the points that have a value."),
         *_points(store),
         *explained,
         Section("What was simulated", scene_blocks(store.plan.scene, tuple(_facts(store)))),
         Section("How to reproduce it", tuple(_reproduction(store))),
     ]
-    name = store.plan.scene.name or "a scene without a name"
-    return Section(f"Sweep: {name}", tuple(blocks), "sweep", path.name, new_page=True)
+    name = store.plan.scene.name or "scene"
+    return Section(Text("Sweep: {name:s}", name=name), tuple(blocks), "sweep", path.name, new_page=True)
 
 
 def sweep_values(path: Path) -> tuple[tuple[str, ...], tuple[tuple[Any, ...], ...]] | None:
@@ -89,7 +91,10 @@ def _cell(value: Any) -> Any:
 
 def _warnings(store: Store, summary: Summary) -> Iterator[Warnings]:
     if left := store.plan.size - summary.points:
-        text = f"{left} of {store.plan.size} points are not computed; levilab sweep {store.path} --resume goes on"
+        text = Text(
+            "{left} of {all} points are not computed; levilab sweep {path:s} --resume goes on",
+            left=left, all=store.plan.size, path=store.path,
+        )  # fmt: skip
         yield Warnings(((text,),))
 
 
@@ -97,14 +102,15 @@ def _figures(store: Store, notes: Sequence[str]) -> Iterator[Block]:
     if (drawn := load_drawn(store)) is None:
         return
     found, columns = drawn
-    axes = " and ".join(axis.key for axis in store.plan.axes)
+    axes = " × ".join(axis.key for axis in store.plan.axes)
     for column in columns[:MOST_FIGURES]:
-        title = f"{column.name} over {axes}, SYNTHETIC."
-        alt = f"Map of {column.name} over {axes}"
+        title = Text("{column:s} over {axes:s}, SYNTHETIC.", column=column.name, axes=axes)
+        alt = Text("Map of {column:s} over {axes:s}", column=column.name, axes=axes)
         draw = partial(_draw, found, column.name, tuple(notes))
         yield Picture(f"sweep-{column.name.replace('_', '-')}", title, column.meaning, alt, draw)
     if len(columns) > MOST_FIGURES:
-        yield Note(f"{len(columns) - MOST_FIGURES} more columns are not drawn here; levilab sweep draws all of them.")
+        left = len(columns) - MOST_FIGURES
+        yield Note(Text("{n} more columns are not drawn here; levilab sweep draws all of them.", n=left))
 
 
 def _draw(found: Map, column: str, notes: Sequence[str]) -> Figure:
@@ -123,10 +129,12 @@ def _points(store: Store) -> Iterator[Block]:
 def _facts(store: Store) -> Iterator[Fact]:
     plan = store.plan
     yield Fact("Axes", tuple(axis_in_words(axis) for axis in plan.axes))
-    yield Fact("Length", (f"each motion up to {plan.duration_s:g} s",))
-    step = "chosen in each chunk" if plan.step_share is None else f"{plan.step_share:g} of the longest one"
-    yield Fact("Accuracy", (f"wanted error at the end {plan.tolerance:g}, in m and in rad; step {step}",))
-    yield Fact("Cost", (f"{plan.chunk_count} chunks, {store.done} of them computed",))
+    yield Fact("Length", (Text("each motion up to {seconds:g} s", seconds=plan.duration_s),))
+    longest = "the longest step that each chunk allows"
+    step = longest if plan.step_share is None else Text("{share:g} of the longest step", share=plan.step_share)
+    wanted = Text("wanted error at the end {error:n}, in m and in rad; {step}", error=digits(plan.tolerance), step=step)
+    yield Fact("Accuracy", (wanted,))
+    yield Fact("Cost", (Text("{n} chunks, {done} of them computed", n=plan.chunk_count, done=store.done),))
 
 
 def _reproduction(store: Store) -> Iterator[Block]:
@@ -139,7 +147,8 @@ def _reproduction(store: Store) -> Iterator[Block]:
         facts.append(Fact("Software", (", ".join(f"{name} {version}" for name, version in software.items()),)))
     if isinstance(processor, dict) and "name" in processor:
         facts.append(Fact("Processor", (str(processor["name"]),)))
-    facts.append(Fact("When", (f"begun {str(store.group.attrs.get('created_utc', '—'))[:19].replace('T', ' ')} UTC",)))
+    begun = str(store.group.attrs.get("created_utc", "—"))[:19].replace("T", " ")
+    facts.append(Fact("When", (Text("begun {time:s} UTC", time=begun),)))
     yield Facts(tuple(facts))
     yield Note("On a processor of the same kind the same command gives the same numbers to the last digit.")
 

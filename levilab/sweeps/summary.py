@@ -14,6 +14,7 @@ from levilab.sweeps.axes import in_words
 from levilab.sweeps.plan import Plan, unit_of
 from levilab.sweeps.quantities import Observable, columns_of
 from levilab.sweeps.store import Map, Store
+from levilab.texts.text import Text
 
 
 @dataclass(frozen=True)
@@ -107,9 +108,14 @@ FEW_POINTS = 40
 def headline(summary: Summary) -> str:
     """Return what was swept, in a line."""
     plan = summary.plan
-    size = f"{' × '.join(map(str, plan.shape))} point{'s' if plan.size > 1 else ''}"
-    done = "" if summary.points == plan.size else f", {summary.points} of them computed"
-    return f"{plan.scene.name or 'the scene'}: {size}{done}, each up to {plan.duration_s:g} s"
+    return Text(
+        "{scene:s}: {size} {points}{done}, each up to {seconds:g} s",
+        scene=plan.scene.name or "scene",
+        size=" × ".join(map(str, plan.shape)),
+        points="points" if plan.size > 1 else "point",
+        done="" if summary.points == plan.size else Text(", {n} of them computed", n=summary.points),
+        seconds=plan.duration_s,
+    )
 
 
 def axes_lines(summary: Summary) -> list[str]:
@@ -127,8 +133,8 @@ def columns_table(summary: Summary) -> Table:
 def _row(one: ColumnSummary, points: int) -> tuple[str, ...]:
     meaning = one.column.meaning
     if one.column.dtype == "bool":
-        yes = round(one.mean * one.defined) if one.defined else 0
-        return (one.column.name, "", f"{100 * one.mean:.1f} %" if points else "", "", f"{yes} of {points}", meaning)
+        yes = Text("{yes} of {points}", yes=round(one.mean * one.defined) if one.defined else 0, points=points)
+        return (one.column.name, "", f"{100 * one.mean:.1f} %" if points else "", "", yes, meaning)
     numbers = (_number(value) for value in (one.least, one.mean, one.greatest))
     return (one.column.name, *numbers, str(one.defined), meaning)
 

@@ -28,7 +28,7 @@ from levilab.sweeps.plan import unit_of
 from levilab.sweeps.quantities import columns_of, quantity_of
 from levilab.sweeps.store import Store
 from levilab.texts.note import kind_of
-from levilab.texts.text import Text
+from levilab.texts.text import ENGLISH, Text, in_language
 
 Results = Sequence[tuple[Analysis[Any], Any]]
 
@@ -367,7 +367,7 @@ def _of_sweep(store: Store) -> Contents:
         "plan": json.dumps(plan.as_table(), ensure_ascii=False),
     }
     table = Table("points", tuple(rows), "a point of the map")
-    return Contents(name, headline(summarise(store)), (table,), about, axes=grid, arrays=arrays)
+    return Contents(name, in_language(headline(summarise(store)), ENGLISH), (table,), about, axes=grid, arrays=arrays)
 
 
 def free_name(name: str, taken: set[str]) -> str:

@@ -50,8 +50,8 @@ def test_a_map_with_islands_agrees_with_the_full_one_within_its_limit():
     assert report["saved"] > 0.2
     assert np.all(np.isnan(found.values["lifetime_s"][found.filled]))
     said = " ".join(in_words(report, asked))
-    assert "with 95 % confidence at most" in said
-    assert "a box of 3.2 Hz (spin at the start) by 0.08 g (mass) is sure to be seen" in said
+    assert "With 95 % confidence at most" in said
+    assert "a box of 3.2 Hz (spin at the start) × 0.08 g (mass) is sure to be seen" in said
 
 
 def test_the_result_does_not_depend_on_the_workers(monkeypatch):

@@ -58,7 +58,7 @@ def test_spin_and_mass_have_both_windows_and_the_limits_of_the_thesis():
     assert edges == pytest.approx([21.65, 80.6], abs=0.1)  # PHYSICS: at 7.30 cm, where 25.26 g float
     assert legend(figure)[:2] == ["still up after 10 s", "lost before"]
     assert "masses that float (adiabatic): 24.74 to 25.48 g" in legend(figure)
-    assert "2 Hz (spin at the start) by 0.1 g (mass): a limit is known no better." in caption(figure)
+    assert "2 Hz (spin at the start) × 0.1 g (mass): a limit is known no better." in caption(figure)
     other = map_figure(a_map(MASS, SPIN, scene=UNDRIVEN.changed({"top.moment_a_m2": -0.715})))
     assert not any("thesis" in text for text in legend(other))
 
@@ -95,7 +95,7 @@ def test_lost_tops_are_hatched_and_only_these():
 
 
 def test_filled_points_are_paler_and_the_report_is_below():
-    figure = map_figure(a_map(MASS, SPIN, adaptive=True), notes=["5 of 9 points were computed", "few are wrong"])
+    figure = map_figure(a_map(MASS, SPIN, adaptive=True), notes=["5 of 9 points were computed.", "Few are wrong."])
     assert legend(figure)[:4] == [
         "still up after 10 s", "filled in: still up", "lost before", "filled in: lost before",
     ]  # fmt: skip
