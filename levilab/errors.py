@@ -23,6 +23,15 @@ class LevilabError(Exception):
 _QUANTITY = re.compile(r"`([a-z]\w*)`")
 
 
+def as_typed(path: object) -> str:
+    """Return a path as it is typed in a command, on any system.
+
+    >>> as_typed("my.csv"), as_typed("Raw Data.csv")
+    ('my.csv', '"Raw Data.csv"')
+    """
+    return f'"{path}"' if set(str(path)) & set(" &;()") else str(path)
+
+
 def unquote(text: str) -> str:
     """Return a message without its backquotes, for a file: its reader may not use the command line.
 

@@ -13,7 +13,7 @@ from levilab.cli.later import Later, NamedLast
 from levilab.cli.options import Json, Language, Paths, existing_path, flag, folder, number, option, place
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
-from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError
+from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError, as_typed
 from levilab.pipelines.options import DEFAULTS, KINDS, OPTIONS, Option, options_of, read_options, typed_name
 from levilab.texts.text import Text, text_of
 
@@ -291,7 +291,7 @@ def _advice(tried: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, A
         if names and tried not in found:
             *first, last = names
             either = Text("{first:s} or {last:s}" if first else "{last:s}", first=(*first,), last=last)
-            return Text("; levilab analyze {names} {path:s} reads it", names=either, path=path)
+            return Text("; levilab analyze {names} {path:s} reads it", names=either, path=as_typed(path))
     return ""
 
 

@@ -16,6 +16,7 @@ from levilab.cli.later import Later
 from levilab.cli.options import speak_from
 from levilab.cli.output import message, silence
 from levilab.cli.quantities import APPLICATION, command_of, in_options
+from levilab.errors import as_typed
 from levilab.texts.text import Sentences, Text, in_language
 
 
@@ -38,7 +39,7 @@ class Commands(typer.core.TyperGroup):
             name, *rest = args
             if os.path.exists(name):  # noqa: PTH110 - without pathlib's import
                 text = "{name:s} is a file or a folder, and no command: take levilab analyze {path:s}"
-                ctx.fail(Text(text, name=name, path=name))
+                ctx.fail(Text(text, name=name, path=as_typed(name)))
             if meant := _MEANT.get(name.casefold()) or _of_another_command(name.casefold()):
                 text = "No such command '{name:s}': take levilab {words:s}"
                 ctx.fail(Text(text, name=name, words=" ".join([meant, *rest])))

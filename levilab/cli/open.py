@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 from levilab.cli.analyze import takes_options, write_and_print
 from levilab.cli.options import Json, Language, argument, existing_paths, flag, place
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
-from levilab.errors import NoneUsable, UsageError
+from levilab.errors import NoneUsable, UsageError, as_typed
 from levilab.pipelines.options import OF_FILES, read_options
 from levilab.texts.text import Text, in_language
 
@@ -56,7 +56,7 @@ def open_files(
     _print_looks(looks, as_json=as_json)
     readable = [look.path for look in looks if not look.problem]
     for path in readable if keep else []:
-        message(f"kept in {write_correction(path, options)}")
+        message(Text("kept in {path:s}", path=write_correction(path, options)))
     if shows:
         _serve([(path, options) for path in files], language)
     if not readable:
@@ -80,8 +80,8 @@ def _analyze(paths: "Sequence[Path]", options: "Mapping[str, Any]") -> None:
     with interruptible("nothing is shown"):
         results = analyze_suiting(paths, options, left_out.append)
     write_and_print(results, left_out, save=False, out=None, as_json=False, tables=False)
-    same = " with the same options" if options else ""
-    message(f"all numbers, and a figure beside the file: levilab analyze {' '.join(map(str, paths))}{same}")
+    text = "all numbers, and a figure beside the file: levilab analyze {paths:s}{same}"
+    message(Text(text, paths=" ".join(map(as_typed, paths)), same=" with the same options" if options else ""))
 
 
 def _report(paths: "Sequence[Path]", options: "Mapping[str, Any]", output: Path) -> None:
@@ -115,7 +115,7 @@ def _print_looks(looks: "Sequence[Look]", *, as_json: bool) -> None:
     for look in looks:
         _print_look(look)
         if look.problem and len(looks) > 1:
-            message(f"not read: {look.problem}")
+            message(Text("not read: {problem}", problem=look.problem))
 
 
 def _print_look(look: "Look") -> None:
@@ -123,7 +123,6 @@ def _print_look(look: "Look") -> None:
     from levilab.pipelines.look import QUANTITIES
     from levilab.present.tables import table
     from levilab.present.terminal import draw, terminal
-    from levilab.texts.text import Text
 
     console = terminal()
     for run in look.runs:
@@ -149,9 +148,9 @@ def _unit_of(column: "UnderstoodColumn") -> str:
     from levilab.formats.titles import unit_factor
 
     if not column.inverse:
-        return f"{column.unit}, differences" if column.unit == "turns" else column.unit
+        return Text("{unit}, differences", unit=column.unit) if column.unit == "turns" else column.unit
     turns = round((unit_factor(column.unit, "time") or column.factor) / column.factor)
-    return f"{column.unit} a turn" if turns == 1 else f"{column.unit} for {turns} turns"
+    return Text("{unit} a turn" if turns == 1 else "{unit} for {turns} turns", unit=column.unit, turns=turns)
 
 
 def _print_doubts(look: "Look", run: "UnderstoodRun") -> None:
@@ -161,7 +160,7 @@ def _print_doubts(look: "Look", run: "UnderstoodRun") -> None:
 
     console = terminal()
     for text in run.warnings:
-        console.print(f"[yellow]{in_language('note')}:[/yellow] {escape(in_language(text))}")
+        console.print(escape(in_language(Text("note: {text}", text=text))))
     for doubt in run.doubts:
         console.print(f"[yellow]{in_language('question')}:[/yellow] {escape(in_language(doubt.text))}")
         answers = [
@@ -171,6 +170,6 @@ def _print_doubts(look: "Look", run: "UnderstoodRun") -> None:
             keys = dict.fromkeys(key for choice in doubt.choices for key in choice.columns)
             answers = [("by their numbers", ",".join(f"{key}=NUMBER" for key in keys))]
         for text, columns in answers:
-            console.print(escape(f'  {in_language(text)}: levilab open {look.path} --columns "{columns}"'))
+            console.print(escape(f'  {in_language(text)}: levilab open {as_typed(look.path)} --columns "{columns}"'))
     if run.problem and not run.doubts and run.problem != look.problem:
-        console.print(f"[red]not read:[/red] {escape(run.problem)}")
+        console.print(in_language(Text("not read: {problem}", problem=run.problem)), style="red", markup=False)

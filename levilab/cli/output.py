@@ -64,5 +64,8 @@ def interruptible(what_is_left: str | Callable[[], str]) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        message(f"levilab: interrupted, {what_is_left if isinstance(what_is_left, str) else what_is_left()}")
+        from levilab.texts.text import Text  # not for a help
+
+        left = what_is_left if isinstance(what_is_left, str) else what_is_left()
+        message(Text("levilab: interrupted, {left}", left=left))
         raise typer.Exit(exit_codes.INTERRUPTED) from None

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from levilab.computer import computer
-from levilab.errors import DataError
+from levilab.errors import DataError, as_typed
 from levilab.files import as_json, parse_json
 from levilab.formats.table import Table, read_run_readings
 from levilab.present.html import facts_as_html, table_as_html
@@ -258,7 +258,7 @@ def _is_alive(folder: Path) -> bool:
 def read_record(folder: Path) -> RunRecord:
     """Return the content of ``run.json``.  Raises DataError if it is missing, cut off, or of another schema."""
     path = folder / RECORD
-    rescue = f"its readings can still be analyzed: levilab analyze {path.parent / READINGS}"
+    rescue = f"its readings can still be analyzed: levilab analyze {as_typed(path.parent / READINGS)}"
     try:
         if path.exists() and not path.is_file():
             raise DataError(f"{path}: is a folder, a pipe or a device; a file is expected; {rescue}")
