@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from numba.core.event import Event, Listener, install_listener
 
 from levilab.simulator.kernels.splitting import advance
+from levilab.texts.text import Text
 
 
 @contextlib.contextmanager
@@ -39,4 +40,4 @@ class _Announcement(Listener):
         start, began = self._start
         if event.is_failed == start.is_failed:  # numba 0.68 returns False for a failure alone; no start is one
             self._ended = True
-            self._message(f"compiled in {time.monotonic() - began:.1f} s")
+            self._message(Text("compiled in {seconds:.1f} s", seconds=time.monotonic() - began))
