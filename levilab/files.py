@@ -10,6 +10,7 @@ import re
 import tempfile
 import tomllib
 from collections.abc import Iterator
+from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -91,6 +92,25 @@ def parse_toml(text: str) -> dict[str, Any]:
         raise ValueError(_TOO_LARGE) from None
     _refuse_oddities(table, finite=False)
     return table
+
+
+def read_toml(file: Path | Traversable, refusal: type[LevilabError], missing: str) -> dict[str, Any]:
+    """Return the content of a TOML file.
+
+    Raises:
+        refusal: it cannot be read; where there is no such file with the text `missing`.
+    """
+    try:
+        return parse_toml(file.read_bytes().decode("utf-8-sig"))
+    except FileNotFoundError:
+        raise refusal(missing) from None
+    except OSError as error:
+        if file.is_dir():
+            raise refusal("{path}: is a folder; a TOML file is expected", path=file) from None
+        what = "{path}: cannot be read ({why}): a TOML file is expected"
+        raise refusal(what, path=file, why=error.strerror) from error
+    except ValueError as error:
+        raise refusal("{path}: not readable as TOML: {why}", path=file, why=error) from error
 
 
 #: Ends of names of files that people give where a folder is expected.

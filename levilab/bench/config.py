@@ -8,8 +8,9 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, Valida
 
 from instruments.drivers.generator import Limits as DriveLimits
 from levilab.errors import LevilabError
-from levilab.files import parse_toml, toml_value
+from levilab.files import read_toml, toml_value
 from levilab.settings import Settings, in_one_line
+from levilab.texts.text import Text
 
 
 @dataclass(frozen=True)
@@ -121,19 +122,5 @@ def read_bench(path: Path, tables: type[C], *, instead: str = ", or try `mock`")
 
 def read_table(path: Path, *, instead: str = ", or try `mock`") -> dict[str, Any]:
     """Return the content of a bench file, whatever it is; see `read_bench`.  Raises ConfigError."""
-    try:
-        return parse_toml(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise ConfigError(
-            "{path}: there is no such file: describe your bench in it (docs/bench.md){instead}",
-            path=path,
-            instead=instead,
-        ) from None
-    except OSError as error:
-        if path.is_dir():
-            raise ConfigError("{path}: is a folder; a TOML file is expected", path=path) from None
-        raise ConfigError(
-            "{path}: cannot be read ({why}): a TOML file is expected", path=path, why=error.strerror
-        ) from error
-    except ValueError as error:
-        raise ConfigError("{path}: not readable as TOML: {why}", path=path, why=error) from error
+    missing = "{path}: there is no such file: describe your bench in it (docs/bench.md){instead}"
+    return read_toml(path, ConfigError, Text(missing, path=path, instead=instead))

@@ -9,9 +9,10 @@ from typing import Self
 from pydantic import Field, NonNegativeFloat, PositiveFloat, ValidationError, field_validator, model_validator
 
 from levilab.errors import DataError
-from levilab.files import parse_toml
+from levilab.files import read_toml
 from levilab.formats.typed import check_range
 from levilab.settings import Settings, in_one_line
+from levilab.texts.text import Text
 
 
 class DeviceError(DataError):
@@ -107,18 +108,8 @@ class Device(Settings):
 def read_device(path: Path) -> Device:
     """Return the device described in a TOML file.  Raises DeviceError."""
     advice = "a TOML file with [base] and [top] is expected, as sample_data/device.toml"
-    try:
-        if path.is_dir():
-            raise DeviceError("{path:s}: is a folder; {advice}", path=path, advice=advice)
-        table = parse_toml(path.read_text(encoding="utf-8-sig"))
-    except FileNotFoundError:
-        raise DeviceError("{path:s}: there is no such file; {advice}", path=path, advice=advice) from None
-    except OSError as error:
-        what = "{path:s}: cannot be read ({why}); {advice}"
-        raise DeviceError(what, path=path, why=error.strerror, advice=advice) from error
-    except ValueError as error:
-        what = "{path:s}: not readable as TOML: {why}; {advice}"
-        raise DeviceError(what, path=path, why=error, advice=advice) from error
+    missing = Text("{path:s}: there is no such file; {advice}", path=path, advice=advice)
+    table = read_toml(path, DeviceError, missing)
     try:
         return Device.model_validate(table)
     except ValidationError as error:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from pydantic import NonNegativeFloat, ValidationError, model_validator
 
-from levilab.files import parse_toml
+from levilab.files import read_toml
 from levilab.settings import in_one_line
 from levilab.simulator.keys import SceneError, Table, UnknownScene, as_toml, nearest, parse_setting, set_key, short_text
 from levilab.simulator.laws import LAWS
@@ -364,21 +364,8 @@ def _scenes_folder() -> Traversable:
 
 def _read_file(file: Traversable | Path, name: str) -> Scene:
     """Return the scene of a file; its name is `name` unless the file says another.  Raises SceneError."""
-    try:
-        table = parse_toml(file.read_bytes().decode("utf-8-sig"))
-    except FileNotFoundError:
-        raise SceneError(
-            "{file:s}: there is no such file; scenes that come with levilab are {names:s}, each a TOML file to copy",
-            file=file, names=", ".join(presets()),
-        ) from None  # fmt: skip
-    except OSError as error:
-        if file.is_dir():
-            what = "{path:s}: is a folder; a TOML file is expected, or the name of a scene"
-            raise SceneError(what, path=file) from None
-        what = "{path:s}: cannot be read ({why}): a TOML file is expected"
-        raise SceneError(what, path=file, why=error.strerror) from error
-    except ValueError as error:
-        raise SceneError("{path}: not readable as TOML: {why}", path=file, why=error) from error
+    missing = "{file:s}: there is no such file; scenes that come with levilab are {names:s}, each a TOML file to copy"
+    table = read_toml(file, SceneError, Text(missing, file=file, names=", ".join(presets())))
     try:
         return scene_of({"name": name} | table)
     except SceneError as error:
