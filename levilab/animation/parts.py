@@ -9,13 +9,10 @@ Every part is a solid of revolution about the top's axis, convex, and no part re
 another along the axis they hide each other as real parts do.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
+from levilab.simulator.scene import Scene
 
 #: Colours by day and by night.  Path, axis and spin have those that the figures use (Okabe and Ito).
 COLOURS: dict[str, dict[str, str]] = {

@@ -6,10 +6,8 @@ the body turns behind the drive is that of a pendulum: while it swings, it stays
 slips, it does not.  The azimuth of the axis does not decide it either: it is not defined at θ = 0.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,10 +16,7 @@ from analysis.arrays import Array
 from levilab.simulator.energy import core_spin
 from levilab.simulator.kernels.motion import ARM, TIME, N
 from levilab.simulator.numbers import copysign
-
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
-
+from levilab.simulator.scene import Scene
 
 #: The part of the motion, at its end, in which the top must not slip; before, the drive may still catch it.
 LAST_SHARE = 0.5

@@ -1,21 +1,16 @@
 """From inputs to what is found of each and of all together: what every analysis does alike."""
 
-from __future__ import annotations
-
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
 
+from analysis.budget import Budget
 from levilab.pipelines.options import InputOptions
+from levilab.pipelines.result import Place
 from levilab.pipelines.sources import NotTaken, Readings, Source
 from levilab.texts.note import Note, is_doubt, kind_of, reword
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterable, Sequence
-    from pathlib import Path
-
-    from analysis.budget import Budget
-    from levilab.pipelines.result import Place
 
 #: Readings of an input, what is found of it, of all together; options of the analysis.
 S = TypeVar("S", bound=Readings)

@@ -1,15 +1,16 @@
 """A person's title above a report, and how to make its numbers again: commands, data with hashes, seeds, versions."""
 
-from __future__ import annotations
-
 import shlex
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path, PurePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.errors import LevilabError
 from levilab.formats.table import parse_columns
+from levilab.pipelines.document import Analysis
 from levilab.pipelines.options import OF_REPORT, OPTIONS, options_of, typed_name
+from levilab.pipelines.sources import Source
 from levilab.present.document.blocks import (
     Block,
     Code,
@@ -26,12 +27,6 @@ from levilab.present.numbers import how_many
 from levilab.present.tables import table
 from levilab.software import software_versions
 from levilab.texts.text import ENGLISH, Text, spoken
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
-
-    from levilab.pipelines.document import Analysis
-    from levilab.pipelines.sources import Source
 
 
 @dataclass(frozen=True)

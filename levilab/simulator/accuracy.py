@@ -1,8 +1,6 @@
 """How long a step may be, and how large the error of a result is."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,12 +11,9 @@ from levilab.simulator.kernels import braking
 from levilab.simulator.kernels.motion import CLOCK, L, Model, R
 from levilab.simulator.laws import LAWS
 from levilab.simulator.numbers import largest, length, smallest, sqrt
+from levilab.simulator.scene import Scene
+from levilab.simulator.schemes import Scheme
 from levilab.simulator.spin import DECAYS
-
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
-    from levilab.simulator.schemes import Scheme
-
 
 #: A drift turns the axis by so much at most [rad], for which the kernels' polynomials are made.
 LONGEST_TURN = 2.0

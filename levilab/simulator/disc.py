@@ -9,16 +9,13 @@ and torque, against a rule of 2800 nodes, for radii of 5 to 30 mm, heights of 2 
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from analysis.arrays import Array
 from levilab.simulator.numbers import ceil, hypot, largest, log, smallest, uniform
-
-if TYPE_CHECKING:
-    from levilab.simulator.parts import Base, Top
-
+from levilab.simulator.parts import Base, Top
 
 #: Relative error of force and torque that the number of nodes is chosen for.
 TARGET = 1e-11

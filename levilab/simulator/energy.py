@@ -1,10 +1,7 @@
 """Energy and spin of states: what stays constant without drag and drive."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
+from numpy.typing import ArrayLike
 
 from analysis.arrays import Array
 from levilab.simulator.field import flux_density
@@ -12,11 +9,7 @@ from levilab.simulator.kernels.loads import Aligned, Disc
 from levilab.simulator.kernels.motion import ARM, LOOSE, L, Model, N, R, V
 from levilab.simulator.model import gravity
 from levilab.simulator.numbers import row
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from levilab.simulator.scene import Scene
+from levilab.simulator.scene import Scene
 
 
 def energy(scene: Scene, model: Model, states: Array) -> Array:

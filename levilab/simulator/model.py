@@ -1,9 +1,7 @@
 """From a scene to the numbers that its kernels need."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.simulator.disc import distance_to, nodes_of, rule_for
 from levilab.simulator.field import field_of
@@ -11,9 +9,7 @@ from levilab.simulator.kernels import braking
 from levilab.simulator.kernels.loads import Aligned, Bursts, Disc, Leaning, PiecewiseLinear, Sine, Tilted, Upright
 from levilab.simulator.kernels.motion import Body, Loose, Model, Rigid
 from levilab.simulator.numbers import cos, hypot, largest, sin
-
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
+from levilab.simulator.scene import Scene
 
 
 def model_of(scene: Scene, place: Any = None, more_nodes: int = 0) -> Model:

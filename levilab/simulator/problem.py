@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,15 +20,10 @@ from levilab.simulator.kernels.loads import Bursts, Disc
 from levilab.simulator.kernels.motion import STATE_SIZE, TIME, R
 from levilab.simulator.kernels.splitting import RunStops, advance
 from levilab.simulator.model import model_of
+from levilab.simulator.scene import Scene
 from levilab.simulator.schemes import SCHEMES, Scheme
 from levilab.simulator.stops import Stops, check_count, stop_after_each_step, stops_between
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from levilab.simulator.scene import Scene
-    from levilab.simulator.trajectory import Event
-
+from levilab.simulator.trajectory import Event
 
 #: Radius and height of no escape [m]: for coarse runs, which a fine one is compared with.
 NO_LIMITS = (math.inf, -math.inf)

@@ -7,10 +7,12 @@ SceneError with the key, its value and what is allowed.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import resources
+from importlib.resources.abc import Traversable
 from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 from pydantic import NonNegativeFloat, ValidationError, model_validator
 
@@ -20,10 +22,6 @@ from levilab.simulator.keys import SceneError, Table, UnknownScene, as_toml, nea
 from levilab.simulator.laws import LAWS
 from levilab.simulator.parts import Base, Drag, Drive, Escape, Part, Start, TemperatureRise, Top, Washers
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Iterator, Mapping
-    from importlib.resources.abc import Traversable
 
 __all__ = [
     "Base", "Drag", "Drive", "Escape", "Scene", "SceneError", "Start", "Top", "Washers",

@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
 from levilab.errors import SimulationError
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from levilab.simulator.scene import Drive
-
+from levilab.simulator.scene import Drive
 
 #: No times at all: the kinks of a drive that has none.
 NO_TIMES: Array = np.empty(0)

@@ -1,19 +1,14 @@
 """What a simulation gives: the motion as arrays, how it ended, and how good it is."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.arrays import Array
 from levilab.simulator.energy import energy, spin_of
 from levilab.simulator.kernels.motion import LOOSE, TIME, L, Model, N, R, V
-
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
+from levilab.simulator.scene import Scene
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,10 @@
 """The limits of the spin that the master's thesis on the Levitron simulated and measured, and their device."""
 
-from __future__ import annotations
-
 import math
 import statistics
-from typing import TYPE_CHECKING
 
 from levilab.simulator.published.printed import published, several
-
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
+from levilab.simulator.scene import Scene
 
 _THESIS = published("thesis")
 

@@ -1,18 +1,12 @@
 """How a top that has left its place falls and lies, for a view: no instrument sees it, and nothing is simulated."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.arrays import Array
 from levilab.simulator.kernels.motion import N, R, V
-
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
-
+from levilab.simulator.scene import Scene
 
 #: A top of the usual shape lies on the rim of its magnet and the end of its stem: its axis is this far from upright
 #: [rad], and the centre of mass so high above the ground, in radii of the magnet.

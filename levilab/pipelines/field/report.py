@@ -1,32 +1,24 @@
 """Scans of a field → tables, and their part of a report."""
 
-from __future__ import annotations
-
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.field.fit import LEARNS_NOTHING, FieldScan
 from analysis.field.ring import on_axis
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
+from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun
+from levilab.pipelines.field.readings import FieldReadings
 from levilab.pipelines.field.words import OF_TOPS, QUANTITIES
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, first_of, input_parts, points_of, title_of
+from levilab.pipelines.sources import Source
 from levilab.present.document.blocks import Block, Listing, Note, Paragraph, Section, Tabular
 from levilab.present.numbers import off, plain, short_name, with_decimals, with_sign, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping
-
-    from numpy.typing import NDArray
-
-    from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun
-    from levilab.pipelines.field.readings import FieldReadings
-    from levilab.pipelines.sources import Source
-
 
 #: What is shown of several scans, a row each.
 _BY_RUN = ("strength", "origin", "lightest_mass", "heaviest_mass", "mass_to_set")

@@ -1,19 +1,24 @@
 """Spin-downs → tables, the meaning of the fits, and their part of a report."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.numbers import digits
+from analysis.spindown.combine import CombinedLaw, Mean
 from analysis.spindown.drag import LAWS
+from analysis.spindown.fit import SpinDown
+from analysis.spindown.lawfit import LawFit
+from analysis.spindown.selection import Statistics
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.tilt import count_of
 from analysis.uncertainty import Estimate
+from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.part import (
     VALUE_U,
     FigureText,
@@ -26,6 +31,9 @@ from levilab.pipelines.part import (
     title_of,
 )
 from levilab.pipelines.row import cells_of
+from levilab.pipelines.sources import Source
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis
+from levilab.pipelines.spindown.readings import SpinReadings
 from levilab.pipelines.spindown.words import (
     OF_RUN,
     STRAIGHT_LINES,
@@ -54,20 +62,6 @@ from levilab.present.tables import Row, Table, table
 from levilab.present.units import unit as unit_row
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Sentences, Text, text_from
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
-
-    from analysis.arrays import Array
-    from analysis.spindown.combine import CombinedLaw, Mean
-    from analysis.spindown.fit import SpinDown
-    from analysis.spindown.lawfit import LawFit
-    from analysis.spindown.selection import Statistics
-    from levilab.pipelines.options import SpinDownOptions
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
-    from levilab.pipelines.spindown.readings import SpinReadings
-
 
 #: Laws of one power, and the power, in its order.
 _POWERS: Mapping[str, float] = MappingProxyType(
