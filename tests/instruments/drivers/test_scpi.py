@@ -240,7 +240,7 @@ def test_what_stands_for_no_reading_is_none(answer, reading):
     assert parse_reading("A", "READ?", answer) == reading
 
 
-#: What was set and what there is now: another value in whatever unit it is; or what the instrument rounds.
+#: The value that was set and the present one: another value in whatever unit it is; or what the instrument rounds.
 CHANGED = [
     (Keysight53230A, "gate", 1e-3, 5e-3),
     (Keysight53230A, "gate", 1.0, 1.011),
