@@ -7,14 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from levilab.animation.film import Film, as_gif, as_mp4, check_encoder
-from levilab.animation.page import (
-    FEWEST_A_TURN,
-    POSES_A_TURN,
-    as_page,
-    columns_of,
-    most_poses,
-    three_for_page,
-)
+from levilab.animation.page import FEWEST_A_TURN, POSES_A_TURN, as_page, columns_of, most_poses, three_for_page
 from levilab.animation.poses import poses_of, turn_rate
 from levilab.animation.words import span_text, speed_text
 from levilab.errors import UsageError

@@ -195,13 +195,7 @@ MANY_RUNS = 500
 
 
 def _tabulate(
-    kind: str,
-    paths: Sequence[Path],
-    given: Mapping[str, Any],
-    writing: Writing,
-    *,
-    out: Path | None,
-    as_json: bool,
+    kind: str, paths: Sequence[Path], given: Mapping[str, Any], writing: Writing, *, out: Path | None, as_json: bool
 ) -> None:
     """Write a row of each run into a table."""
     from levilab.pipelines.catalogue import ANALYSES

@@ -32,8 +32,7 @@ def crosscheck(
         int | None, option("N", "How many trials of each.", min=2, show_default="40; with --like 200")
     ] = None,
     seed: Annotated[
-        int | None,
-        typer.Option(min=0, help="Of the first trial; the next have the next.", show_default="0"),
+        int | None, typer.Option(min=0, help="Of the first trial; the next have the next.", show_default="0")
     ] = None,
     calibrate: Annotated[
         bool,

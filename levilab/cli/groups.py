@@ -36,13 +36,7 @@ def of_class(
 
     heading = Heading(**{one.name: given.pop(one.name) for one in HEADING})
     with interruptible("nothing is written"):
-        written = write_class(
-            paths or (),
-            out,
-            read_options(given, typed=True),
-            message,
-            heading,
-        )
+        written = write_class(paths or (), out, read_options(given, typed=True), message, heading)
     result(Text("the class is in {file:s}", file=written))
 
 

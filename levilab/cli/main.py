@@ -154,8 +154,7 @@ def _print_version(asked: bool) -> None:
 @app.callback()
 def levilab(
     version: Annotated[
-        bool,
-        typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True),
+        bool, typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True)
     ] = False,
 ) -> None:
     """Acquire, analyze and report experiments on the Levitron."""

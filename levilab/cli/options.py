@@ -204,8 +204,7 @@ Paths = Annotated[
 #: Those that come with levilab, simple ones first; help is not to wait for their files.
 SCENES = "undriven, friction, tilted, driven, loose-washers, motor, ramp, precession, spindown, sway, practice"
 Presets = Annotated[
-    str | None,
-    typer.Argument(metavar="SCENE", help=f"{SCENES}, or a file.", show_default=False, callback=named_scene),
+    str | None, typer.Argument(metavar="SCENE", help=f"{SCENES}, or a file.", show_default=False, callback=named_scene)
 ]
 Settings = Annotated[
     list[str] | None,

@@ -104,13 +104,7 @@ def bench_clock(sensitivity: float) -> Component:
 
 
 def direct_row(  # noqa: PLR0917 - the fields of a row
-    name: str,
-    what: str,
-    part: float,
-    unit: str,
-    note: str,
-    remedy: str,
-    kind: Literal["A", "B"] = "B",
+    name: str, what: str, part: float, unit: str, note: str, remedy: str, kind: Literal["A", "B"] = "B"
 ) -> Component:
     """Return a row whose size is known in the result's own unit alone [`unit`]; see `Component`."""
     return Component(name, what, kind, part, unit, 1.0, note=note, remedy=remedy)

@@ -134,10 +134,7 @@ def columns_of(quantities: Iterable[Quantity]) -> Iterator[Column]:
 
 
 def estimate(
-    name: str,
-    unit: str,
-    meaning: str,
-    read: Callable[[Mapping[str, Any]], Mapping[str, Any] | None] | None = None,
+    name: str, unit: str, meaning: str, read: Callable[[Mapping[str, Any]], Mapping[str, Any] | None] | None = None
 ) -> tuple[Column, Column]:
     """Return the columns of an estimate: its value and its standard uncertainty.
 

@@ -43,11 +43,7 @@ Results = Sequence[tuple[Analysis[Any], Any]]
 MOST_IN_FULL = 12
 
 
-def document_of(
-    results: Results,
-    others: Sequence[Section] = (),
-    asked: Asked | None = None,
-) -> Document:
+def document_of(results: Results, others: Sequence[Section] = (), asked: Asked | None = None) -> Document:
     """Return the report.
 
     Args:
@@ -83,12 +79,7 @@ def document_of(
 
 
 def blocks_of_part(
-    analysis: Analysis[A],
-    found: A,
-    part: ReportPart,
-    asked: Asked,
-    *,
-    deeper: bool = False,
+    analysis: Analysis[A], found: A, part: ReportPart, asked: Asked, *, deeper: bool = False
 ) -> list[Block]:
     """Return what one analysis found: doubts, result, figure, notes, what else is known, run by run.
 

@@ -257,10 +257,7 @@ def fall_after(problem: Problem, states: Array, stops: Stops) -> Event | None:
 
 
 def integrate(
-    problem: Problem,
-    stops: Stops,
-    progress: Callable[[float], None] | None = None,
-    beside: Stops | None = None,
+    problem: Problem, stops: Stops, progress: Callable[[float], None] | None = None, beside: Stops | None = None
 ) -> tuple[Array, Event | None, int, Array | None]:
     """Integrate a problem up to the last stop or an escape, in calls short enough to be interrupted.
 

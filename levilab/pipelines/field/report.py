@@ -197,9 +197,7 @@ def _in_words(_: Source[FieldReadings], run: FieldRun, *__: object) -> tuple[str
         high=with_decimals(high, 2),
     )
     u = Text(
-        "u of a reading against the fit: {low:.0f} µT to {high:.0f} µT",
-        low=1e6 * scan.u.min(),
-        high=1e6 * scan.u.max(),
+        "u of a reading against the fit: {low:.0f} µT to {high:.0f} µT", low=1e6 * scan.u.min(), high=1e6 * scan.u.max()
     )
     return text, Text("{u}, that of its height included", u=u)
 

@@ -111,10 +111,8 @@ class Device:
         if which == "upper":
             reached = {name: (one.value, one.rounding / 3**0.5) for name, one in _REACHED.items()}
             of_thesis = {ISLANDS: (ISLANDS_HZ[0], ISLANDS_WITHIN_HZ / 3**0.5)} | reached
-            return {
-                UPPER_EDGE: (self.linear_upper_hz, 0.0),
-                SIMON: (_simon_share() * self.linear_upper_hz, 0.0),
-            } | (of_thesis if self.is_thesis else {})
+            computed = {UPPER_EDGE: (self.linear_upper_hz, 0.0), SIMON: (_simon_share() * self.linear_upper_hz, 0.0)}
+            return computed | (of_thesis if self.is_thesis else {})
         resonance = {} if self.resonance_hz is None else {RESONANCE: (self.resonance_hz, 0.0)}
         return {LOWER_EDGE: (self.linear_lower_hz, 0.0)} | resonance
 
@@ -273,13 +271,7 @@ def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
     causes = Counter(str(event["cause"]) for event in events if event.get("cause"))
     ends = {str(kind): kinds[kind] for kind in ENDS if kinds[kind]}
     return Limits(
-        which,
-        conditions,
-        statistics,
-        _comparisons(statistics, device, conditions),
-        device,
-        ends,
-        causes=dict(causes),
+        which, conditions, statistics, _comparisons(statistics, device, conditions), device, ends, causes=dict(causes)
     )
 
 
@@ -321,10 +313,7 @@ def synthetic_runs(runs: Iterable[Limits]) -> bool | None:
 
 
 def _combine(
-    numbers: tuple[int, ...],
-    sources: Sequence[Source[LimitReadings]],
-    runs: Sequence[Limits],
-    options: LimitOptions,
+    numbers: tuple[int, ...], sources: Sequence[Source[LimitReadings]], runs: Sequence[Limits], options: LimitOptions
 ) -> Limits:
     first = runs[numbers[0]]
     which, device = first.which, first.device

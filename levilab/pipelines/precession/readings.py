@@ -125,8 +125,7 @@ def sweep_readings(table: Table) -> SweepReadings:
     drive, precession = table.column("drive_frequency_hz"), table.column("precession_frequency_hz")
     if drive.size < FEWEST:
         raise TableError(
-            table.path,
-            f"holds {how_many(drive.size, 'point')}, at least {FEWEST} are needed: sweep further",
+            table.path, f"holds {how_many(drive.size, 'point')}, at least {FEWEST} are needed: sweep further"
         )
     if drive.size > MOST_POINTS:
         raise TableError(

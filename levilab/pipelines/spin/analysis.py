@@ -78,14 +78,7 @@ def _axis(k: int) -> Callable[[SpinRun], Estimate | None]:
 #: Of a run; all but the last of a magnetometer.
 OF_A_RUN = (
     *(
-        Quantity(
-            f"amplitude_{k}",
-            "T",
-            f"of the turning field, axis {k}",
-            of=_axis(k - 1),
-            optional=True,
-            fine=True,
-        )
+        Quantity(f"amplitude_{k}", "T", f"of the turning field, axis {k}", of=_axis(k - 1), optional=True, fine=True)
         for k in (1, 2, 3)
     ),
     Quantity("transverse_moment", "A m^2", "the part of the moment that turns", "μ_t", of="transverse", optional=True),

@@ -355,10 +355,7 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
 
 #: What the analysis calls a column, in the words of a file, and what to do.
 _ABOVE_0 = {
-    "spin frequency": (
-        "the frequency",
-        "Hz; above 0 is expected: a sign is the sense of the spin, give the magnitude",
-    ),
+    "spin frequency": ("the frequency", "Hz; above 0 is expected: a sign is the sense of the spin, give the magnitude"),
     "standard uncertainty": ("the uncertainty", "Hz, but must be above 0: correct it or remove the column"),
 }
 

@@ -704,10 +704,7 @@ def _readings(source: Source[SpinReadings], fit: SpinDown, options: SpinDownOpti
     named = ("t [s]", "ν [Hz]", "u [Hz]", "residual [Hz]")
     heads, clocks = with_clock(source.time_zero, readings.time[:shown].tolist(), named)
     rows = [
-        Row(
-            (*clocks[i], with_decimals(t, 3), *reading(float(nu), u_, left.get(i))),
-            "outlier" if i in outliers else "",
-        )
+        Row((*clocks[i], with_decimals(t, 3), *reading(float(nu), u_, left.get(i))), "outlier" if i in outliers else "")
         for i, (t, nu, u_) in enumerate(zip(readings.time[:shown], readings.frequency[:shown], u, strict=True))
     ]
     residual = Text("Residual: reading − {law} law.", law=law_names([best]))

@@ -576,10 +576,7 @@ def _of_traces(traces: Sequence[Table], taken: set[str]) -> Iterator[Variable]:
             first, values = channels[name][0][1], [column.values for _, column in channels[name]]
             stacked = np.stack(values) if len(dimensions) > 1 else np.concatenate(values)
             yield _variable(
-                replace(first, values=stacked),
-                free_name(plain_name(name), taken),
-                dimensions,
-                {"coordinates": place},
+                replace(first, values=stacked), free_name(plain_name(name), taken), dimensions, {"coordinates": place}
             )
 
 
