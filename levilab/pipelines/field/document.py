@@ -13,7 +13,7 @@ from levilab.pipelines.budget import setting_of
 from levilab.pipelines.document import Analysis, statistics_of, value_of, values_of
 from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun, Mean, analyze_source
 from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
-from levilab.pipelines.field.report import field_columns, field_curve, field_curve_u, field_part, field_tables
+from levilab.pipelines.field.report import field_columns, field_part, field_tables
 from levilab.pipelines.field.words import FIELD_ROW, QUANTITIES, remark
 from levilab.pipelines.options import FieldOptions
 from levilab.pipelines.row import symbols_of
@@ -180,7 +180,7 @@ FIELD = Analysis(
     columns=field_columns,
     row=FIELD_ROW,
     symbols=symbols_of(QUANTITIES.values()),
-    curve=field_curve,
-    curve_u=field_curve_u,
+    curve=lambda analysis, number, _: analysis.runs[number].scan.model,
+    curve_u=lambda analysis, number, _: analysis.runs[number].scan.u_model,
     compared=("strength", "origin", "thickness"),
 )

@@ -1,6 +1,6 @@
 """Scans of a field → tables, and their part of a report."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -115,16 +115,6 @@ def field_columns(analysis: FieldAnalysis) -> Iterator[Mapping[str, np.ndarray]]
             "flux_density_u_t": scan.u,
             "residual_t": scan.residuals,
         }
-
-
-def field_curve(analysis: FieldAnalysis, number: int, _: str) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the flux density [T] of the ring fitted to one scan, of heights [m]."""
-    return analysis.runs[number].scan.model
-
-
-def field_curve_u(analysis: FieldAnalysis, number: int, _: str) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the standard uncertainty [T] of the flux density fitted to one scan, of heights [m]."""
-    return analysis.runs[number].scan.u_model
 
 
 #: Readings printed in the page; more stay in the run folder.
