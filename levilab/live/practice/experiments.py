@@ -3,13 +3,9 @@
 The settings take some minutes of the bench at most: the usual ones are those of a laboratory, which has the time.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
+from levilab.simulator.scene import Scene
 
 
 @dataclass(frozen=True)

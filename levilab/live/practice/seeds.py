@@ -1,14 +1,11 @@
 """What a seed makes of the bench for practice: a top and a base of one's own, and the noise of the light."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from levilab.simulator.scene import Scene
+from levilab.simulator.scene import Scene
 
 #: The published drag constants scatter by this from top to top, as on the bench of `levilab acquire --mock`.
 _DRAG_SCATTER = 0.02

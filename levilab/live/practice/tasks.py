@@ -1,20 +1,15 @@
 """Tasks with a goal that the bench recognizes: a row a task."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from levilab.live.practice.commands import CommandRefused
+from levilab.simulator.scene import Scene
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from levilab.simulator.scene import Scene
 
 #: A held top swings about its drive by less than this [Hz].
 _HELD_HZ = 0.5

@@ -1,19 +1,14 @@
 """What a person can change at the bench for practice, with immediate effect: a row a quantity."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.live.practice.commands import CommandRefused
 from levilab.simulator.laws import LAWS
+from levilab.simulator.scene import Scene
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from levilab.simulator.scene import Scene
 
 
 @dataclass(frozen=True)
