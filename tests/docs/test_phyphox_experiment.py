@@ -17,12 +17,8 @@ def autocorrelation(y):
     return np.array([y[: n - k] @ y[k:] / (n - k) for k in range(n)])
 
 
-def inside(values, low, high):
-    return (values >= low) & (values <= high)
-
-
 def rangefilter(f, low, high, p):
-    kept = inside(f, low, high)
+    kept = (f >= low) & (f <= high)
     return f[kept], p[kept]
 
 

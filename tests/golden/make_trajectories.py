@@ -8,12 +8,9 @@ potential Φ = Σ (−1)ⁿ φ₂ₙ r²ⁿ/(4ⁿ n!²).  Nothing of the simulat
     python tests/golden/make_trajectories.py
 """
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path
-from typing import Any
 
 import heyoka as hy
 import numpy as np
@@ -21,7 +18,7 @@ import numpy as np
 Q = np.longdouble
 HERE = Path(__file__).parent
 #: The preset `undriven`; cases give what differs.
-DEFAULTS: dict[str, Any] = {
+DEFAULTS = {
     "base.field": "paraxial-2", "base.tilt_rad": 0.0, "base.tilt_azimuth_rad": 0.0,
     "top.mass_kg": 0.02526, "top.moment_tilt": [0.0, 1.0],
     "drag.law": "none", "drag.coefficient": 0.0,
@@ -33,7 +30,7 @@ A, B, RHO, I1, I3, MU, G = Q(0.030), Q(0.055), Q(1.40e-3), Q(1.04e-6), Q(1.73131
 EXPONENT = {"stokes": 1.0, "newton": 2.0, "disc": 1.5}
 
 
-def system(scene: dict[str, Any]) -> list[Any]:
+def system(scene):
     """The equations of motion as (variable, right-hand side) pairs; 12 of them, or 15 with the arm e₁."""
     names = "x y z vx vy vz nx ny nz lx ly lz ex ey ez"
     x, y, z, vx, vy, vz, nx, ny, nz, lx, ly, lz, ex, ey, ez = hy.make_vars(*names.split())
@@ -75,7 +72,7 @@ def system(scene: dict[str, Any]) -> list[Any]:
     return pairs
 
 
-def braking(scene: dict[str, Any], spin: Any) -> Any:
+def braking(scene, spin):
     """dω₃/dt by drag, for a spin above 0."""
     law, c = scene["drag.law"], scene["drag.coefficient"]
     if law == "none":
@@ -85,7 +82,7 @@ def braking(scene: dict[str, Any], spin: Any) -> Any:
     return -Q(c) * spin ** Q(EXPONENT[law])
 
 
-def start(scene: dict[str, Any]) -> list[Any]:
+def start(scene):
     """The state at time 0."""
     tilt, spin = Q(scene["start.tilt_rad"]), 2 * np.arccos(Q(-1)) * Q(scene["start.spin_hz"])
     n = np.array([Q(0), -np.sin(tilt), np.cos(tilt)])
@@ -95,7 +92,7 @@ def start(scene: dict[str, Any]) -> list[Any]:
     return state + ([Q(1), Q(0), Q(0)] if scene["top.moment_tilt"][0] else [])
 
 
-def final(scene: dict[str, Any], duration: float, tolerance: float) -> np.ndarray:
+def final(scene, duration, tolerance):
     """The state after the duration, 80-bit."""
     integrator = hy.taylor_adaptive(system(scene), start(scene), tol=Q(tolerance), fp_type=Q, compact_mode=True)
     # a top that falls comes where the truncated field has no bounds: enough steps for those that do not
@@ -103,7 +100,7 @@ def final(scene: dict[str, Any], duration: float, tolerance: float) -> np.ndarra
     return np.array(integrator.state)
 
 
-def case(name: str, duration: float, **different: Any) -> dict[str, Any]:
+def case(name, duration, **different):
     """One case: the scene, its end, and how far ends at two tolerances lie apart."""
     changes = {key.replace("__", "."): value for key, value in different.items()}
     scene = DEFAULTS | changes
@@ -121,7 +118,7 @@ def case(name: str, duration: float, **different: Any) -> dict[str, Any]:
     }
 
 
-def named() -> list[dict[str, Any]]:
+def named():
     """The thesis's four starts, every kind of scene, and hard cases."""
     tilted = {"top__moment_tilt": [0.03, 0.97], "top__mass_kg": 0.02445}
     driven = tilted | {"drive__waveform": "sine", "start__spin_hz": 30.03}
@@ -152,16 +149,16 @@ def named() -> list[dict[str, Any]]:
     return cases
 
 
-def random_cases(count: int) -> list[dict[str, Any]]:
+def random_cases(count):
     """Scenes drawn at random: half aligned, a quarter with drag, a quarter driven; only those that end in the air."""
     draw = np.random.default_rng(20261121)
     laws = {"stokes": 0.00318175, "newton": 1.7270e-5, "disc": 2.340e-4, "mixed": [0.0016, 8.6e-6]}
-    cases: list[dict[str, Any]] = []
+    cases = []
     while len(cases) < count:
         i = len(cases)
         edge = i % 5 == 0
         spin = draw.uniform(21.7, 23.0) if edge and draw.random() < 0.5 else draw.uniform(65, 75) if edge else 0.0
-        values: dict[str, Any] = {
+        values = {
             "start__position_m": [*draw.uniform(-0.002, 0.002, 2).tolist(), float(draw.uniform(0.0705, 0.074))],
             "start__velocity_m_s": draw.uniform(-0.002, 0.002, 3).tolist(),
             "start__tilt_rad": float(draw.uniform(0, 0.05)),
@@ -191,7 +188,7 @@ def random_cases(count: int) -> list[dict[str, Any]]:
     return cases
 
 
-def main() -> None:
+def main():
     """Write trajectories.json, a case a line."""
     cases = named() + random_cases(200)
     text = ",\n".join(json.dumps(one) for one in cases)

@@ -12,8 +12,6 @@ not skip whole modules, and a resource opened at the author's address is the one
 Ends with 0 if every case passes but for those excused in agilent33500_excuses.toml, which must not pass.
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import os
@@ -33,9 +31,9 @@ EXCUSES = Path(__file__).with_name("agilent33500_excuses.toml")
 class Bench:
     """A pytest plugin: lets the suite begin, brings it to the device, and notes how each case ends."""
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address):
         self.address = address
-        self.outcomes: dict[str, str] = {}
+        self.outcomes = {}
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtestloop(self):
@@ -47,7 +45,7 @@ class Bench:
     def pytest_collection(self):
         skip = pytest.skip
 
-        def only_cases(reason: str = "", *, allow_module_level: bool = False) -> None:
+        def only_cases(reason="", *, allow_module_level=False):
             if not allow_module_level:
                 skip(reason)
 
@@ -55,7 +53,7 @@ class Bench:
             patch.setattr(pytest, "skip", only_cases)
             return (yield)
 
-    def _lead_to_the_device(self, patch: pytest.MonkeyPatch) -> None:
+    def _lead_to_the_device(self, patch):
         import pyvisa
 
         open_resource = pyvisa.ResourceManager.open_resource
@@ -65,7 +63,7 @@ class Bench:
 
         patch.setattr(pyvisa.ResourceManager, "open_resource", at_our_address)
 
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+    def pytest_runtest_logreport(self, report):
         case = report.nodeid.partition("::")[2]
         if report.failed:
             self.outcomes[case] = f"{report.outcome} ({report.when})"
@@ -73,12 +71,12 @@ class Bench:
             self.outcomes.setdefault(case, report.outcome)
 
 
-def excuses(path: Path = EXCUSES) -> dict[str, str]:
+def excuses(path=EXCUSES):
     """Which case need not pass, and why: what the real instrument does."""
     return {excuse["test"]: excuse["reason"] for excuse in tomllib.loads(path.read_text("utf-8")).get("excuse", [])}
 
 
-def complaints(outcomes: dict[str, str], excused: dict[str, str]) -> list[str]:
+def complaints(outcomes, excused):
     """What keeps the run from being a proof.
 
     >>> complaints({f"case {k}": "passed" for k in range(395)}, {})
@@ -90,7 +88,7 @@ def complaints(outcomes: dict[str, str], excused: dict[str, str]) -> list[str]:
     return wrong + [f"{case} is excused and unknown" for case in excused if case not in outcomes]
 
 
-def run(source: Path, address: str) -> dict[str, str]:
+def run(source, address):
     """How each case of the suite ends."""
     bench = Bench(address)
     settings = ["-c", str(source / "pyproject.toml"), f"--rootdir={source}"]  # PyMeasure's, wherever it was unpacked
@@ -100,7 +98,7 @@ def run(source: Path, address: str) -> dict[str, str]:
 
 
 @contextlib.contextmanager
-def reached(way: str | None, address: str):
+def reached(way, address):
     """The address to use while this lasts, and PyVISA's library set for it.  way: of a server's of our own, if any."""
     if way is None:
         os.environ.setdefault("PYVISA_LIBRARY", "@levilab")
@@ -115,7 +113,7 @@ def reached(way: str | None, address: str):
         yield offer.resources[way]
 
 
-def main() -> int:
+def main():
     """Run the suite, compare, and print the result."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("source", type=Path, help="PyMeasure's unpacked source distribution")

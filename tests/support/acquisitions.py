@@ -47,17 +47,24 @@ class Silent(Display):
         self.closed = True
 
 
-class Impatient(Silent):
-    """Presses Ctrl-C, or sends another signal, after so many readings."""
+class Meanwhile(Silent):
+    """Does something after so many readings."""
 
-    def __init__(self, most, number=signal.SIGINT):
+    def __init__(self, after, do):
         super().__init__()
-        self.most, self.number = most, number
+        self.after, self.do = after, do
 
     def reading(self, text, elapsed, remaining):
         super().reading(text, elapsed, remaining)
-        if len(self.readings) == self.most:
-            signal.raise_signal(self.number)
+        if len(self.readings) == self.after:
+            self.do()
+
+
+class Impatient(Meanwhile):
+    """Presses Ctrl-C, or sends another signal, after so many readings."""
+
+    def __init__(self, most, number=signal.SIGINT):
+        super().__init__(most, lambda: signal.raise_signal(number))
 
 
 def mock(out, seed=1, **changes):

@@ -1,7 +1,5 @@
 """The command line in this process: quick, and with the exit status that a process of its own would have."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import os

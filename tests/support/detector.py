@@ -1,14 +1,8 @@
 """Signals of a detector that a mark passes once per turn, by closed forms."""
 
 import wave
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 #: C of the disc law [(rad/s)^-1/2/s], and where a top is released [Hz].
 C32, RELEASE_HZ = 2.34e-4, 40.0

@@ -1,16 +1,13 @@
 """Frozen dataclasses with arrays, compared attribute by attribute."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
-from typing import Any
 
 import numpy as np
 
 
-def differences(one: Any, other: Any, path: str = "") -> list[str]:
+def differences(one, other, path=""):
     """Return the paths at which two objects differ, to the last bit; NaN equals NaN."""
     if isinstance(one, np.ndarray) and isinstance(other, np.ndarray):
         return [] if np.array_equal(one, other, equal_nan=True) else [path]

@@ -2,7 +2,6 @@
 
 import base64
 import contextlib
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
@@ -13,11 +12,6 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from levilab.present.style import as_png, as_svg
-
-if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
-    Array = NDArray[np.float64]
 
 #: Pixels that a letter's box is larger than the letter, and by how much less than a line's box is looked at.
 _EDGE = 1.5

@@ -1,7 +1,5 @@
 """Motions of a top without a simulation, for a camera."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from levilab.animation.camera import Flight

@@ -46,7 +46,6 @@ def address(hall, run="", *, token=False):
 
 def address_for_guests(hall):
     """Where a guest's page of the server is."""
-    assert hall.guests
     return f"http://127.0.0.1:{hall.guests.port}/{hall.guests.token}/"
 
 
@@ -114,14 +113,7 @@ class GrowingRun:
         """Append readings."""
         self.add("".join(",".join(map(repr, row)) + "\n" for row in rows))
 
-    def event(
-        self,
-        text,
-        kind="said",
-        time_s=None,
-        utc="2026-11-22T09:00:05.123456Z",
-        **more,
-    ):
+    def event(self, text, kind="said", time_s=None, utc="2026-11-22T09:00:05.123456Z", **more):
         """Append an event."""
         with (self.folder / "events.jsonl").open("a", encoding="utf-8") as file:
             file.write(json.dumps({"utc": utc, "time_s": time_s, "kind": kind, "text": text} | more) + "\n")

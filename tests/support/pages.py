@@ -1,7 +1,5 @@
 """A report's page as the tests read it: its tags, and its text as people see it."""
 
-from __future__ import annotations
-
 from html.parser import HTMLParser
 
 #: Elements after which a text goes on as another one.
@@ -13,27 +11,27 @@ _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 class Page(HTMLParser):
     """Tags with their attributes, and the text without styles and scripts, powers of ten as ×10⁻³."""
 
-    def __init__(self, html: str) -> None:
+    def __init__(self, html):
         super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.headings: list[tuple[int, str]] = []
+        self.tags = []
+        self.headings = []
         self.raw = ""
-        self._open: list[str] = []
+        self._open = []
         self.feed(html)
         self.text = " ".join(self.raw.split())
 
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+    def handle_starttag(self, tag, attrs):
         self.tags.append((tag, dict(attrs)))
         self.raw += " " if tag in _APART else ""
         self._open.append(tag)
         if tag[0] == "h" and tag[1:].isdigit():
             self.headings.append((int(tag[1:]), ""))
 
-    def handle_endtag(self, tag: str) -> None:
+    def handle_endtag(self, tag):
         while self._open and self._open.pop() != tag:
             pass
 
-    def handle_data(self, data: str) -> None:
+    def handle_data(self, data):
         if {"style", "script"} & set(self._open[-1:]):
             return
         if self._open[-1:] in (["sup"], ["sub"]):
@@ -43,10 +41,10 @@ class Page(HTMLParser):
             level, text = self.headings[-1]
             self.headings[-1] = (level, text + data)
 
-    def of_level(self, level: int) -> list[str]:
+    def of_level(self, level):
         """The headings of a level, in their order."""
         return [text for own, text in self.headings if own == level]
 
-    def names(self) -> set[str]:
+    def names(self):
         """The names of all tags."""
         return {tag for tag, _ in self.tags}

@@ -29,7 +29,7 @@ class Fault:
     marked: bool = True
 
     @property
-    def toward(self) -> bool:
+    def toward(self):
         """Whether it strikes what goes to the instrument."""
         return self.what in MESSAGES
 

@@ -76,7 +76,6 @@ def test_a_disc_feels_what_the_simulators_quadrature_gives():
     seen, expected = axial_field(ring, disc)(z), scene_field(scene)(z)
     assert seen[:2] == pytest.approx(expected[:2], rel=1e-5)  # the series is left off at 1e-5 of the force
     stiff = top_of(scene).stiffnesses
-    assert stiff is not None
     # of the differences of the simulator 1e-4 is left where the stiffness itself nearly vanishes
     assert stiffnesses(ring, disc, moment)(z) == pytest.approx(stiff(z), rel=4e-4)
     top = SymmetricTop(1.0, 1.0, 1.0, moment, 9.82, stiffnesses(ring, disc, moment))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.ndimage import shift as moved
 
 from analysis.film.circles import Circle, coarse, find_base, find_top
 from analysis.film.errors import NoTop
@@ -65,8 +66,6 @@ def test_no_rim_is_seen_where_there_is_none(shown):
 
 @pytest.mark.parametrize("shift", [0.0, 0.2, -0.7])
 def test_a_shift_of_the_background_is_measured_whatever_the_light(shown, shift):
-    from scipy.ndimage import shift as moved
-
     random = np.random.default_rng(2)
     now = 0.9 * moved(shown.background, (0, shift), order=3, mode="nearest") + 12
     away = np.ones(now.shape, dtype=bool)

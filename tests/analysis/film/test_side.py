@@ -32,7 +32,6 @@ def fits(pictures):
     fits = []
     for one in pictures:
         fit = fit_side(one, side) or fit_side(one, side, width=3.0, rounds=6)
-        assert fit is not None
         fits.append(fit)
         side = replace(fit[1], radius=side.radius)
     return fits

@@ -1,6 +1,7 @@
 """What every link does, whatever is behind it: VISA by messages and as a stream, a line by VISA and by pyserial."""
 
 import contextlib
+from unittest.mock import Mock
 
 import pytest
 import serial
@@ -80,11 +81,8 @@ def test_an_answer_without_a_question_is_dropped_before_the_next_question(link, 
 
 
 def test_an_interrupted_wait_leaves_no_answer_for_the_next_question(link, clock, monkeypatch):
-    def interrupted(_):
-        raise KeyboardInterrupt
-
     with monkeypatch.context() as patch:
-        patch.setattr(clock, "sleep", interrupted)
+        patch.setattr(clock, "sleep", Mock(side_effect=KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             link.query("SLOW?")
     clock.sleep(10.0)

@@ -6,6 +6,7 @@ import os
 import socketserver
 import sys
 import threading
+from unittest.mock import Mock
 
 import pytest
 import pyvisa
@@ -207,10 +208,7 @@ def test_visas_third_port(monkeypatch, platform, name):
 
 
 def failing(monkeypatch, error):
-    def fail(*_, **__):
-        raise error
-
-    monkeypatch.setattr(serial, "serial_for_url", fail)
+    monkeypatch.setattr(serial, "serial_for_url", Mock(side_effect=error))
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,7 @@
 """The message link over a port that a test writes: what every link does, whatever library is behind it."""
 
+from unittest.mock import Mock
+
 import pytest
 
 from instruments.clock import VirtualClock
@@ -131,11 +133,7 @@ def test_a_link_that_was_locked_is_locked_again_when_it_is_made_anew(port):
 def test_nothing_is_sent_over_a_new_link_that_could_not_be_locked(port):
     one = link(port)
     one.lock()
-
-    def refuse(_):
-        raise Occupied("port")
-
-    port.lock = refuse
+    port.lock = Mock(side_effect=Occupied("port"))
     sent = list(port.sent)
     with pytest.raises(Occupied):
         one.reopen()

@@ -1,6 +1,7 @@
 """The transport over PyVISA, with the virtual bench in the same process at the far end."""
 
 import itertools
+from unittest.mock import Mock
 
 import pytest
 from pyvisa import VisaIOError
@@ -189,11 +190,7 @@ def test_on_a_serial_line_no_late_answer_is_taken_for_another(clock, questions):
 )
 def test_a_link_without_locks_is_no_trouble_and_one_that_breaks_is(bench, monkeypatch, trouble, error):
     transport = VisaTransport(ADDRESS, library=library_for(bench))
-
-    def broken(**_):
-        raise trouble
-
-    monkeypatch.setattr(transport.port.resource, "lock_excl", broken)
+    monkeypatch.setattr(transport.port.resource, "lock_excl", Mock(side_effect=trouble))
     if error is None:
         transport.lock()
     else:

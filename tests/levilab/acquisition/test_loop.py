@@ -1,12 +1,12 @@
 """The acquisition: from the virtual bench into a run folder, and every way out of it."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import json
 import signal
 from datetime import UTC, datetime, timedelta
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -27,13 +27,16 @@ from levilab.bench.bench import OutputMayBeOn
 from levilab.bench.wiring import Wiring
 from levilab.computer import Computer, at_another_computer
 from levilab.files import CannotWrite
+from levilab.pipelines.options import SpinDownOptions
+from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
+from levilab.simulator import preset
 from levilab.simulator.laws import LAWS
 from levilab.simulator.spin import DECAYS
 from levilab.world.bench import VIRTUAL, virtual_bus
 from levilab.world.spin_world import Phase, SpinScene, SpinWorld, random_scene
-from support.acquisitions import BEFORE, LET_GO_AT_ONCE, Impatient, Silent, in_world, mock, of_scene
+from support.acquisitions import BEFORE, LET_GO_AT_ONCE, Impatient, Meanwhile, Silent, in_world, mock, of_scene
 
 
 def watch_outputs(patch):
@@ -56,22 +59,14 @@ def outputs(monkeypatch):
     return watch_outputs(monkeypatch)
 
 
-@dataclasses.dataclass(frozen=True)
-class Whole:
-    """A run that nothing disturbs, what was shown of it, and what the generator's output was set to."""
-
-    run: Run
-    show: Silent
-    outputs: list[bool]
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory):
+    """A run that nothing disturbs, what was shown of it, and what the generator's output was set to."""
     show = Silent()
     with pytest.MonkeyPatch.context() as patch:
         outputs = watch_outputs(patch)
         run = acquire(mock(tmp_path_factory.mktemp("usual"), note="first try", wire_log=True), show)
-    return Whole(run, show, outputs)
+    return SimpleNamespace(run=run, show=show, outputs=outputs)
 
 
 @pytest.fixture
@@ -336,16 +331,10 @@ def test_errors_that_an_earlier_program_left_are_not_ours(tmp_path, monkeypatch)
 
 
 def test_a_full_disk_in_the_middle_leaves_outputs_off_and_the_shown_readings(tmp_path, outputs, monkeypatch):
-    class Filling(Silent):
-        def reading(self, text, elapsed, remaining):
-            super().reading(text, elapsed, remaining)
-            if len(self.readings) == 7:
-                monkeypatch.setattr("levilab.runs.writer.os.fsync", full)
-
     def full(_):
         raise OSError(28, "No space left on device")
 
-    show = Filling()
+    show = Meanwhile(7, lambda: monkeypatch.setattr("levilab.runs.writer.os.fsync", full))
     with pytest.raises(CannotWrite, match=r"write the reading .*No space left"):
         acquire(mock(tmp_path), show)
     (run,) = [Run.load(path) for path in tmp_path.iterdir()]
@@ -486,10 +475,6 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path):
 
 
 def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion):
-    from levilab.pipelines.options import SpinDownOptions
-    from levilab.pipelines.spindown.document import SPINDOWN
-    from levilab.simulator import preset
-
     run = in_full_motion
     assert [event["kind"] for event in run.events()][-4:] == ["locked", "drive off", "asked again", "fell"]
     spins = run.readings().frame["spin_frequency_hz"]
@@ -520,12 +505,8 @@ def test_a_run_in_full_motion_is_repeated_by_its_seed_and_resumed_in_its_scene(i
 @pytest.mark.parametrize("error", [OutputMayBeOn("COM1", OSError("gone")), ConnectionError("gone")])
 def test_a_drive_that_may_be_on_is_said_once(monkeypatch, error):
     """Either by the error, or by a message where the error is another one."""
-
-    def fail(*_):
-        raise error
-
     said = [str(error)]
-    monkeypatch.setattr("levilab.acquisition.loop._acquire", fail)
+    monkeypatch.setattr("levilab.acquisition.loop._acquire", Mock(side_effect=error))
     monkeypatch.setattr(Silent, "message", lambda _, text: said.append(str(text)), raising=False)
     request = dataclasses.replace(request_for("spin", AcquisitionOptions(mock=True)), synthetic_how=None)
     with pytest.raises(type(error)):

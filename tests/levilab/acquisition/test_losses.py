@@ -12,6 +12,7 @@ from levilab.acquisition.grip import GRIP_GATE_S
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.session import MOST_LOSSES
 from levilab.acquisition.table import settings_of, with_settings
+from levilab.runs.run import Run
 from levilab.world import bench as benches
 from levilab.world.bench import VIRTUAL, virtual_bus
 from support.acquisitions import BEFORE, Silent, kinds, mock
@@ -89,8 +90,6 @@ def test_an_instrument_that_is_gone_for_a_while_is_tried_until_it_is_back(tmp_pa
 
 
 def test_an_instrument_that_another_program_keeps_ends_the_run_and_keeps_its_readings(tmp_path, monkeypatch):
-    from levilab.runs.run import Run
-
     with pytest.raises(InstrumentError, match="locked"):
         acquired(tmp_path, monkeypatch, Fault("taken by another", question=r"READ\?", after=BEFORE + 6))
     (run,) = [Run.load(path) for path in tmp_path.iterdir()]
@@ -100,8 +99,6 @@ def test_an_instrument_that_another_program_keeps_ends_the_run_and_keeps_its_rea
 
 
 def test_an_instrument_that_is_lost_again_and_again_is_given_up(tmp_path, monkeypatch):
-    from levilab.runs.run import Run
-
     with pytest.raises(InstrumentError):
         acquired(tmp_path, monkeypatch, Fault("disconnected", question=r"READ\?", after=BEFORE + 6, times=1000))
     (run,) = [Run.load(path) for path in tmp_path.iterdir()]

@@ -1,7 +1,5 @@
 """What a session offers to every experiment, shown by one that is no spin-down: a scan with a person at the bench."""
 
-from __future__ import annotations
-
 import dataclasses
 import shutil
 import signal

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope.sound import SilentInput
 from instruments.errors import NotConnected
 from levilab.acquisition.loop import acquire
@@ -13,6 +14,7 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.runs.run import Run
+from levilab.world.bench import PickupCoil
 from levilab.world.spin_world import SpinScene, SpinWorld
 from support.acquisitions import LET_GO_AT_ONCE, RAISED_QUICKLY, Impatient, Silent
 from support.wire import ask
@@ -141,9 +143,6 @@ def test_left_is_the_light_and_right_a_pickup_coil(tmp_path):
 
 
 def test_the_voltage_of_the_pickup_coil_is_that_of_a_turning_dipole():
-    from instruments.clock import VirtualClock
-    from levilab.world.bench import PickupCoil
-
     world = SpinWorld(SpinScene(), VirtualClock())
     volts = PickupCoil(world, amplifier=1.0)(0.0, 1e-4, 1000)
     # N A ω (μ₀/4π) 2 μ δ / r³

@@ -1,6 +1,7 @@
 """The bench, opened and left: whatever happens, the drive is off and everything is closed."""
 
 from functools import partial
+from unittest.mock import Mock
 
 import pytest
 import pyvisa
@@ -114,11 +115,8 @@ def test_after_a_normal_end_the_drive_is_off_and_all_is_closed(world):
     "error", [ZeroDivisionError("physics"), Interrupted("SIGINT"), KeyboardInterrupt(), SystemExit()], ids=repr
 )
 def test_after_any_error_the_drive_is_off_and_the_error_is_reported(world, error):
-    def end():
-        raise error
-
     with pytest.raises(type(error)) as raised:
-        drive_and(world, end)
+        drive_and(world, Mock(side_effect=error))
     assert raised.value is error
     assert world.field == 0
     assert_closed(world.bench)

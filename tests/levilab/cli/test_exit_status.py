@@ -4,6 +4,7 @@ import ast
 import errno
 import inspect
 import re
+from unittest.mock import Mock
 
 import pytest
 
@@ -229,18 +230,12 @@ def test_what_may_not_be_read_is_said_in_one_line(monkeypatch, tmp_path, words):
 
 
 def test_an_interrupted_command_ends_with_130(monkeypatch, tmp_path):
-    def interrupted(_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("levilab.runs.listing.list_runs", interrupted)
+    monkeypatch.setattr("levilab.runs.listing.list_runs", Mock(side_effect=KeyboardInterrupt))
     assert command("runs", ".", cwd=tmp_path).status == exit_codes.INTERRUPTED
 
 
 def test_an_interrupted_analysis_says_in_one_line_what_is_lost(monkeypatch, tmp_path, sample_data):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", interrupted)
+    monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", Mock(side_effect=KeyboardInterrupt))
     run = sample_data / "spin-down-1"
     for words, says in (("analyze spindown", "is lost, nothing is written"), ("report", "no report is written")):
         ended = command(*words.split(), str(run), cwd=tmp_path)
@@ -258,10 +253,7 @@ def test_the_exit_statuses_know_only_the_trees_of_errors():
 
 
 def test_a_defect_of_the_program_stays_loud(monkeypatch, tmp_path):
-    def broken(_):
-        raise ZeroDivisionError
-
-    monkeypatch.setattr("levilab.runs.listing.list_runs", broken)
+    monkeypatch.setattr("levilab.runs.listing.list_runs", Mock(side_effect=ZeroDivisionError))
     monkeypatch.setattr("sys.argv", ["levilab", "runs", str(tmp_path)])
     with pytest.raises(ZeroDivisionError):
         main()

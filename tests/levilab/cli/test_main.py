@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from importlib.metadata import version
 from typing import get_type_hints
 
 import pytest
@@ -51,8 +52,6 @@ def test_each_analysis_has_its_options():
 
 
 def test_the_version_is_printed(levilab):
-    from importlib.metadata import version
-
     assert levilab("--version").stdout == f"levilab {version('levilab')}\n"
 
 
@@ -231,10 +230,7 @@ def test_a_reader_that_goes_away_costs_neither_the_run_nor_the_result(tmp_path):
     """As in `levilab … | head -1`: the first line is read, then the pipe is closed."""
     for words in (["acquire", "spin", "--mock", *QUICKLY], ["analyze", "spindown", "runs"]):
         process = subprocess.Popen(
-            [sys.executable, "-m", "levilab", *words],
-            cwd=tmp_path,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
+            [sys.executable, "-m", "levilab", *words], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
         )
         process.stdout.readline()
         process.stdout.close()

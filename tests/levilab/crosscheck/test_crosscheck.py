@@ -79,9 +79,8 @@ def test_the_count_of_a_nutating_top_is_as_the_analysis_has_it():
         slow, fast = steady_rates(scene, 2 * np.pi * motion.spin_hz[part].mean(), motion.position[0])
         sleeping.append(np.sqrt(slow * fast / top.inertia_axial_kg_m2**2) * 2 * top.inertia_transverse_kg_m2)
         shape = 1 / np.sqrt((2 * np.pi * motion.spin_hz[part].mean() / sleeping[-1]) ** 2 - 1)
-        assert more[part].mean() == pytest.approx(
-            0.05 * shape, rel=0.03
-        )  # the axis is tilted by up to 0.06: its square
+        # the axis is tilted by up to 0.06: its square
+        assert more[part].mean() == pytest.approx(0.05 * shape, rel=0.03)
     assert motion.spin_hz[-1] < 29
     assert sleeping[1] == pytest.approx(sleeping[0])
     assert scene.start.tilt_rad == pytest.approx(0.03, abs=0.01)

@@ -1,5 +1,6 @@
 """Files as students have them: each is read, gives the spin-down that it was made from, or asks."""
 
+import importlib.util
 import json
 import re
 import zipfile
@@ -19,6 +20,7 @@ from levilab.formats.waveforms.header import NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.sources import data_files
+from levilab.pipelines.suits import save
 from support.paths import ROOT
 
 FILES = ROOT / "sample_data" / "student-files"
@@ -53,8 +55,6 @@ def test_a_file_of_a_student_gives_the_spin_down_it_was_made_from(name):
 
 
 def test_the_files_are_what_their_script_makes(tmp_path):
-    import importlib.util
-
     spec = importlib.util.spec_from_file_location("student_files", ROOT / "sample_data" / "student_files.py")
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
@@ -245,8 +245,6 @@ def test_what_was_found_of_runs_in_a_file_is_recalled(tmp_path):
     file.write_bytes((FILES / "runs-under-one-time.csv").read_bytes())
     row = ANALYSES["spindown"]
     found = row.analyze([file], row.options_from({}))
-    from levilab.pipelines.suits import save
-
     assert [path.name for path in save(row, found, with_figure=False)] == ["runs.csv.result.json"]
     inputs = json.loads((tmp_path / "runs.csv.result.json").read_text(encoding="utf-8"))["inputs"]
     assert [one["path"] for one in inputs] == ["runs.csv/Messung 1", "runs.csv/Messung 2", "runs.csv/Messung 3"]

@@ -4,6 +4,7 @@ import codecs
 import math
 import os
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -356,11 +357,7 @@ def test_a_pipe_is_refused_at_once(tmp_path):
 )
 def test_an_unreadable_file_is_reported(error, words, table_file, monkeypatch):
     path = table_file(GOOD)
-
-    def refuse(*_, **__):
-        raise error
-
-    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr(Path, "open", Mock(side_effect=error))
     for read in (read_table, read_run_readings):
         with pytest.raises(TableError, match=words):
             read(path)

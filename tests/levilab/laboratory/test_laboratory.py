@@ -15,6 +15,7 @@ from levilab.bench.bench import Bench
 from levilab.cli.exit_codes import exit_status
 from levilab.interruption import interruption_blocked
 from levilab.laboratory import explore
+from levilab.laboratory import visit as visiting
 from levilab.laboratory.disk import SimulatedComputer
 from levilab.laboratory.fate import Event
 from levilab.laboratory.plan import draw
@@ -102,98 +103,64 @@ def test_a_seed_gives_the_same_trace_in_another_process(levilab_process):
 # --- what it would notice ---
 
 
-def oracles(told):
-    return {finding.oracle for finding in told.findings}
+WITHOUT_SYNC = (SimulatedComputer, "sync", lambda *_: None)
+READING, READINGS_EVERY, RECONNECT = RunWriter.reading, Session.readings_every, Session.reconnect
+FLUX_DENSITY = LakeShoreGaussmeter.flux_density
 
 
-def without_sync(patch):
-    patch.setattr(SimulatedComputer, "sync", lambda *_: None)
+def off_by_a_turn(writer, row):
+    row["spin_frequency_hz"] += 0.5
+    READING(writer, row)
 
 
-def shown_before_written(patch):
-    patch.setattr(RunWriter, "reading", lambda *_: None)
+#: What is wrong in the program, by whom that is noticed, and in which laboratory.
+MISTAKES = {
+    "without sync": (WITHOUT_SYNC, "lost", spin_down(Event("power", 0, 150))),
+    "shown before it is written": ((RunWriter, "reading", lambda *_: None), "lost", spin_down()),
+    "written twice": ((RunWriter, "reading", lambda *row: [READING(*row), READING(*row)]), "doubled", spin_down()),
+    "a defect": ((Bench, "changed_settings", lambda *_: {}["of no such name"]), "traceback", spin_down()),
+    "off by a turn": ((RunWriter, "reading", off_by_a_turn), "wrong reading", spin_down()),
+    "another height than typed": (
+        *((field, "parse_height", lambda _: 0.05), "wrong reading"),
+        a_scan(Event("types a height", 0, 3)),
+    ),
+    "in gauss": (
+        *((LakeShoreGaussmeter, "flux_density", lambda meter: 1e4 * FLUX_DENSITY(meter)), "wrong reading", a_scan()),
+    ),
+    "readings that catch up": (
+        (Session, "readings_every", lambda session, interval, most: READINGS_EVERY(session, interval / 3, most)),
+        *("crowded", spin_down()),
+    ),
+    "not set up again": (
+        (Session, "reconnect", lambda session, kind, error, _: RECONNECT(session, kind, error, lambda: None)),
+        *("false fall", spin_down(Event("plug", 0, 150, 0.03))),
+    ),
+    "drives on": (
+        (driving, "drive_off", lambda _: None),
+        "output",
+        a_plan("spin", "hold_s=0", "drive_frequency_hz=35"),
+    ),
+    "fails without a reason": (
+        (ReciprocalCounter, "_reading", lambda driver, *asked: driver.reject(*asked, "another number")),
+        *("gave up", spin_down()),
+    ),
+    "None in a report": ((visiting, "page_of", lambda _: "<p>None</p><svg>NaN</svg>"), "report", spin_down()),
+    "raises what the disk says": (
+        (Run, "events", lambda run: [(run.folder / "run.json").read_bytes() for _ in range(9)] and []),
+        *("traceback", replace(spin_down(), seed=31)),
+    ),
+    "left on": (
+        *((Bench, "outputs_off", lambda _: None), "output"),
+        a_plan("spin", "drive_frequency_hz=35", events=[Event("ctrl-c", 0, 300)]),
+    ),
+}
 
 
-def written_twice(patch):
-    once = RunWriter.reading
-    patch.setattr(RunWriter, "reading", lambda *given: [once(*given), once(*given)])
-
-
-def left_on(patch):
-    patch.setattr(Bench, "outputs_off", lambda _: None)
-
-
-def with_a_defect(patch):
-    patch.setattr(Bench, "changed_settings", lambda *_: {}["of no such name"])
-
-
-def off_by_a_turn(patch):
-    once = RunWriter.reading
-
-    def reading(writer, row):
-        row["spin_frequency_hz"] += 0.5
-        once(writer, row)
-
-    patch.setattr(RunWriter, "reading", reading)
-
-
-def another_height_than_typed(patch):
-    patch.setattr(field, "parse_height", lambda _: 0.05)
-
-
-def in_gauss(patch):
-    once = LakeShoreGaussmeter.flux_density
-    patch.setattr(LakeShoreGaussmeter, "flux_density", lambda driver: 1e4 * once(driver))
-
-
-def catches_up(patch):
-    once = Session.readings_every
-    patch.setattr(Session, "readings_every", lambda session, interval, longest: once(session, interval / 3, longest))
-
-
-def not_set_up_again(patch):
-    once = Session.reconnect
-    patch.setattr(Session, "reconnect", lambda session, kind, error, _: once(session, kind, error, lambda: None))
-
-
-def drives_on(patch):
-    patch.setattr(driving, "drive_off", lambda _: None)
-
-
-def fails_without_a_reason(patch):
-    patch.setattr(ReciprocalCounter, "_reading", lambda driver, *asked: driver.reject(*asked, "another number"))
-
-
-def with_none_in_it(patch):
-    patch.setattr("levilab.laboratory.visit.page_of", lambda _: "<p>None</p><svg>NaN</svg>")
-
-
-def raises_what_the_disk_says(patch):
-    patch.setattr(Run, "events", lambda run: [(run.folder / "run.json").read_bytes() for _ in range(9)] and [])
-
-
-@pytest.mark.parametrize(
-    ("mistake", "oracle", "plan"),
-    [
-        (without_sync, "lost", spin_down(Event("power", 0, 150))),
-        (shown_before_written, "lost", spin_down()),
-        (written_twice, "doubled", spin_down()),
-        (with_a_defect, "traceback", spin_down()),
-        (off_by_a_turn, "wrong reading", spin_down()),
-        (another_height_than_typed, "wrong reading", a_scan(Event("types a height", 0, 3))),
-        (in_gauss, "wrong reading", a_scan()),
-        (catches_up, "crowded", spin_down()),
-        (not_set_up_again, "false fall", spin_down(Event("plug", 0, 150, 0.03))),
-        (drives_on, "output", a_plan("spin", "hold_s=0", "drive_frequency_hz=35")),
-        (fails_without_a_reason, "gave up", spin_down()),
-        (with_none_in_it, "report", spin_down()),
-        (raises_what_the_disk_says, "traceback", replace(spin_down(), seed=31)),
-        (left_on, "output", a_plan("spin", "drive_frequency_hz=35", events=[Event("ctrl-c", 0, 300)])),
-    ],
-)
-def test_a_mistake_in_the_program_is_noticed(mistake, oracle, plan, monkeypatch):
-    mistake(monkeypatch)
-    assert oracle in oracles(visit(plan, exit_status))
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_in_the_program_is_noticed(name, monkeypatch):
+    mistake, oracle, plan = MISTAKES[name]
+    monkeypatch.setattr(*mistake)
+    assert oracle in {finding.oracle for finding in visit(plan, exit_status).findings}
 
 
 def test_ctrl_c_is_pressed_in_a_worker_too_which_blocks_its_own():
@@ -208,7 +175,7 @@ def test_ctrl_c_is_pressed_in_a_worker_too_which_blocks_its_own():
 
 
 def test_a_failure_is_shrunk_to_what_it_needs(monkeypatch):
-    without_sync(monkeypatch)
+    monkeypatch.setattr(*WITHOUT_SYNC)
     events = [Event("slow disk", 0, 20, 0.01), Event("power", 0, 150)]
     plan = replace(spin_down(*events), typed={"group": "Group 7"}, models={"counter": "CNT-91"})
     small = shrink(visit(plan, exit_status), exit_status)

@@ -1,9 +1,12 @@
 """Who may look, and who may give commands."""
 
 import json
+import socket
+import urllib.request
 
 import pytest
 
+from levilab.live.desk import Desk
 from levilab.live.doors import Doors
 from levilab.live.practice.commands import PracticeEvent
 from support.live_pages import PATIENCE_S, GrowingRun, address, request, serving, spin_down
@@ -61,8 +64,6 @@ def bench():
 
 @pytest.fixture(scope="module")
 def hall(tmp_path_factory, bench):
-    from levilab.live.desk import Desk
-
     root = tmp_path_factory.mktemp("runs")
     GrowingRun(root, "one")
     (root / "one" / "report.html").write_text("<h1>report</h1>", encoding="utf-8")
@@ -89,8 +90,6 @@ def test_nothing_but_figures_and_the_report_is_served(hall, path):
 
 
 def test_a_report_is_a_page_of_no_origin(hall):
-    import urllib.request
-
     with urllib.request.urlopen(address(hall) + "run/one/report.html") as answer:
         policy = answer.headers["content-security-policy"]
     assert policy.startswith("sandbox allow-scripts")
@@ -146,8 +145,6 @@ def test_a_question_that_is_no_text_or_too_long_closes_the_socket(hall, question
 
 
 def test_a_request_that_is_no_http_prints_nothing(hall, caplog):
-    import socket
-
     with socket.create_connection(("127.0.0.1", hall.doors.port), timeout=PATIENCE_S) as raw:
         raw.sendall(b"\x16\x03\x01 junk\r\n\r\n")
         assert raw.recv(100).startswith(b"HTTP/1.1 400")

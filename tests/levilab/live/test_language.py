@@ -3,6 +3,7 @@
 import json
 import re
 
+import numpy as np
 import pytest
 
 from levilab.live.desk import Desk
@@ -42,8 +43,6 @@ def hall(tmp_path):
 
 
 def measure(hall, run=""):
-    import numpy as np
-
     said = Text("the drive has lost the top: {again}", again="switch it off, match the spin, and go up more slowly")
     drive = Drive("SQU", 30.25, 10.0, output=True)
     wave = np.zeros(50, np.float32)

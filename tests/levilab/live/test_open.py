@@ -1,8 +1,10 @@
 """A data file in the browser: dropped, corrected, kept, analyzed; and what the server takes and refuses."""
 
+import asyncio
 import json
 import math
 import shutil
+import socket
 from pathlib import Path
 from threading import Event
 
@@ -198,8 +200,6 @@ def test_a_file_needs_the_token_and_a_page_of_this_server(hall):
 
 
 def test_a_file_that_breaks_off_on_its_way_leaves_nothing(hall):
-    import socket
-
     head = f"POST /file HTTP/1.1\r\nHost: 127.0.0.1:{hall.doors.port}\r\nX-Levilab-Token: {hall.doors.token}\r\n"
     with socket.create_connection(("127.0.0.1", hall.doors.port)) as raw:
         raw.sendall(f"{head}X-Levilab-Name: torn.csv\r\nContent-Length: 9999\r\n\r\nt,f\n".encode())
@@ -248,8 +248,6 @@ async def _keep(opened, name, content):
 
 
 def test_a_dropped_file_replaces_no_other(tmp_path):
-    import asyncio
-
     opened = Opened(tmp_path)
 
     async def drop():

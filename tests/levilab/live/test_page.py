@@ -168,9 +168,8 @@ def test_a_run_grows_is_torn_reloaded_and_ends(served, page, tmp_path):
         until(page, "document.querySelector('#event-list .warning')")
         run.readings(spin_down(9, first=4))  # to 120 s; 25 Hz come at 143 s, 21.36 Hz at 199 s
         until(page, "document.getElementById('left').textContent === 'about 25 to 80 s left'")
-        assert (
-            page.evaluate("Math.abs(levilab.data.fit.x.at(-1) - levilab.data.end[1])") < 0.001
-        )  # the line ends where the head says
+        # the line ends where the head says
+        assert page.evaluate("Math.abs(levilab.data.fit.x.at(-1) - levilab.data.end[1])") < 0.001
         for limits, said in (("-3, 21", "at most 25 s"), ("-9, -1", ""), ("80, 140", "about 80 s to 2:20 min")):
             assert page.evaluate(f"import('/page/words.js').then(({{between}}) => between({limits}))") == said
     chosen = "document.querySelector('#run option:checked').textContent"
@@ -302,10 +301,8 @@ def test_the_last_minutes_of_the_bench_are_drawn_before_the_first_reading(served
             if spin:
                 said = f"top at {spin:.2f} hertz" + ", drive at 30.75 hertz" * drive
                 until(page, f"document.getElementById('plot').getAttribute('aria-label').endsWith(': {said}')")
-        assert page.evaluate("[levilab.history.drives.length, levilab.history.counts.length]") == [
-            1,
-            0,
-        ]  # of the last three minutes
+        # of the last three minutes
+        assert page.evaluate("[levilab.history.drives.length, levilab.history.counts.length]") == [1, 0]
         assert page.inner_text("#readings-title") == "The last minutes"
         assert not page.locator("#empty").is_visible()
         run.readings(spin_down(3))
@@ -478,7 +475,6 @@ def test_a_million_readings_are_drawn_from_a_few_thousand_numbers(served, page, 
     page.goto(address(served, run.folder.name))
     until(page, "levilab.frames > 0")
     followed = served.watches[run.folder.name].followed
-    assert followed is not None
     followed.readings.add(rows)
     run.readings([(1e5, 30.0, 0.03)])
     until(page, f"levilab.data.count === {n + 1}")

@@ -433,7 +433,6 @@ def test_fingers_turn_the_top_come_nearer_and_scroll(starting, watched):
     page = watched(viewport=PHONE, has_touch=True)
     show_a_top(starting, page)
     cdp, box = page.context.new_cdp_session(page), page.locator("#space").bounding_box()
-    assert box
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
 
     def draw(*paths):

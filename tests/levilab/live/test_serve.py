@@ -193,7 +193,6 @@ def test_a_signal_ends_the_view_in_one_line(tmp_path, name):
     process = subprocess.Popen(
         words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=os.environ
     )
-    assert process.stdout is not None
     try:
         assert process.stdout.readline().startswith("http://127.0.0.1:")
         process.send_signal(getattr(signal, name))

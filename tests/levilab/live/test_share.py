@@ -3,6 +3,7 @@
 import contextlib
 import json
 import socket
+from unittest.mock import Mock
 from urllib.parse import urlsplit
 from urllib.request import urlopen
 
@@ -10,8 +11,10 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
+from levilab.interruption import End
 from levilab.live.desk import Desk
 from levilab.live.practice.bench import PracticeBench
+from levilab.live.serve import LiveOptions, serve_live
 from levilab.live.share import NoNetwork, address_in_network, code_of, who_may_look
 from support.browser import PHONE
 from support.live_pages import PATIENCE_S, GrowingRun, address, address_for_guests, request, serving, spin_down, until
@@ -153,10 +156,7 @@ def test_the_code_is_a_square_with_its_three_marks():
 
 
 def test_without_a_network_nothing_is_shared(monkeypatch):
-    def unreachable(*_):
-        raise OSError(101, "Network is unreachable")
-
-    monkeypatch.setattr(socket.socket, "connect", unreachable)
+    monkeypatch.setattr(socket.socket, "connect", Mock(side_effect=OSError(101, "Network is unreachable")))
     with pytest.raises(NoNetwork, match="is in no network"):
         address_in_network()
 
@@ -166,14 +166,10 @@ def test_a_public_address_is_said_to_be_one():
 
 
 def test_nothing_is_shared_unless_it_is_asked_for(tmp_path):
-    from levilab.interruption import End
-    from levilab.live.serve import LiveOptions, serve_live
-
     end, said = End(), []
 
     def announce(own, shared):
         said.append((own, shared))
-        assert end.wake
         end.wake()
 
     serve_live(LiveOptions(out=tmp_path, port=0), end, announce, pytest.fail)

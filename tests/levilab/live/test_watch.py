@@ -1,13 +1,11 @@
 """When the running fit is computed: on a clock that the test moves."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 import time
 from contextlib import nullcontext
 from types import MappingProxyType, SimpleNamespace
-from typing import TYPE_CHECKING
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -24,10 +22,6 @@ from levilab.telemetry.codec import unpack
 from levilab.telemetry.messages import State
 from support.live_pages import GrowingRun, publish, spin_down
 from support.waiting import HANG_GUARD_S
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
 
 LINE = Running("a law so far", curve=Curve(np.arange(2.0), np.arange(2.0)))
 
@@ -180,15 +174,12 @@ def test_a_watch_that_fails_fails_alone_and_names_the_error(tmp_path, monkeypatc
     sound = GrowingRun(tmp_path, "2-sound")
     hall = Hall(tmp_path, "", Doors(1))
 
-    def fail():
-        raise MemoryError("1 TiB")
-
     async def read():
         with hall.watching("1-broken") as one, hall.watching("2-sound") as two:
             one.step()
             assert one.followed
             assert two.followed
-            monkeypatch.setattr(one.followed, "look", fail)
+            monkeypatch.setattr(one.followed, "look", Mock(side_effect=MemoryError("1 TiB")))
             sound.readings(spin_down(3))
             reading = asyncio.create_task(hall.read_on())
             while not two.followed.readings.count and not reading.done():
@@ -205,7 +196,7 @@ def test_a_watch_that_fails_fails_alone_and_names_the_error(tmp_path, monkeypatc
 class Flood:
     """A socket with a question at any time.  It is closed after 1000 answers."""
 
-    query_params: Mapping[str, str] = MappingProxyType({"run": "one"})
+    query_params = MappingProxyType({"run": "one"})
 
     def __init__(self):
         self.answers = 0

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import levilab
+from analysis.field.ring import Ring, on_axis
 from support.paths import DOCS, SAMPLE_DATA
 
 
@@ -76,7 +77,6 @@ def test_u_of_a_curve_is_that_of_its_parameters():
     assert line.eval_uncertainty(x) == pytest.approx(u, rel=0.15)  # Student's factor, of 7 degrees and more
     scan = levilab.analyze(SAMPLE_DATA / "field-scan", device=SAMPLE_DATA / "device.toml")
     fit, z = scan.fit, np.array([0.04, 0.07, 0.1])
-    from analysis.field.ring import Ring, on_axis
 
     def field(p):
         return on_axis(Ring(p[0], p[1], p[2], p[4], p[5]), z)[0] + p[3]

@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import fields
+from unittest.mock import Mock
 
 import numpy as np
 import pandas as pd
@@ -322,10 +323,7 @@ def test_two_arrays_need_no_brackets():
 # --- wrong calls ---
 
 
-def frame_of(*names):
-    return pd.DataFrame({name: [40.0, 41.0, 42.0, 43.5] for name in names})
-
-
+FOUR = [40.0, 41.0, 42.0, 43.5]
 #: Wrong calls: the argument that the UsageError names, or the class of another error.
 WRONG = {
     "several suit": (lambda: levilab.analyze(SAMPLE_DATA), "kind"),
@@ -338,7 +336,7 @@ WRONG = {
     "no equal columns": (lambda: levilab.analyze({"time_s": [0.0, 1.0], "spin_frequency_hz": [40.0]}), "data"),
     "nothing": (lambda: levilab.analyze([]), "data"),
     "no columns": (lambda: levilab.analyze(pd.DataFrame()), "data"),
-    "unknown titles": (lambda: levilab.analyze(frame_of("a", "b")), DoesNotSuit),
+    "unknown titles": (lambda: levilab.analyze(pd.DataFrame({"a": FOUR, "b": FOUR})), DoesNotSuit),
     "two kinds": (lambda: levilab.analyze([SAMPLE_DATA / "spin-down-1", SAMPLE_DATA / "field-scan"]), DoesNotSuit),
     "no file": (lambda: levilab.analyze("nowhere.csv"), DataError),
     "foreign option": (lambda: levilab.analyze(spin_down(), method="edges"), "method"),
@@ -425,10 +423,7 @@ def test_an_experiment_gives_its_run_without_a_word(tmp_path, capsys):
 
 
 def test_a_person_who_cannot_be_asked_ends_the_experiment(monkeypatch):
-    def closed(_):
-        raise EOFError
-
-    monkeypatch.setattr("builtins.input", closed)
+    monkeypatch.setattr("builtins.input", Mock(side_effect=EOFError))
     with pytest.raises(ExperimentFailed, match=r"'float the top' cannot be answered: .* give `person`"):
         ask_with_input(Task("float the top"))
 
@@ -461,7 +456,6 @@ def test_a_simulated_motion_has_the_states_that_were_asked_for(tmp_path):
     assert repr(motion) == "<SimulatedMotion of undriven: 101 states in 2 s, up to the end>"
     assert "undriven: the top stayed up for all of 2 s" in motion.summary()
     assert "constant, 31.000 Hz" in motion._repr_html_()
-    assert motion.folder
     written = levilab.load(motion.folder).to_dataframe()
     assert np.array_equal(written.to_numpy(), states.to_numpy())
 

@@ -21,10 +21,6 @@ from support.paths import SAMPLE_DATA
 T = np.arange(0.0, 200.0, 10.0)
 
 
-def _disc(t):
-    return 40.0 / (1 + 0.5 * 2.37e-4 * np.sqrt(2 * np.pi * 40.0) * t) ** 2
-
-
 #: What is typed → whether the answer is right.
 GUESSES = {
     # a run
@@ -366,7 +362,8 @@ def names():
         "xr": xarray,
         "seconds": (seconds := np.arange(6000) / 3000.0),
         "light": (np.abs((25.0 * seconds) % 1 - 0.5) < 0.03) + np.random.default_rng(1).normal(0, 0.01, 6000),
-        "f": _disc(T) + np.random.default_rng(1).normal(0.0, 0.03, T.size),
+        "f": 40.0 / (1 + 0.5 * 2.37e-4 * np.sqrt(2 * np.pi * 40.0) * T) ** 2
+        + np.random.default_rng(1).normal(0.0, 0.03, T.size),
     }
 
 

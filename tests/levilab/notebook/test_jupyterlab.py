@@ -56,7 +56,6 @@ def _server(folder):
     words += ["--ServerApp.ip=127.0.0.1", f"--ServerApp.root_dir={folder}", "--LabApp.news_url="]
     pipes = {"stderr": subprocess.PIPE, "text": True, "encoding": "utf-8"}
     with subprocess.Popen(words, env=environment, cwd=folder, **pipes) as server:
-        assert server.stderr
         rest = threading.Thread(target=deque, args=(server.stderr, 0))  # it must not wait for us to read
         try:
             lines = (re.search(r"http://127\.0\.0\.1:\d+/", line) for line in server.stderr)

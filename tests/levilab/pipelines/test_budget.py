@@ -188,11 +188,7 @@ def test_a_field_is_shown_in_the_units_of_the_laboratory(found):
 def test_budgets_are_folds_and_their_origins_are_said_once(found):
     budgets = found["a sweep"].budget
     blocks = budget_blocks(budgets)
-    assert [type(block) for block in blocks] == [
-        Details,
-        Details,
-        Paragraph,
-        Details,
-    ]  # what holds for both is said once
+    # what holds for both is said once
+    assert [type(block) for block in blocks] == [Details, Details, Paragraph, Details]
     assert [type(block) for block in blocks[0].blocks] == [Tabular]
     assert len({block.blocks[0].name for block in blocks[:2]}) == 2

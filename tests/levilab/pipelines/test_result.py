@@ -61,8 +61,6 @@ def test_files_that_differ_in_their_ending_alone_keep_their_results(tmp_path):
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_the_result_of_a_run_folder_is_result_json_in_it(tmp_path, sample_data, monkeypatch):
-    import shutil
-
     def write(path, content):
         written.append(path.name)
         replace_atomically(path, content)

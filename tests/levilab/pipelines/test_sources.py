@@ -110,12 +110,6 @@ def test_a_pipe_in_the_place_of_readings_is_refused_at_once(tmp_path, sample_dat
             sha256_of(pipe)
 
 
-def test_the_digest_of_a_file_is_that_of_the_standard(tmp_path):
-    (tmp_path / "readings.csv").write_bytes(b"abc")
-    # FIPS 180-4, the example of one block
-    assert sha256_of(tmp_path / "readings.csv") == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"
-
-
 def test_of_many_runs_few_are_compared_with_each_other(tmp_path, monkeypatch):
     first = spin_down_csv(tmp_path / "0.csv")
     head, *lines = first.read_text(encoding="utf-8").splitlines()

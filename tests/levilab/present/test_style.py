@@ -2,6 +2,7 @@
 
 import os
 import re
+from unittest.mock import Mock
 from xml.etree import ElementTree as ET
 
 import matplotlib as mpl
@@ -17,11 +18,7 @@ def test_a_picture_that_cannot_be_written_leaves_the_older_one(tmp_path, monkeyp
     path = tmp_path / "picture.png"
     save_png(Figure(), path)
     older = path.read_bytes()
-
-    def full(descriptor):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", Mock(side_effect=OSError(28, "No space left on device")))
     with pytest.raises(OSError, match="No space"):
         save_png(Figure(), path)
     assert path.read_bytes() == older

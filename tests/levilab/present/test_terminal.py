@@ -5,6 +5,7 @@ import os
 import re
 import shutil
 import sys
+from unittest.mock import Mock
 
 import pytest
 
@@ -93,11 +94,7 @@ def test_a_terminal_that_is_gone_ends_no_measurement(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.setattr(sys, "stderr", screen := Screen())
     display = BarDisplay()
-
-    def gone(_):
-        raise OSError(5, "Input/output error")
-
-    monkeypatch.setattr(screen, "write", gone)
+    monkeypatch.setattr(screen, "write", Mock(side_effect=OSError(5, "Input/output error")))
     display.reading("40.123 Hz", 1.0, 3.0)
     display.state(State(5.0, elapsed_s=1.0, time_left_s=3.0, readings=1))
     display.close()

@@ -92,13 +92,11 @@ def test_a_simulation_is_reported_in_german_to_the_last_word(of, place, folder):
 
 def test_a_motion_is_drawn_anew_only_if_it_ends_in_the_state_that_was_recorded(folder, tmp_path):
     (picture,) = of_kind(motion_section(Run.load(folder)), Picture)
-    assert isinstance(picture, Picture)
     assert not picture.raster
     copy = shutil.copytree(folder, tmp_path / folder.name)
     lines = (copy / "states.csv").read_text(encoding="utf-8").splitlines()
     (copy / "states.csv").write_text("\n".join(lines[:-1]) + "\n", encoding="utf-8")
     (picture,) = of_kind(motion_section(Run.load(copy)), Picture)
-    assert isinstance(picture, Picture)
     assert picture.raster, "the picture in the folder, since another state is the last one"
     (copy / "motion.png").unlink()
     assert of_kind(motion_section(Run.load(copy)), Picture) == []
@@ -113,7 +111,6 @@ def test_a_scene_of_its_own_is_printed_whole(folder, tmp_path):
     section = motion_section(Run.load(copy))
     assert facts_of(section)["Changed keys"].texts == ("a scene of its own; all its keys stand below",)
     (keys,) = of_kind(section, Details)
-    assert isinstance(keys, Details)
     assert keys.on_paper == "whole"
     codes = [block.text for block in of_kind(section, Code)]
     assert "levilab simulate 'my scene.toml'" in codes

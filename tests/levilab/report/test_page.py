@@ -9,6 +9,7 @@ import sys
 from datetime import datetime, timedelta
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from levilab.errors import DataError, LevilabError
@@ -276,8 +277,6 @@ def test_a_report_of_a_data_file_knows_no_instrument_and_says_so(tmp_path):
 
 @pytest.mark.usefixtures("drawn_figures")
 def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path):
-    import numpy as np
-
     t = np.arange(20_000) * 0.01
     nu = 40 * (1 + 2.34e-4 * np.sqrt(2 * np.pi * 40) * t / 2) ** -2 + np.random.default_rng(0).normal(0, 0.03, t.size)
     path = tmp_path / "long.csv"

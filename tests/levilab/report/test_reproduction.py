@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import read_options
-from levilab.present.document.blocks import Code, Details, Facts, Note
+from levilab.present.document.blocks import Code, Details, Note
 from levilab.report.reproduction import Asked, paths_in_commands, reproduction
 from support.paths import SAMPLE_DATA
 
@@ -63,7 +63,6 @@ def test_commands_hashes_seeds_and_what_recorded_it_are_there(tmp_path):
     digest = hashlib.sha256((run / "readings.csv").read_bytes()).hexdigest()
     assert [row.cells for row in data.table.rows] == [("a run", "readings.csv", "7", digest)]
     (facts,) = recorded.blocks
-    assert isinstance(facts, Facts)
     assert facts.facts[0].texts == ("""levilab acquire limit --note 'it'"'"'s'""",)
 
 

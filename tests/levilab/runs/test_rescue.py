@@ -5,6 +5,7 @@ import json
 import os
 import shutil
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -197,14 +198,10 @@ def test_readings_that_cannot_be_written_again_are_not_said_to_be_kept(tmp_path,
         for k in range(3):
             writer.reading(row(k))
         shutil.rmtree(writer.folder)
-        monkeypatch.setattr(Computer, "make_folder", full)
+        monkeypatch.setattr(Computer, "make_folder", Mock(side_effect=OSError(errno.ENOSPC, "full")))
         with pytest.raises(CannotWrite, match="could not write 4 readings again that were removed") as refused:
             writer.reading(row(3))
     assert "kept" not in str(refused.value)
-
-
-def full(*_):
-    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def test_what_else_lies_in_the_folder_is_rescued_with_it(tmp_path):

@@ -9,6 +9,7 @@ import tempfile
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -52,11 +53,7 @@ def written(out, rows=4):
 
 def failing(number):
     """Stands for a function of the system that fails."""
-
-    def fail(*_):
-        raise OSError(number, os.strerror(number))
-
-    return fail
+    return Mock(side_effect=OSError(number, os.strerror(number)))
 
 
 def test_a_run_that_was_written_loads_as_it_was_and_with_numpy_alone(tmp_path):

@@ -4,13 +4,7 @@ import numpy as np
 import pytest
 
 from levilab.simulator.ensemble import simulate_many
-from levilab.simulator.equilibrium import (
-    _disc_stiffnesses,
-    axial_field,
-    floating_height,
-    stability_of,
-    windows_over,
-)
+from levilab.simulator.equilibrium import _disc_stiffnesses, axial_field, floating_height, stability_of, windows_over
 from levilab.simulator.field import flux_density
 from levilab.simulator.model import base_field
 from levilab.simulator.scene import SceneError, preset

@@ -9,6 +9,7 @@ import pytest
 
 from levilab.simulator.field import FieldError, field_of, flux_density, flux_gradient, on_axis
 from levilab.simulator.kernels import ring
+from levilab.simulator.kernels.paraxial import Paraxial, weights
 from support.parts import callable_part
 
 elliptic = callable_part(ring.elliptic)
@@ -188,8 +189,6 @@ def test_the_series_converges_to_the_exact_field_by_the_distance_from_the_edges(
 
 
 def test_general_and_written_out_series_agree():
-    from levilab.simulator.kernels.paraxial import Paraxial, weights
-
     general = Paraxial(*field_of(A, B, RHO, "paraxial-2"), weights(1))
     assert flux_density(general, PLACES) == pytest.approx(
         flux_density(field_of(A, B, RHO, "paraxial-2"), PLACES), rel=1e-13, abs=1e-17

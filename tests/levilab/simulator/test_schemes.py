@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from levilab.simulator import SimulationError
 from levilab.simulator.schemes import SCHEMES
 from levilab.simulator.single import simulate
 from order_conditions import residuals, trees
@@ -76,8 +77,6 @@ def test_the_order_on_the_harmonic_oscillator_whose_step_is_a_matrix(scheme):
 
 
 def test_a_scheme_is_refused_where_it_would_lose_its_order():
-    from levilab.simulator import SimulationError
-
     with pytest.raises(SimulationError, match=r"loses its order: take one of strang, suzuki-4, kahan-li-6, kahan-li-8"):
         simulate(KINDS["tilted with drag"], 0.1, scheme="blanes-moan-6")
     with pytest.raises(SimulationError, match="expected one of strang"):

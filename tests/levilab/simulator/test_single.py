@@ -8,6 +8,7 @@ import pytest
 from levilab.simulator import SimulationError
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
+from levilab.simulator.spin import DECAYS
 from support.scenes import KINDS
 
 UNDRIVEN, FRICTION, TILTED, DRIVEN = (preset(name) for name in ("undriven", "friction", "tilted", "driven"))
@@ -70,8 +71,6 @@ def test_the_moments_of_an_escape_and_of_an_event_are_those_of_the_parabola():
 
 @pytest.mark.parametrize("law", ["stokes", "newton", "disc", "mixed"])
 def test_the_spin_of_an_aligned_top_follows_its_law_whatever_the_motion(law):
-    from levilab.simulator.spin import DECAYS
-
     scene = FRICTION.changed({"drag.law": law})
     motion = simulate(scene, 30.0, rate=10)
     spin = DECAYS[law].after(2 * np.pi * 30, motion.time, *scene.drag.constants)

@@ -133,13 +133,10 @@ def test_each_observable_has_a_unit_and_a_meaning():
     ],
 )
 def test_an_observable_that_no_point_can_have_is_an_error(scene, name, duration, said):
+    unknown = Plan(scene, (Axis("start.spin_hz", SPINS),), (name,), 10.0)
     with pytest.raises(UsageError, match=said):
-        check_observables(plan(scene, (name,), duration) if name != "lifetme_s" else _unknown(scene, name))
+        check_observables(unknown if name == "lifetme_s" else plan(scene, (name,), duration))
     check_observables(plan(UNDRIVEN, ("locked",), 10.0, Axis("drive.amplitude_t", np.array([0.0, 4e-4]))))
-
-
-def _unknown(scene, name):
-    return Plan(scene, (Axis("start.spin_hz", SPINS),), (name,), 10.0)
 
 
 def test_the_highest_spin_on_a_ramp_is_where_pull_equals_drag_and_ramp():

@@ -1,7 +1,5 @@
 """A bench publishes, views listen; a bench that no view listens to computes nothing."""
 
-from __future__ import annotations
-
 import os
 import socket
 import stat

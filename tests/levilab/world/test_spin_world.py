@@ -16,6 +16,8 @@ from instruments.virtual.counter.edges import Thresholds
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
 from instruments.virtual.generator.channel import Burst, Output
 from instruments.virtual.generator.voltage import fundamental, voltage
+from levilab.simulator.equilibrium import axial_field
+from levilab.simulator.scene import preset
 from levilab.simulator.spin import DECAYS
 from levilab.world import bench as virtual_bench
 from levilab.world.light import Tape
@@ -542,9 +544,6 @@ def test_a_change_at_the_time_of_a_fall_or_of_a_burst_that_was_to_end_changes_no
 
 
 def test_the_magnetometer_sees_the_base_as_the_simulator_has_it():
-    from levilab.simulator.equilibrium import axial_field
-    from levilab.simulator.scene import preset
-
     there = axial_field(preset("undriven"))(np.array([0.072]))[0, 0]
     assert world(SpinScene()).flux_density(3.0) == pytest.approx(there, rel=1e-8)
 

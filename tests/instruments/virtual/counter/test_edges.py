@@ -83,6 +83,5 @@ def test_a_signal_that_knows_its_edges_is_not_sampled_while_it_does():
             at = edge.time + 1e-6
     assert signal.sampled > 0
     assert [edge.count for edge in found] == list(range(len(found)))
-    np.testing.assert_allclose(
-        [edge.time for edge in found], edges[: len(found)], atol=2e-6
-    )  # straight between samples
+    # straight between samples
+    np.testing.assert_allclose([edge.time for edge in found], edges[: len(found)], atol=2e-6)

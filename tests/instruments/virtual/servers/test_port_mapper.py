@@ -42,9 +42,8 @@ def mapped():
     """The port of the first instrument's port mapper, and that of its core channel."""
     port = port_of(HOST)
     with serving(listen_at=ListenAt(port_mapper=port)) as served:
-        name = served.names()[
-            "vxi11"
-        ]  # TCPIP0::127.0.0.2,40123::inst0::INSTR: with its port, for the mapper is not at 111
+        # TCPIP0::127.0.0.2,40123::inst0::INSTR: with its port, for the mapper is not at 111
+        name = served.names()["vxi11"]
         assert name.startswith(f"TCPIP0::{HOST},")
         yield port, int(name.split(",")[1].split("::")[0])
 

@@ -7,6 +7,7 @@ import pytest
 from pydantic import ValidationError
 
 from instruments.clock import VirtualClock
+from instruments.virtual.bench.visa_library import library_for
 from levilab.acquisition.experiments.field import FieldSettings, _mean, parse_height
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
@@ -17,7 +18,7 @@ from levilab.bench.person import PlaceProbe, ShieldProbe
 from levilab.world.base import Base, Stand, random_base
 from levilab.world.bench import virtual_bus, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
-from support.acquisitions import Impatient, Silent
+from support.acquisitions import Impatient, Meanwhile, Silent
 
 #: Few heights and readings: what is tested is what happens to them.
 SHORT = FieldSettings(lowest_m=0.04, highest_m=0.08, step_m=0.01, readings=3, settle_s=0.1)
@@ -154,16 +155,8 @@ def test_a_magnetometer_that_is_reset_on_the_way_is_set_up_anew(tmp_path):
     world = world_of()
     bus = virtual_bus(world)
     meter = bus.instruments["ASRLmagnetometer.levilab::INSTR"]
-
-    class Resets(Silent):
-        def reading(self, text, elapsed, remaining):
-            super().reading(text, elapsed, remaining)
-            if len(self.readings) == 2:
-                meter.reset()
-
-    from instruments.virtual.bench.visa_library import library_for
-
-    run = acquire(request_of(tmp_path, wiring=virtual_wiring(world), library=library_for(bus)), Resets())
+    request = request_of(tmp_path, wiring=virtual_wiring(world), library=library_for(bus))
+    run = acquire(request, Meanwhile(2, meter.reset))
     assert run.status == "finished"
     assert run.count() == 5
     assert [event["kind"] for event in run.events()].count("found again") == 1

@@ -16,7 +16,7 @@ from levilab.acquisition.triggering import Motor
 from levilab.errors import UsageError
 from levilab.runs.run import Run
 from levilab.world.spin_world import SpinWorld, random_scene
-from support.acquisitions import Impatient, Silent, in_world
+from support.acquisitions import Impatient, Meanwhile, Silent, in_world
 
 
 def held(out, seed, *settings, show=None, **more):
@@ -57,18 +57,6 @@ def test_an_interrupted_hold_goes_on(tmp_path):
     assert whole.readings().column("spin_frequency_hz")[-1] == pytest.approx(45.0, abs=0.1)
 
 
-class Meanwhile(Silent):
-    """Does something at each reading."""
-
-    def __init__(self, do):
-        super().__init__()
-        self.do = do
-
-    def reading(self, text, elapsed, remaining):
-        super().reading(text, elapsed, remaining)
-        self.do(len(self.readings), elapsed)
-
-
 class Unplugged(SpinWorld):
     """The cable to the trigger input is off from a time on, for a while; the generator's outputs are kept."""
 
@@ -91,12 +79,11 @@ class Unplugged(SpinWorld):
 def unplugged(out, lasts):
     world = Unplugged(replace(random_scene(3), start_hz=40.0), VirtualClock())
 
-    def pull_out(reading, _):
-        if reading == 3:
-            world.off = (world.clock.now(), world.clock.now() + lasts)
+    def pull_out():
+        world.off = (world.clock.now(), world.clock.now() + lasts)
 
     request = request_for("hold", AcquisitionOptions(mock=True, out=out, settings=("hold.longest_s=150",)))
-    return in_world(request, world), Meanwhile(pull_out), world
+    return in_world(request, world), Meanwhile(3, pull_out), world
 
 
 @pytest.mark.parametrize(("lasts", "dips"), [(1.0, 0.0), (5.0, 0.2)])

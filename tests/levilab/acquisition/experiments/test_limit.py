@@ -27,7 +27,7 @@ from levilab.simulator.scene import preset
 from levilab.world.bursts import mean_pull
 from levilab.world.motion_world import MotionWorld
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
-from support.acquisitions import Impatient, Silent, in_world, kinds, texts
+from support.acquisitions import Impatient, Meanwhile, Silent, in_world, kinds, texts
 
 #: From 30 Hz down to where a top falls within a minute, not held for long.
 QUICK = ("limit.drive_frequency_hz=24", "limit.ramp_hz_per_s=0.3", "limit.hold_s=1")
@@ -156,11 +156,6 @@ def test_a_limit_is_kept_though_the_generator_fails_as_it_is_switched_off(tmp_pa
     off = Keysight33500B.off
     faults = []
 
-    class Watchful(Silent):
-        def reading(self, text, elapsed, remaining):
-            super().reading(text, elapsed, remaining)
-            faults.extend([1, 2])
-
     def switched_off(self):
         if faults:
             faults.pop()
@@ -168,7 +163,8 @@ def test_a_limit_is_kept_though_the_generator_fails_as_it_is_switched_off(tmp_pa
         off(self)
 
     monkeypatch.setattr(Keysight33500B, "off", switched_off)
-    run = acquire(in_world(mock(tmp_path, *SLIPS), Slipping(SpinScene(), VirtualClock())), Watchful())
+    request = in_world(mock(tmp_path, *SLIPS), Slipping(SpinScene(), VirtualClock()))
+    run = acquire(request, Meanwhile(1, lambda: faults.extend([1, 2])))
     assert (run.status, run.count()) == ("finished", 1)
     assert "found again" in kinds(run)
     assert kinds(run).count("drive on") == 1

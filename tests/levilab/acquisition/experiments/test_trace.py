@@ -20,7 +20,7 @@ from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from levilab.world.bench import VIRTUAL, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
-from support.acquisitions import Impatient, Silent
+from support.acquisitions import Impatient, Meanwhile, Silent
 from support.commands import command
 
 #: The thesis's driven top, put where it floats: as IC1 it swings so far that the laser misses it now and then.
@@ -174,14 +174,9 @@ def test_a_channel_that_another_program_turns_off_is_turned_on_again(tmp_path):
     request = mock_trace(tmp_path, "records = 2\ninterval_s = 2.0", seed=1)
     wiring = virtual_wiring(SpinWorld(random_scene(1), VirtualClock()))
 
-    class Meddler(Silent):
-        def reading(self, text, elapsed, remaining):
-            super().reading(text, elapsed, remaining)
-            if len(self.readings) == 1:
-                scope = wiring.library.bench.instruments[VIRTUAL["oscilloscope"].address]
-                scope.settings["chan1_display"] = False
-
-    run = acquire(replace(request, wiring=lambda: wiring), Meddler())
+    scope = wiring.library.bench.instruments[VIRTUAL["oscilloscope"].address]
+    meddler = Meanwhile(1, lambda: scope.settings.update(chan1_display=False))
+    run = acquire(replace(request, wiring=lambda: wiring), meddler)
     assert run.status == "finished"
     assert [event["kind"] for event in run.events()] == ["instrument lost", "found again"]
     assert len(run.traces()) == 2
@@ -191,14 +186,9 @@ def watched(tmp_path, message, scene=None):
     """Three driven records; after the first the generator gets this message from its front panel."""
     settings = "records = 3\ninterval_s = 2.0\npoints = 1000\ndrive_frequency_hz = 30.0"
     wiring = virtual_wiring(SpinWorld(scene or SpinScene(), VirtualClock()))
-
-    class Meddler(Silent):
-        def reading(self, text, elapsed, remaining):
-            super().reading(text, elapsed, remaining)
-            if len(self.readings) == 1:
-                wiring.library.bench.instruments[VIRTUAL["generator"].address].execute(message)
-
-    return acquire(replace(mock_trace(tmp_path, settings, seed=1), wiring=lambda: wiring), Meddler())
+    generator = wiring.library.bench.instruments[VIRTUAL["generator"].address]
+    meddler = Meanwhile(1, lambda: generator.execute(message))
+    return acquire(replace(mock_trace(tmp_path, settings, seed=1), wiring=lambda: wiring), meddler)
 
 
 @pytest.mark.parametrize("message", ["FREQ 35", "OUTP1 OFF", "VOLT 1"])

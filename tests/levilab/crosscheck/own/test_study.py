@@ -131,11 +131,8 @@ def test_a_record_of_few_pulses_says_by_how_much_pulls_scatter(sample_data):
 
 def test_the_table_says_what_is_wanted_of_each_row(runs):
     found = study_result("spindown", runs, {}, 6)
-    assert [one.freedom for one in found.spreads] == [
-        None,
-        1,
-        None,
-    ]  # two runs that differ by more than their readings explain
+    # two runs that differ by more than their readings explain
+    assert [one.freedom for one in found.spreads] == [None, 1, None]
     one_run, together, exponent = (row.cells for row in crosscheck_table([found]).rows)
     assert one_run[4].endswith(" (1)")
     assert one_run[5].endswith(" % (68 %)")

@@ -5,6 +5,7 @@ import sys
 import time
 from multiprocessing import Pipe
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
@@ -99,11 +100,7 @@ def test_without_a_run_the_end_waits_a_second_and_with_one_for_its_reading(tmp_p
 def test_ctrl_c_while_a_bench_ends_that_records_nothing_kills_it_at_once(tmp_path, monkeypatch):
     bench, process = PracticeBench(tmp_path), Busy()
     bench._process = process
-
-    def be_interrupted(_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(process, "join", be_interrupted)
+    monkeypatch.setattr(process, "join", Mock(side_effect=KeyboardInterrupt))
     with pytest.raises(KeyboardInterrupt):
         bench.close()
     assert process.did == ["kill"]

@@ -1,7 +1,5 @@
 """The experiments of the practice bench agree with its scene, and what a person changes at it."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -23,7 +23,6 @@ from levilab.report.page import render
 from levilab.world.base import Base
 from support.figures import faults
 
-#: A top alone: the base is taken from the run.
 #: The base as it is.
 CALLIPER = Device.model_validate(
     {"base": {"inner_radius_m": 0.03, "inner_radius_u_m": 0.0, "outer_radius_m": 0.055, "outer_radius_u_m": 0.0,
@@ -42,11 +41,6 @@ def scan(tmp_path, sample_data):
 @pytest.fixture
 def device(sample_data):
     return sample_data / "device.toml"
-
-
-def keep(found):
-    """Write the result, but for the figure."""
-    return save(FIELD.result_of(found, found.place), found.place, b"")[0]
 
 
 def csv(path, header, *columns):
@@ -69,7 +63,8 @@ def test_the_sample_scan_gives_its_truth_back(sample_data, device):
 def test_a_result_holds_what_was_found(scan, device):
     options = FieldOptions(device=read_device(device), height_m=0.0735)
     found = FIELD.analyze([scan], options)
-    document = json.loads(keep(found).read_text(encoding="utf-8"))
+    (file, *_) = save(FIELD.result_of(found, found.place), found.place, b"")
+    document = json.loads(file.read_text(encoding="utf-8"))
     assert document["values"]["strength"]["unit"] == "T m"
     assert {"origin", "thickness", "moment", "mass_to_set"} <= set(document["values"])
     assert document["models"][0]["name"] == "ring"
@@ -99,7 +94,6 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp
     alone = [run.values["strength"] for run in found.runs]
     mean = found.values["strength"]
     assert mean.value == pytest.approx(np.mean([one.value for one in alone]))
-    assert alone[0].u is not None
     assert mean.u > 0.99 * alone[0].u
     page = render([(ANALYSES["field"], found)])
     assert "None of these 2 runs came from a real bench" in page
@@ -138,9 +132,8 @@ def test_files_of_users_are_read_in_their_units(tmp_path, titles, z, b):
     options = FieldOptions(columns=parse_columns(titles[1]), device=CALLIPER)
     found = FIELD.analyze([path], options)
     strength = found.values["strength"].value
-    assert strength == pytest.approx(
-        BASE.strength_t_m, rel=1e-3
-    )  # the origin is left open to 1 mm, the background to 50 µT
+    # the origin is left open to 1 mm, the background to 50 µT
+    assert strength == pytest.approx(BASE.strength_t_m, rel=1e-3)
     assert any("no uncertainty of the readings" in text for text in found.all_warnings)
 
 
@@ -149,7 +142,6 @@ def test_files_of_users_are_read_in_their_units(tmp_path, titles, z, b):
     [
         (HEIGHTS_MM[:2], FIELD_MT[:2], "holds 2 readings, at least 3 readings are needed"),
         (HEIGHTS_MM[:3], FIELD_MT[:3], "heights: 3, from 30 to 40 mm, at least 4 are needed: scan on"),
-        (0 * HEIGHTS_MM + 70, FIELD_MT, "different heights: 1, from 70"),
         (HEIGHTS_MM, np.minimum(FIELD_MT, 20.0), "the probe is saturated, or not moved"),
         (HEIGHTS_MM, np.where(HEIGHTS_MM > 80, -1, 1) * FIELD_MT, "was the probe turned over"),
         (HEIGHTS_MM * 1e3, FIELD_MT, "a height of 30 m cannot be"),

@@ -301,10 +301,7 @@ def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path, samp
         LIMIT.analyze([file], LimitOptions())
     with pytest.raises(DataError, match="is the drive still on"):
         analyze_suiting([file], {})
-    for wrong, says in (
-        ("0,40\nca. 9,39\n20,40\n30,39.5\n", "'ca. 9' stands in"),
-        ("0,40\n0,39\n9,40\n", "repeated"),
-    ):
+    for wrong, says in (("0,40\nca. 9,39\n20,40\n30,39.5\n", "'ca. 9' stands in"), ("0,40\n0,39\n9,40\n", "repeated")):
         file.write_text(f"t,f\n{wrong}", encoding="utf-8")
         with pytest.raises(DataError, match=says):  # a damaged spin-down is no list of limits
             analyze_suiting([file], {})

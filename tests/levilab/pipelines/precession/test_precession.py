@@ -37,10 +37,6 @@ def sweep_csv(path, *, slope=1.0, u=True, seed=1, half=None):
     return path
 
 
-def save_without_picture(found):
-    return save(PRECESSION.result_of(found, found.place), found.place, b"", first=False)[0]
-
-
 def test_a_file_of_ones_own_is_analyzed_without_naming_its_columns(tmp_path):
     file = sweep_csv(tmp_path / "mine.csv", half=3)
     ((row, found),) = analyze_suiting([file], {})
@@ -82,7 +78,7 @@ def test_several_sweeps_share_a_line(tmp_path):
 def test_other_options_than_those_of_the_result_fit_again_with_the_rest_as_before(tmp_path):
     files = [sweep_csv(tmp_path / f"{k}.csv", seed=k, half=k) for k in (1, 2)]
     found = PRECESSION.analyze(files[:1], PrecessionOptions(orthogonal=True))
-    save_without_picture(found)
+    save(PRECESSION.result_of(found, found.place), found.place, b"", first=False)
     other_options = ANALYSES["precession"].recall(files[:1], PrecessionOptions(keep_outliers=True))
     assert other_options.origins[0].text.startswith("analyzed for this page: other options")
     assert other_options.combined.line.orthogonal  # what is not given is as it was

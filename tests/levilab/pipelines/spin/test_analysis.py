@@ -30,7 +30,7 @@ from levilab.runs.writer import RunWriter
 from levilab.texts.text import in_language
 from support.detector import C32, RELEASE_HZ, coasting_turns, coasting_wav, pulses, write_wav
 from support.figures import faults
-from support.paths import ROOT
+from support.paths import ROOT, SAMPLE_DATA
 
 
 def true_frequency(name, time):
@@ -47,8 +47,14 @@ def test_the_offset_from_a_drive_is_of_the_held_part_and_its_u_of_the_scatter():
     assert drive_offset(replace(series, phases=()), 30.0).value == pytest.approx(-3.75)
 
 
-def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data):
-    analysis = SPIN.analyze([sample_data / "scope-files"], SpinOptions(rate=None))
+@pytest.fixture(scope="module")
+def scope_files():
+    """What is found in the sample files."""
+    return SPIN.analyze([SAMPLE_DATA / "scope-files"], SpinOptions())
+
+
+def test_every_sample_file_gives_the_spin_that_it_was_made_with(scope_files):
+    analysis = scope_files
     assert len(analysis.runs) == 21  # the array needs a rate
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
         frequency, chirp = run.spin.frequency, run.spin.chirp
@@ -57,6 +63,7 @@ def test_every_sample_file_gives_the_spin_that_it_was_made_with(sample_data):
         assert chirp.value == pytest.approx(-0.095, abs=4 * chirp.u), source.name
         assert frequency.u < 1.4 * 3e-3, source.name
     assert [remark for remark in analysis.remarks if "samples-4000hz.npy" in str(remark)]
+    assert {run.trend for run in analysis.runs if not run.which} == {None}  # of a single record the slope is its own
 
 
 def test_a_laser_and_a_drive_are_no_spin(sample_data):
@@ -265,14 +272,13 @@ def test_what_is_damaged_is_a_note_of_the_analysis_that_it_belongs_to(sample_dat
 
 
 @pytest.mark.parametrize("what", ["trace", "times", "long", "many"])
-def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(what, sample_data, tmp_path):
+def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(what, scope_files, sample_data, tmp_path):
     files = {
         "trace": [sample_data / "scope-files" / "recording.wav"],
         "times": [sample_data / "scope-files" / "pulse-times.txt"],
         "long": [coasting_wav(tmp_path / "long.wav", seconds=14, rate=4000)] if what == "long" else [],
-        "many": [sample_data / "scope-files"],
     }
-    figure = spin_figure(SPIN.analyze(files[what], SpinOptions()))
+    figure = spin_figure(scope_files if what == "many" else SPIN.analyze(files[what], SpinOptions()))
     panels = figure.get_axes()
     assert len(panels) == (12 if what == "many" else 4)
     assert faults(figure) == []
@@ -362,13 +368,6 @@ def test_each_finding_about_pulses_and_lines_has_a_sentence():
     source = "".join(file.read_text(encoding="utf-8") for file in (ROOT / "analysis/pulses").glob("*.py"))
     made = set(re.findall(r'Finding\("([\w-]+)"', source)) | {"no-pulses", *get_args(Kind)}
     assert made == {name for name, _ in words._SENTENCES}
-
-
-def test_of_a_single_record_the_slope_is_its_own(sample_data):
-    found = SPIN.analyze([sample_data / "scope-files"], SpinOptions())
-    single = [run for run in found.runs if not run.which]
-    assert single
-    assert all(run.trend is None for run in single)
 
 
 def test_the_time_that_is_said_moves_the_spin_by_less_than_its_u(tmp_path):

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import runpy
 import shutil
 from pathlib import Path
 
@@ -23,16 +24,22 @@ from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Tabular
 from levilab.runs.run import Run
 from levilab.texts.text import in_language, text_of
+from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
 
 #: The thesis's constants, as printed: C₁ [1/s], |C₂| [1/rad].
 PUBLISHED = (("0.003199", "1.760e-05"), ("0.003134", "1.707e-05"), ("0.003133", "1.669e-05"), ("0.003261", "1.772e-05"))
 
 
-def test_the_straight_lines_give_the_published_constants_to_every_printed_digit(sample_data):
-    analysis = SPINDOWN.analyze([sample_data], SpinDownOptions())
+@pytest.fixture(scope="module")
+def four():
+    """What is found in the four sample runs."""
+    return SPINDOWN.analyze([SAMPLE_DATA], SpinDownOptions())
+
+
+def test_the_straight_lines_give_the_published_constants_to_every_printed_digit(four):
     constants = [
-        (run.fit("stokes").linearised["c1"].value, run.fit("newton").linearised["c2"].value) for run in analysis.runs
+        (run.fit("stokes").linearised["c1"].value, run.fit("newton").linearised["c2"].value) for run in four.runs
     ]
     assert tuple((f"{c1:.6f}", f"{c2:.3e}") for c1, c2 in constants) == PUBLISHED
     assert f"{np.mean([c1 for c1, _ in constants]):.8f}" in {"0.00318175", "0.00318176", "0.00318174"}
@@ -44,8 +51,6 @@ def _words(path):
 
 
 def test_the_sample_data_are_what_their_script_makes(sample_data, tmp_path, monkeypatch):
-    import runpy
-
     script = tmp_path / "make.py"
     script.write_text((sample_data / "make.py").read_text(encoding="utf-8"), encoding="utf-8")
     make = runpy.run_path(str(script))
@@ -70,12 +75,11 @@ def test_the_sample_traces_are_small_and_labelled_synthetic(sample_data):
         assert sum(path.stat().st_size for path in (sample_data / name).rglob("*") if path.is_file()) < 200_000
 
 
-def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data):
-    analysis = SPINDOWN.analyze([sample_data], SpinDownOptions())
-    combined = analysis.combined
-    lines = spindown_tables(analysis)[-1]
+def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(four):
+    combined = four.combined
+    lines = spindown_tables(four)[-1]
     assert [row.kind for row in lines.rows] == ["", "", "", "", "together", "together"]
-    tables = [block for block in spindown_part(analysis).result if isinstance(block, Tabular)]
+    tables = [block for block in spindown_part(four).result if isinstance(block, Tabular)]
     (laws,) = (one.table for one in tables if one.name == "spindown-laws")
     cells = {row.cells[0]: row.cells[2] for row in laws.rows}
     assert re.fullmatch(r"5\.\d\(2\.\d\)×10⁻⁶ .*", cells["disc (best)"]), cells  # as below; u of it: s/√(2·3)
@@ -89,8 +93,8 @@ def test_the_four_runs_exclude_stokes_and_newton_and_favour_the_disc(sample_data
 
 
 @pytest.mark.usefixtures("drawn_figures")
-def test_the_result_is_written_as_the_interface_says(sample_data, tmp_path):
-    save(ANALYSES["spindown"], SPINDOWN.analyze([sample_data], SpinDownOptions()), tmp_path)
+def test_the_result_is_written_as_the_interface_says(four, tmp_path):
+    save(ANALYSES["spindown"], four, tmp_path)
     text = (tmp_path / "result.json").read_text(encoding="utf-8")
     result = json.loads(text, parse_constant=pytest.fail)
     assert list(result) == sorted(result)
@@ -219,14 +223,13 @@ def test_hertz_taken_for_another_unit_are_doubted(tmp_path):
     assert not right.warnings
 
 
-def test_a_run_whose_unit_is_in_doubt_stays_out_of_the_means(sample_data, tmp_path):
+def test_a_run_whose_unit_is_in_doubt_stays_out_of_the_means(four, sample_data, tmp_path):
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
     np.savetxt(path, np.c_[t, 360 * nu], delimiter=",", header="t,f [Hz]", comments="")
-    alone = SPINDOWN.analyze([sample_data], SpinDownOptions())
     both = SPINDOWN.analyze([sample_data, path], SpinDownOptions())
-    assert both.combined.fit("disc").constants == alone.combined.fit("disc").constants
-    assert len(both.runs) == len(alone.runs) + 1
+    assert both.combined.fit("disc").constants == four.combined.fit("disc").constants
+    assert len(both.runs) == len(four.runs) + 1
     assert any("my" in warning for warning in both.about_all())
 
 
@@ -274,11 +277,10 @@ def test_a_folder_without_runs_says_what_it_found(sample_data, tmp_path):
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_a_folder_that_cannot_be_written_is_reported_in_one_line(sample_data, tmp_path):
+def test_a_folder_that_cannot_be_written_is_reported_in_one_line(four, tmp_path):
     (tmp_path / "file").write_text("in the way", encoding="utf-8")
-    analysis = SPINDOWN.analyze([sample_data], SpinDownOptions())
     with pytest.raises(CannotWrite, match="`out`") as caught:
-        save(ANALYSES["spindown"], analysis, tmp_path / "file" / "below")
+        save(ANALYSES["spindown"], four, tmp_path / "file" / "below")
     assert isinstance(caught.value, LevilabError)
     assert "\n" not in str(caught.value)
 
