@@ -1,13 +1,12 @@
 """The pulls of a cross-check, or the ranks of its truths: a panel a quantity, beside what they should be."""
 
-from __future__ import annotations
-
 import math
 import textwrap
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from levilab.crosscheck.calibration import band_of, by_ranks, ranks_of
@@ -16,12 +15,6 @@ from levilab.present.drawing import SMALL, headline, panel, write
 from levilab.present.looks import BLUE, VERMILION
 from levilab.present.numbers import with_sign
 from levilab.present.style import STYLE, WIDE
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from matplotlib.axes import Axes
-
 
 _COLUMNS = 3
 #: Left edge of the first panel, a panel's size, and from one to the next [inch].

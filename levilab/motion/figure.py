@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from analysis.arrays import Array
 from analysis.numbers import digits
+from levilab.motion.lines import NamedLine
 from levilab.motion.summary import Summary, changing_energy
 from levilab.present.drawing import SMALL, curve, headline, panel
 from levilab.present.looks import GREY, LOOKS
 from levilab.present.numbers import enumeration, with_decimals
 from levilab.present.style import STYLE, WIDE
 from levilab.texts.text import Sentences, Text, in_language
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from matplotlib.axes import Axes
-
-    from analysis.arrays import Array
-    from levilab.motion.lines import NamedLine
-
 
 #: A curve of more points is drawn as the envelope of this number of pieces.
 PIECES = 700

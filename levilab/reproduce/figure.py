@@ -1,18 +1,23 @@
 """The figures of the chapters."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
+from analysis.arrays import Array
+from analysis.limits import Statistics
+from analysis.pull import Driven
+from analysis.spindown.fit import SpinDown
+from levilab.motion.lines import AxisLines
 from levilab.present.drawing import SMALL
 from levilab.present.looks import BLACK, BLUE, GREEN, GREY, LOOKS, ORANGE, SERIES, VERMILION
 from levilab.present.numbers import with_decimals
@@ -20,19 +25,8 @@ from levilab.present.style import STYLE, WIDE
 from levilab.reproduce.tops import MASS_KG, Flags, known
 from levilab.simulator.equilibrium import MassWindows, stability_of
 from levilab.simulator.scene import preset
+from levilab.simulator.trajectory import Trajectory
 from levilab.stability.thesis import HIGHEST_HZ, LOOSE_HZ, SIMULATED_HZ, WITH_DRAG_HZ
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from matplotlib.axes import Axes
-
-    from analysis.arrays import Array
-    from analysis.limits import Statistics
-    from analysis.pull import Driven
-    from analysis.spindown.fit import SpinDown
-    from levilab.motion.lines import AxisLines
-    from levilab.simulator.trajectory import Trajectory
 
 #: A curve of more points is drawn as the band between its least and greatest values in so many pieces.
 PIECES = 900

@@ -4,23 +4,27 @@ Blue is up and hatched grey is lost, paler where a point was filled in; lines ov
 differ in their dashes as well as in colour.
 """
 
-from __future__ import annotations
-
 import math
 import textwrap
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.numbers import digits
+from analysis.stability import Window
 from levilab.errors import UsageError
 from levilab.motion.lock import LAST_SHARE
 from levilab.motion.summary import changing_energy
@@ -28,23 +32,12 @@ from levilab.present.drawing import SMALL, headline
 from levilab.present.looks import LOOKS, PURPLE
 from levilab.present.style import STYLE, WIDE
 from levilab.simulator.equilibrium import stability_of, windows_over
+from levilab.simulator.scene import Scene
 from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
+from levilab.sweeps.plan import Axis, Plan
 from levilab.sweeps.quantities import quantity_of, step_in_words
+from levilab.sweeps.store import Map
 from levilab.texts.text import Sentences, Text, in_language
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.artist import Artist
-    from matplotlib.axes import Axes
-    from numpy.typing import NDArray
-
-    from analysis.arrays import Array
-    from analysis.stability import Window
-    from levilab.simulator.scene import Scene
-    from levilab.sweeps.plan import Axis, Plan
-    from levilab.sweeps.store import Map
-
 
 SPIN, MASS, HEIGHT, DRIVE = "start.spin_hz", "top.mass_kg", "start.position_m.2", "drive.frequency_hz"
 #: Numbers, from few to many, darker to lighter all the way; blue stays for the tops that are up.

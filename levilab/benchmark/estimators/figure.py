@@ -1,21 +1,15 @@
 """RMSE over the bound against SNR, and samples per second, of all methods."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from levilab.benchmark.estimators.study import AIMS, OURS, Score, Study
 from levilab.present.drawing import SMALL, headline, panel
 from levilab.present.looks import BLACK, BLUE, GREEN, PURPLE, SKY, VERMILION
 from levilab.present.style import STYLE, WIDE
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 
 #: Methods: colour, marker, line.
 LINES = {

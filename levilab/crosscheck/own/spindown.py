@@ -1,7 +1,5 @@
 """Spin-downs with the fitted constants, times, scatter, correlation, gates and number of runs of a result."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,29 +1,23 @@
 """Scans of a field → their figure."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.arrays import Array
 from analysis.field.floating import floating_spins, floating_top
 from analysis.field.magnet import axial_field
+from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun
 from levilab.pipelines.field.words import QUANTITIES
 from levilab.present.drawing import SMALL, band, headline, panel, sigma_bands, synthetic_mark
 from levilab.present.looks import BLUE, GREY, LOOKS, PURPLE, SKY, VERMILION
 from levilab.present.numbers import short_name, with_uncertainty
 from levilab.present.style import STYLE, WIDE
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from analysis.arrays import Array
-    from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun
-
 
 #: A scan each as long as there are so few: colour and marker.
 COLOURS, _MARKERS = (BLUE, VERMILION, PURPLE, SKY), "o^vD"

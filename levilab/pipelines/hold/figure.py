@@ -1,11 +1,10 @@
 """Held spins → their figure."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Callable
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from levilab.pipelines.hold.analysis import HoldAnalysis, text_of
@@ -13,12 +12,6 @@ from levilab.present.drawing import headline, panel, synthetic_mark
 from levilab.present.looks import LOOKS
 from levilab.present.style import STYLE, WIDE
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from matplotlib.axes import Axes
-
 
 #: Where the drag over that of the best law is drawn: laws that are excluded leave it.
 _RATIOS = (0.9, 1.1)

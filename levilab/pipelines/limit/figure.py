@@ -1,14 +1,15 @@
 """Limits → their figure."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from analysis.arrays import Array
 from levilab.pipelines.limit.analysis import ISLANDS, LOWER_EDGE, RESONANCE, UPPER_EDGE, LimitAnalysis, Limits
 from levilab.present.drawing import SMALL, headline, panel, synthetic_mark
 from levilab.present.looks import BLACK, GREEN, GREY, LOOKS, MARKERS, ORANGE, PURPLE, SKY, VERMILION, YELLOW
@@ -16,14 +17,6 @@ from levilab.present.numbers import with_uncertainty
 from levilab.present.style import STYLE, TALLEST, WIDE, label_of_run
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from matplotlib.axes import Axes
-
-    from analysis.arrays import Array
-
 
 #: Of runs: colours that theory does not have.
 _COLOURS = (BLACK, GREEN, SKY, ORANGE, YELLOW, GREY)

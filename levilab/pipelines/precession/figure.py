@@ -1,29 +1,21 @@
 """Sweeps → their figure."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.numbers import digits
+from analysis.precession.sweep import SweepFit
+from levilab.pipelines.precession.analysis import PrecessionAnalysis
 from levilab.pipelines.precession.words import intercept_of, miscount_as_text, slope_of
 from levilab.present.drawing import SMALL, band, headline, panel, run_look, synthetic_mark
 from levilab.present.looks import GREY, LOOKS
 from levilab.present.numbers import plain, without_unit
 from levilab.present.style import STYLE, WIDE, label_of_run
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from numpy.typing import NDArray
-
-    from analysis.arrays import Array
-    from analysis.precession.sweep import SweepFit
-    from levilab.pipelines.precession.analysis import PrecessionAnalysis
-
 
 #: More points have no bars.
 MOST_BARS = 200

@@ -1,35 +1,28 @@
 """Spin frequencies → their figure."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.numbers import digits, with_minus
+from analysis.pulses import SpinFrequency
 from analysis.rotation import FieldSpin, LineSamples, samples_of_line
+from levilab.formats.waveforms.waveform import Waveform
+from levilab.pipelines.sources import Source
 from levilab.pipelines.spin.analysis import MOST_DRAWN, SpinAnalysis, SpinRun
+from levilab.pipelines.spin.readings import Records
 from levilab.present.drawing import SMALL, band, headline, panel, synthetic_mark, write
 from levilab.present.looks import LOOKS
 from levilab.present.numbers import short_name, with_uncertainty
 from levilab.present.style import STYLE, TALLEST, WIDE
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-    from numpy.typing import NDArray
-
-    from analysis.arrays import Array
-    from analysis.pulses import SpinFrequency
-    from levilab.formats.waveforms.waveform import Waveform
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.spin.readings import Records
-
 
 #: Points of a panel.
 MOST_POINTS = 4000

@@ -1,20 +1,23 @@
 """Spin-downs → their figure."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.font_manager import findfont, get_font
 from matplotlib.lines import Line2D
+from numpy.typing import NDArray
 
+from analysis.arrays import Array
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
+from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 from levilab.pipelines.spindown.report import is_best, laws_of, tilt_part
 from levilab.pipelines.spindown.words import STRAIGHT_LINES, SYMBOLS, finding, law_names, short_law
 from levilab.present.drawing import (
@@ -34,16 +37,6 @@ from levilab.present.numbers import short_name
 from levilab.present.style import STYLE, WIDE
 from levilab.present.units import unit as unit_row
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from matplotlib.axes import Axes
-    from numpy.typing import NDArray
-
-    from analysis.arrays import Array
-    from levilab.pipelines.spindown.analysis import SpinDownAnalysis
-
 
 #: More points than a panel can show are thinned out evenly; up to so many have bars each; so many means of more.
 MOST_POINTS, MOST_BARS, MEANS = 600, 200, 40

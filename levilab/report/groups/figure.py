@@ -1,11 +1,10 @@
 """A class → its figure: each group's value with u, the class's mean, and the truth."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from levilab.present.drawing import SMALL, headline, in_mathtext, panel, synthetic_mark, write
@@ -14,12 +13,6 @@ from levilab.present.style import STYLE, WIDE, label_of_run
 from levilab.present.units import unit
 from levilab.report.groups.beside import Class, Compared, Group, finding
 from levilab.texts.text import in_language
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from matplotlib.axes import Axes
-
 
 #: Left edge of the panels, their right edge, from panel to panel, above them, below them, and a group's row [inch].
 _LEFT, _RIGHT, _GAP, _HEAD, _FOOT, _ROW = 1.75, 6.85, 0.25, 0.85, 0.55, 0.135
