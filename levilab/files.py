@@ -16,6 +16,7 @@ from typing import Any, BinaryIO
 
 from levilab.computer import computer
 from levilab.errors import LevilabError, UsageError
+from levilab.texts.text import Text
 
 
 class CannotWrite(LevilabError):
@@ -203,17 +204,18 @@ def _refuse_surrogates(text: str) -> None:
 
 
 @contextlib.contextmanager
-def writing(what: str, advice: str = "choose another place with `out`") -> Iterator[None]:
+def writing(what: str | Path, advice: str = "choose another place with `out`") -> Iterator[None]:
     """Raise CannotWrite, in a sentence, for what the operating system refuses.
 
     Args:
-        what: the beginning of the sentence: what could not be written, and where.
+        what: the path, or the beginning of the sentence: what could not be written, and where.
         advice: what to do.
     """
     try:
         yield
     except OSError as error:
-        raise CannotWrite(f"{what} ({error.strerror or error})", advice) from error
+        said = Text("{path:s}: could not be written", path=what) if isinstance(what, Path) else what
+        raise CannotWrite(Text("{said} ({why})", said=said, why=error.strerror or str(error)), advice) from error
 
 
 def must_be_folder(path: Path) -> None:

@@ -134,7 +134,7 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
 
 
 def _writing(path: Path) -> AbstractContextManager[None]:
-    return writing(f"{path}: could not be written", "choose another place with `animate`")
+    return writing(path, "choose another place with `animate`")
 
 
 def _check_pictures(chosen: _Format, span: float, speed: float) -> None:
@@ -185,7 +185,7 @@ def animate(
         if note := _stroboscopic(turn_rate(summary.motion), speed, chosen.pictures_per_s):
             message(note)
         content = chosen.encode(Film(poses, speed, chosen.pictures_per_s, chosen.size, _POSES_A_PICTURE), progress)
-    with writing(f"{request.path}: could not be written", "choose another place with `animate`"):
+    with writing(request.path, "choose another place with `animate`"):
         request.path.parent.mkdir(parents=True, exist_ok=True)
         replace_atomically(request.path, content)
     return f"the motion {span_text(poses)}, at {speed_text(speed)}"

@@ -30,8 +30,11 @@ class AcquireGroup(NamedLast):
         """Put the name of the experiment first.  Fails where options stand alone."""
         if args and args[0].startswith("-") and args[0] not in ctx.help_option_names:
             args = self.with_name_first(args) or ctx.fail(
-                f"name the experiment, as levilab acquire spin {' '.join(args)}: {', '.join(self.commands)}"
-            )
+                Text(
+                    "name the experiment, as levilab acquire spin {options:s}: {names:s}",
+                    options=" ".join(args), names=", ".join(self.commands),
+                )
+            )  # fmt: skip
         return super().parse_args(ctx, args)
 
 

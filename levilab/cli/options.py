@@ -74,7 +74,7 @@ def place(metavar: str, text: str, endings: Collection[str] = (), **more: Any) -
     def check(path: Path | None) -> Path | None:
         if path is not None and endings and path.suffix.lower() not in endings:
             *some, last = endings
-            named = f"{', '.join(some)} or {last}" if some else last
+            named = Text("{some:s} or {last:s}", some=", ".join(some), last=last) if some else last
             raise UsageError("out", Text("a name that ends in {named} is expected", named=named), value=path)
         target = path if endings else folder(path)
         return target if target is None or target.suffix == ".zarr" else writable(target)
@@ -88,7 +88,7 @@ def writable(path: Path | None) -> Path | None:
         from levilab.files import check_writable, must_be_folder, writing
 
         must_be_folder(path.parent if path.suffix else path)
-        with writing(f"{path}: could not be written", "choose another place with `out`"):
+        with writing(path, "choose another place with `out`"):
             check_writable(path if path.suffix else path / "file")
     return path
 

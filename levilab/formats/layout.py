@@ -22,6 +22,7 @@ from levilab.formats.dialect import (
 from levilab.formats.kinds import OTHER, kind_of_bytes
 from levilab.formats.texts import Text
 from levilab.formats.titles import UNITS, implied_unit, is_unit, known_titles, read_title, unit_factor
+from levilab.texts.text import Text as Said
 
 HEAD = 65536  # bytes that the guess rests upon
 SAMPLE = 100  # lines, the last of the head: those are rows even below a long preamble
@@ -98,8 +99,8 @@ def sniff(source: Text) -> Layout:
     if dialect is None:
         at, line = next((n, line) for n, line in enumerate(lines, 1) if line.strip())
         alone = "; if it holds one quantity alone, its times are needed, too: a column of them before it"
-        seen = f"'{shorten(line.strip())}' begins no table of at least two columns"
-        raise NoTable(path, f"{seen}; {EXPORT}{alone}", line=at)
+        text = "'{seen:s}' begins no table of at least two columns; {export}{alone}"
+        raise NoTable(path, Said(text, seen=shorten(line.strip()), export=EXPORT, alone=alone), line=at)
     layout = lay_out(lines, encoding, dialect, head)
     if source.aligned and not layout.width:
         raise NoTable(path, "holds no rows of numbers")
@@ -147,12 +148,13 @@ def lines_of(path: Path, head: bytes, encoding: str, *, whole: bool, padding: st
     if CONTROL.search(text):
         clean = ["\n" if CONTROL.search(line) else line for line in lines]
         if sum(one != line for one, line in zip(clean, lines, strict=True)) > _MOST_NOISE * len(lines):
-            raise NoTable(path, f"is a binary file; {EXPORT}")
+            raise NoTable(path, Said("is a binary file; {export}", export=EXPORT))
         lines = clean
     if not whole and lines and not lines[-1].endswith("\n"):
         lines.pop()
     if not any(line.strip() for line in lines):
-        raise NoTable(path, f"is {'empty' if whole else 'one line without end'}; {EXPORT}")
+        seen = "is empty; {export}" if whole else "is one line without end; {export}"
+        raise NoTable(path, Said(seen, export=EXPORT))
     return lines
 
 
@@ -176,7 +178,7 @@ def refuse_other_kinds(path: Path, head: bytes) -> None:
     """Raise NoTable for a file that is no text by its first bytes, with what to do."""
     kind = kind_of_bytes(head)
     if kind is not OTHER:
-        raise NoTable(path, f"is {kind.name}: {kind.advice}", kind=kind)
+        raise NoTable(path, Said("is {kind}: {advice}", kind=kind.name, advice=kind.advice), kind=kind)
 
 
 def _of_words(lines: list[str], encoding: str, head: bytes) -> Layout | None:

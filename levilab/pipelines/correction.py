@@ -143,7 +143,7 @@ def write_correction(file: Path, options: Mapping[str, Any]) -> Path:
     for name, those in kept.items():
         lines += [f"\n[{_SHEET}.{toml_value(name)}]\n"] if name else []
         lines += [f"{key} = {toml_value(value)}\n" for key, value in those.items()]
-    with writing(f"{path}: could not be written", "copy the data file to a folder of yours"):
+    with writing(path, "copy the data file to a folder of yours"):
         replace_atomically(path, _HEAD.format(name=path.name.removesuffix(ENDING)) + "".join(lines))
     return path
 

@@ -134,7 +134,7 @@ def write_content(output: Path, content: str | bytes) -> None:
 
 def writing_report(output: Path) -> AbstractContextManager[None]:
     """Explain errors of writing a report."""
-    return writing(f"{output}: could not be written", "choose another place with `out`")
+    return writing(output, "choose another place with `out`")
 
 
 def _sorted_by_kind(paths: Sequence[Path]) -> tuple[Found, list[Path]]:

@@ -19,6 +19,7 @@ from levilab.formats.kinds import AUDIO
 from levilab.formats.waveforms.wav import signals_of
 from levilab.formats.waveforms.waveform import BLOCK, Waveform, check_count
 from levilab.software import how_to_install
+from levilab.texts.text import Text
 
 #: What a file may be, in FFmpeg's names: no list of other files, no address, no script.
 _FORMATS = "mov,mp4,m4a,3gp,3g2,mj2,mp3,ogg,flac,aac,amr,aiff,caf,matroska,webm,asf,avi"
@@ -42,7 +43,7 @@ def read_audio(path: Path) -> Waveform:
     """
     if not _is_installed():
         kind = replace(AUDIO, advice=advice_on_sound())
-        raise NoTable(path, f"is {kind.name}: {kind.advice}", kind=kind)
+        raise NoTable(path, Text("is {kind}: {advice}", kind=kind.name, advice=kind.advice), kind=kind)
     errors: list[str] = []
     count, rate = 0, 0
     with _decoded(path, errors) as stream:

@@ -32,6 +32,7 @@ from levilab.formats.titles import (
     unit_factor,
     without_runs_of_blanks,
 )
+from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -465,7 +466,7 @@ def _recognise_plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) ->
     titles = [read_title(text) for text in layout.header]
     readings = [title.column for title in titles if title.column in QUANTITIES and title.column not in _NO_READINGS]
     if readings:
-        raise NoWaveform(head.path, f"holds readings ({readings[0]}) and no samples")
+        raise NoWaveform(head.path, Text("holds readings ({names:s}) and no samples", names=readings[0]))
     width = len(layout.header) or layout.width
     if width < 2:
         raise NoWaveform(head.path, "has one column and no times beside it")

@@ -84,7 +84,7 @@ class TableFile:
             UsageError: rows of an earlier call were not asked for, or were made with other options.
             CannotWrite: the place cannot be written to, or another process writes there.
         """
-        with writing(f"{self.table}: could not be written", _ELSEWHERE), ExitStack() as until_failure:
+        with writing(self.table, _ELSEWHERE), ExitStack() as until_failure:
             self.table.parent.mkdir(parents=True, exist_ok=True)
             until_failure.enter_context(locked(self.table, "another process is writing it; wait for its end"))
             if not self.part.exists():
@@ -115,7 +115,7 @@ class TableFile:
 
     def add(self, cells: Sequence[Cell]) -> None:
         """Append a row and hand it to the operating system.  Raises CannotWrite."""
-        with writing(f"{self.part}: could not be written", "make room, and go on with `resume`"):
+        with writing(self.part, "make room, and go on with `resume`"):
             place = self._file.tell()
             self._file.write(_line([text_of(cell) for cell in cells]))
             self._file.flush()

@@ -280,31 +280,40 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
     """Return doubts about units: a spin that no such top has, readings closer than a turn, turns counted twice."""
     middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
     if not is_possible_spin(middle):
-        doubt = f"{table.path.name}: the spin is about {middle:.4g} Hz, a Levitron spins at 20 to 60 Hz"
-        meant = [
-            f"f=NAME [{unit}] ({digits(spin, 3)} Hz)"
+        meant = tuple(
+            Text("f=NAME [{unit:s}] ({spin:n} Hz)", unit=unit, spin=digits(spin, 3))
             for unit, spin in possible_spins(middle / table.factors.get("spin_frequency_hz", 1.0)).items()
-        ]
-        if meant:
-            return [_doubt(f"{doubt}; say the unit with the column: {' or '.join(meant)}")]
-        thousands = "; if its point stands behind the thousands, write the numbers without it"
-        return [_doubt(doubt + thousands * is_possible_spin(1e3 * middle))]
+        )
+        say = Text("; say the unit with the column: {columns}", columns=meant) if meant else ""
+        if not meant and is_possible_spin(1e3 * middle):
+            say = "; if its point stands behind the thousands, write the numbers without it"
+        text = "{name:s}: the spin is about {spin:.4g} Hz, a Levitron spins at 20 to 60 Hz{say}"
+        return [_doubt(Text(text, name=table.path.name, spin=middle, say=say))]
     if step * middle < 1:  # nor does a counter give a reading in less
-        doubt = f"{table.path.name}: the readings lie {1e3 * step:.3g} ms apart, the top needs {1e3 / middle:.3g} ms"
-        return [_doubt(f"{doubt} for a turn; if the times are in seconds, say so with their column, as t=NAME [s]")]
-    lasts = float(time[-1] - time[0])
+        doubt = Text(
+            "{name:s}: the readings lie {step:.3g} ms apart, the top needs {turn:.3g} ms for a turn; if the times are "
+            "in seconds, say so with their column, as t=NAME [s]",
+            name=table.path.name, step=1e3 * step, turn=1e3 / middle,
+        )  # fmt: skip
+        return [_doubt(doubt)]
+    lasts, first, last = float(time[-1] - time[0]), float(frequency[0]), float(frequency[-1])
     loss = float(np.log(frequency[0] / frequency[-1])) / lasts
     if loss > FASTEST_LOSS_PER_S or (0 < loss < SLOWEST_LOSS_PER_S):
-        doubt = f"{table.path.name}: the spin goes from {frequency[0]:.4g} to {frequency[-1]:.4g} Hz in {lasts:.4g} s"
         minutes = loss < SLOWEST_LOSS_PER_S and table.factors.get("time_s", 1.0) > 1
         written, unit = ("minutes", "s") if minutes else ("seconds", "min" if loss > FASTEST_LOSS_PER_S else "ms")
-        text = f"{doubt}, in air it takes minutes; if the times are not in {written}, say so, as t=NAME [{unit}]"
-        return [_doubt(text)]
-    first, last = float(frequency[0]), float(frequency[-1])
+        doubt = Text(
+            "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz in {lasts:.4g} s, in air it takes minutes; if "
+            "the times are not in {written}, say so, as t=NAME [{unit:s}]",
+            name=table.path.name, first=first, last=last, lasts=lasts, written=written, unit=unit,
+        )  # fmt: skip
+        return [_doubt(doubt)]
     if first > FASTEST_BY_HAND_HZ and FALLS_BETWEEN_HZ[1] < last / 2 < FALLS_BETWEEN_HZ[0]:
-        doubt = f"{table.path.name}: the spin goes from {first:.4g} to {last:.4g} Hz: is each turn counted twice?"
-        why = f"No hand starts a top so fast, and it falls at {last / 2:.3g} Hz"
-        return [_doubt(f"{doubt} {why}; f=NAME [1/2s] halves the numbers")]
+        doubt = Text(
+            "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz: is each turn counted twice? No hand starts a "
+            "top so fast, and it falls at {half:.3g} Hz; f=NAME [1/2s] halves the numbers",
+            name=table.path.name, first=first, last=last, half=last / 2,
+        )  # fmt: skip
+        return [_doubt(doubt)]
     return []
 
 

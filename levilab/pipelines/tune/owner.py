@@ -178,7 +178,7 @@ def write_owner(path: Path, owner: Owner) -> None:
     lines.append("trials = [\n" + "".join(f"  {toml_value(one.text)},\n" for one in owner.attempts) + "]\n")
     if owner.scan:
         lines += ["\n[scan]\n", *(f"{key} = {toml_value(value)}\n" for key, value in owner.scan)]
-    with writing(f"{path}: could not be written", "choose another place with `file`"):
+    with writing(path, "choose another place with `file`"):
         replace_atomically(path, "".join(lines))
 
 

@@ -71,14 +71,14 @@ def export(
         raise UsageError("out", f"a name that ends in {', '.join(ENDINGS)} is expected", value=out)
     form.check()
     _refuse_to_replace([out], force=force)
-    with writing(f"{out}: could not be written"):
+    with writing(out):
         check_writable(out)  # before what takes long
     contents = make()
     given = {name: text for name, text in (("creator_name", creator), ("license", licence)) if text}
     files = form.files(replace(contents, about={**contents.about, **given}), out)
     _refuse_to_replace(files, force=force)
     for path, content in files.items():
-        with writing(f"{path}: could not be written"):
+        with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             replace_atomically(path, content)
     return [*files]

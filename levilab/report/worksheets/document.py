@@ -197,7 +197,7 @@ def write_worksheets(
             runs = how_many(len(seeds), "run")
             tell(Text("the key of {sheet:s}: {runs} on the virtual bench", sheet=sheet.experiment, runs=runs))
             contents[f"{sheet.experiment}-key"] = key(sheet, texts, seeds, measure(sheet, seeds))
-        with writing(f"{out}: could not be written"):
+        with writing(out):
             out.mkdir(parents=True, exist_ok=True)
             for name, document in contents.items():
                 files.append(out / f"{name}-{language}{ending}")

@@ -291,6 +291,7 @@ def test_a_wrong_setting_is_answered_in_german(given, said):
         "simulate undriven --set base.outer_radius_m=0.01", "simulate undriven --set top.mass_kg=abc",
         "simulate undriven --duration abc", "simulate sway --set drag.law=foo", "tune --top 24 --temperature x",
         "tune --top 24.9 --temperature 21 --washers 0.06,0.1 --trial 0.1g,20C,sink --trial 0.06g,20C,seitlich",
+        "acquire --mock", "open --no-browser", "class . -o x.png",
         "sweep undriven --sweep start.spin_hz=18:40:3 --sweep top.mass_kg=25g:25.5g:2 --duration 0.1",
     ],
 )  # fmt: skip
