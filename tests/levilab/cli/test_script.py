@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tomllib
 from importlib.metadata import EntryPoint
+from types import SimpleNamespace
 
 import pytest
 
@@ -99,13 +100,11 @@ def test_ctrl_c_ends_the_process_while_a_command_is_imported():
 def test_a_signal_after_the_run_changes_nothing(tmp_path, monkeypatch):
     handlers = []
 
-    class Kept:
-        status, folder = "finished", "somewhere"
+    def count():
+        handlers.append(signal.getsignal(signal.SIGTERM))
+        return 3
 
-        def count(self):
-            handlers.append(signal.getsignal(signal.SIGTERM))
-            return 3
-
-    monkeypatch.setattr("levilab.acquisition.loop.acquire", lambda *_: Kept())
+    kept = SimpleNamespace(status="finished", folder="somewhere", count=count)
+    monkeypatch.setattr("levilab.acquisition.loop.acquire", lambda *_: kept)
     assert command("acquire", "spin", "--mock", cwd=tmp_path).status == 0
     assert isinstance(handlers[0], End)

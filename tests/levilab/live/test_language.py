@@ -2,6 +2,7 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,14 +23,8 @@ READ = """[...document.querySelectorAll('body, body *')].filter((one) => !one.cl
 DATA = re.compile(r"English|Deutsch|Klammer|[0-9].*|hertz|bar|min|UTC|SQU|Vpp|TestMaker|Model.*|spin|Group 7")
 
 
-class Silent:
-    """A bench that says nothing."""
-
-    address = None
-    may_record = False
-
-    def events(self):
-        return []
+#: A bench that says nothing.
+SILENT = SimpleNamespace(address=None, may_record=False, events=list)
 
 
 @pytest.fixture
@@ -38,7 +33,7 @@ def hall(tmp_path):
     run.readings(spin_down(19))
     run.event("x", says=Text("the top follows the drive at {drive:.2f} Hz", drive=30.5).as_table())
     run.event("the top follows the drive up")
-    with serving(tmp_path / "runs", desk=Desk(Silent())) as hall:
+    with serving(tmp_path / "runs", desk=Desk(SILENT)) as hall:
         yield hall
 
 

@@ -4,6 +4,7 @@ import json
 import threading
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -235,19 +236,10 @@ def test_a_student_drives_records_and_analyzes(served, older, page, monkeypatch)
     assert (served.root / name / "result.json").exists()
 
 
-class Starting:
-    """A bench that is not ready."""
-
-    address = None
-    may_record = False
-
-    def events(self):
-        return []
-
-
 @pytest.fixture
 def starting(tmp_path):
-    with serving(tmp_path, desk=Desk(Starting())) as hall:
+    not_ready = SimpleNamespace(address=None, may_record=False, events=list)
+    with serving(tmp_path, desk=Desk(not_ready)) as hall:
         yield hall
 
 

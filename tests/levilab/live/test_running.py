@@ -56,7 +56,7 @@ def test_tops_that_level_off_count_as_in_the_analysis(tmp_path, levels_off):
     for top in levels_off:
         run.event("the top gets no faster", "levels off", 10.0, top=top)
     run.event("the top fell", "top lost", 10.0, top=9)
-    watch = Watch(run.folder)
+    watch = Watch(run.folder, clock=lambda: 0.0)  # on which no look ends early
     watch.step()
     task = watch.fit_task()
     shown = task[1]()
