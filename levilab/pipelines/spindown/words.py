@@ -166,7 +166,7 @@ def verdict_of_all(found: Combined, runs: Sequence[SpinDown]) -> str:
 
 def verdict_in_doubt(found: Combined) -> str:
     """Return what all runs say about the laws where no unit is sure."""
-    said = "The unit comes first: as it was read the {law} law is nearest, with constants as wrong as it."
+    said = "The unit comes first: as it was read the {law} law is nearest; do not use its constants."
     return Text(said, law=law_names([found.best]))
 
 
