@@ -280,6 +280,7 @@ def test_a_resume_at_a_bench_that_does_not_answer_keeps_the_run(tmp_path):
     before = (folder / "readings.csv").read_bytes()
     assert command("acquire", "spin", "--resume", folder, cwd=tmp_path).status == 3
     assert (folder / "readings.csv").read_bytes() == before
+    assert Run.load(folder).status == "failed"
 
 
 # --- a whole acquisition ---
