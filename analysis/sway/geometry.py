@@ -21,7 +21,7 @@ import numpy as np
 from analysis.arrays import Array
 from analysis.errors import ShapesDiffer, TooFewReadings
 from analysis.sway.joint import Corrections, Joint, fit_together
-from analysis.sway.lines import COARSE, Swings
+from analysis.sway.lines import Swings
 from analysis.sway.orbit import NoSwing, slow_swings, small_swings
 from analysis.sway.vertical import vertical_swing
 from analysis.uncertainty import Estimate, partly_believed, propagate
@@ -243,8 +243,8 @@ def choose_lines(windows: Sequence[Swings], spin_hz: Array, known: Known) -> lis
 def _judge(swings: Swings, spin: float, known: Known, part: float) -> tuple[float, float, float]:
     """Return misfit, Ω_g/ω₃ and the part of it by which it scatters; the misfit is infinite where no top swings so.
 
-    The vertical swing of this base, which is alike in all windows, counts by this part in each; weak swings are
-    improbable.
+    The vertical swing of this base and the size of the swings, which are alike in all windows, count by this part in
+    each.
     """
     backward, forward = swings.frequency[:2].tolist()
     size = max(abs(swings.split) / spin, _SMALL)
@@ -254,7 +254,7 @@ def _judge(swings: Swings, spin: float, known: Known, part: float) -> tuple[floa
         return math.inf, size, _BENT
     off = swings.vertical.value - vertical_swing(backward, forward, slope, known.top.gravity)
     u = math.hypot(_VERTICAL_U_HZ, _VERTICAL_SHIFT_U * swings.size**2 / max(_away(swings), NEAREST_HZ))
-    unlikely = COARSE * swings.misfit + part * ((off / u) ** 2 + 2 * math.log(u)) + swings.weakness
+    unlikely = swings.misfit + part * ((off / u) ** 2 + 2 * math.log(u) + swings.weakness)
     share = size * swings.split / _split(size, spin, swings.frequency[:2], known)[0]
     return unlikely, share, math.hypot(_BENT, _doubt(swings))
 

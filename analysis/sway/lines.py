@@ -1,11 +1,12 @@
 """The slow swings of a place over time: signed frequencies, amplitudes and uncertainties, window by window.
 
-In a window the place x + iy is a sum of waves: the backward and the forward slow swing and the precession, each with a
-frequency and a slope, and of lines at sums and differences of the slow swings' and the vertical swing's frequencies,
-since the field changes with height.  One of these lies within 0.2 Hz of the backward swing: a fit without it is wrong
-by tens of millihertz.  Where the height is known, it gives the vertical swing.  Noise is white.  Amplitudes are
-linear; frequencies follow by Gauss and Newton from the peaks of a spectrum, from several starts.  The likeliest fit is
-not always the right one, as a line beside a swing may be the stronger one: others are kept as its rivals.
+In a window the place x + iy is a sum of waves: the backward and the forward slow swing and the precession, each with
+a frequency and a slope, and of lines of the second and third order, at sums and differences of the slow swings' and
+the vertical swing's frequencies, since the field changes with height.  One of these lies within 0.2 Hz of the
+backward swing: a fit without it is wrong by tens of millihertz.  Where the height is known, it gives the vertical
+swing.  Noise is white.  Amplitudes are linear; frequencies follow by Gauss and Newton from the peaks of a spectrum,
+from several starts.  The likeliest fit is not always the right one, as a line beside a swing may be the stronger one:
+others are kept as its rivals.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from analysis.lines import Line, spectral_lines
 from analysis.sway.vertical import (
     ALONE,
     BESIDE,
+    CUBIC,
     VERTICAL_U_HZ,
     Beside,
     Vertical,
@@ -55,11 +57,8 @@ _SPANS_HZ = 20.0
 _TRIED, _STEPS = 3, 25
 #: Rounding: the noise is no smaller a part of the places, and frequencies differ by no smaller a part of their effect.
 _FINEST = 1e-8
-#: This part of −2 log L counts where lines are compared, since amplitudes change within a window: the model is not
-#: exact (Miller & Dunson, J. Am. Stat. Assoc. 114, 1113 (2019)).
-COARSE = 0.03
-#: The number of likeliest swings of a window that are kept, and how far that part may be above the least.
-_KEPT, _FARTHEST = 4, 30.0
+#: The number of likeliest swings of a window that are kept, and how far their −2 log L may be above the least.
+_KEPT, _FARTHEST = 6, 100.0
 
 
 class NoSwings(AnalysisError):
@@ -192,7 +191,7 @@ def swings_in_window(t: Array, s: Places, heights: Array | None = None, *, risin
     apart = 0.6 / float(t[-1] - t[0])
     starts = [np.array([backward, forward[0]]) for backward in {*seen, seen[0] - apart, seen[0] + apart}]
     starts += [np.array([backward, one]) for backward in seen[:2] for one in forward[1:]]
-    rows = BESIDE + ALONE if rising else BESIDE
+    rows = BESIDE + CUBIC + ALONE if rising else BESIDE + CUBIC
 
     def fit(slow: Array, rise: float | None = None, line: _Precession | None = None) -> _Fit:
         start, slopes = (slow, [0, 0]) if line is None else ([*slow, line.frequency], [0, 0, line.slope])
@@ -224,7 +223,7 @@ def _likeliest(fits: Sequence[_Fit]) -> list[_Fit]:
         if not apart or min(apart) > one.swings.u[:2].max():
             kept.append(one)
     least = improbable(kept[0])
-    return [one for one in kept if COARSE * (improbable(one) - least) < _FARTHEST][:_KEPT]
+    return [one for one in kept if improbable(one) - least < _FARTHEST][:_KEPT]
 
 
 def _weak(t: Array, rest: Places) -> float:

@@ -226,9 +226,9 @@ def test_a_swing_and_a_line_of_the_vertical_swing_are_distinguished_by_the_spin(
         slow = np.array(sorted(sorted(modes(field, TOP, HEIGHT, spin).real, key=abs)[:2]))
         right, turned = replace(lines(slow), vertical=Vertical(1.19, 3e-4)), slow.copy()
         turned[which] = slow[1 - which] + (1.19 if which else -1.19)
-        wrong = replace(lines(turned), vertical=Vertical(float(slow[1] - slow[0]), 3e-4), misfit=-40.0)
+        wrong = replace(lines(turned), vertical=Vertical(float(slow[1] - slow[0]), 3e-4), misfit=-4.0)
         seen.append(
-            replace(wrong, rivals=(right,)) if k in windows else replace(right, rivals=(replace(wrong, misfit=40.0),))
+            replace(wrong, rivals=(right,)) if k in windows else replace(right, rivals=(replace(wrong, misfit=4.0),))
         )
     chosen = choose_lines(seen, spins, known(0.02526))
     found = geometric_magnetism(chosen, spins, known(0.02526))

@@ -14,6 +14,7 @@ from levilab.pipelines.many.table import Row, Task, analyze_one
 from levilab.pipelines.suits import analyze_suiting
 from levilab.runs.run import RunRecord
 from levilab.runs.writer import RunWriter
+from levilab.simulator import preset, simulate
 from levilab.texts.text import in_language
 from support.commands import command
 from support.paths import ROOT
@@ -135,15 +136,16 @@ def test_a_mark_on_the_end_of_the_stem_is_noticed(tmp_path):
     assert found.runs[0].geometry.parts["lean"] > 0.1 * found.runs[0].geometry.measured.u
 
 
-def test_lines_that_may_be_either_are_named_and_not_compared(tmp_path):
-    t = np.arange(720) / 120  # the lines of 6 s of preset friction, whose push was too large
-    waves = ((-0.561, 1.12, 0.1), (0.739, 1.22, 1.0), (-0.358, 0.74, 2.0), (0.536, 0.68, 3.0), (7.62, 0.03, 0.0))
-    z = sum(size * np.exp(2j * np.pi * f * t + 1j * phase) for f, size, phase in waves)
-    rows = [(f"{one:.4f}", f"{place.real:.6f}", f"{place.imag:.6f}") for one, place in zip(t, z, strict=True)]
-    found = analyze(write(tmp_path / "large.csv", ("t [s]", "x [mm]", "y [mm]"), rows), spin_hz=29.7)
-    assert "may be the lines at -0.56 or -0.36 Hz and at 0.74 or 0.54 Hz" in " ".join(found.all_warnings)
-    assert "too uncertain" in found.text
-    assert found.runs[0].geometry.measured.u > 0.1
+@pytest.mark.slow
+def test_a_push_that_was_too_large_leaves_lines_of_the_third_order_which_say_which_is_which(tmp_path):
+    """6 s of preset friction: four lines of 0.7 to 1.2 mm, and of 9 µm those at 2b − f and 2f − b."""
+    motion, noise = simulate(preset("friction"), 6.0, rate=120.0), np.random.default_rng(1).normal(0, 0.03, (720, 2))
+    table = np.column_stack([motion.time[:-1], 1e3 * motion.position[:-1, :2] + noise])
+    rows = [tuple(f"{one:.6f}" for one in row) for row in table]
+    found = analyze(write(tmp_path / "large.csv", ("t [s]", "x [mm]", "y [mm]"), rows), spin_hz=29.72)
+    measured = found.runs[0].geometry.measured
+    assert abs(measured.value - 0.1765) < 3 * measured.u  # where it floats at rest
+    assert "near the vertical swing, 1.10 Hz" in " ".join(found.all_warnings)
 
 
 def test_without_a_precession_the_view_is_doubted(tmp_path):
@@ -171,7 +173,9 @@ def test_a_film_from_beside_gives_the_heights_and_its_spin_the_time(found, tmp_p
     titles = ("time_s", "x_m", "z_m", "spin_frequency_hz")
     side = write(tmp_path / "side.tracks.csv", titles, [row for row, inside in zip(rows, seen, strict=True) if inside])
     both = analyze(TRACK, device=DEVICE, side=side)
-    (note,) = both.all_warnings
+    # at 1.12 Hz, where no swing of this top is, rises are no proof: lines of 0.5 Hz are improbable, not impossible
+    note, either = both.all_warnings
+    assert "the lines at -0.62 or -0.29 Hz and at 0.83 or 0.50 Hz" in either
     assert re.search(r"side\.tracks\.csv begins at (8\.0\d|7\.9\d) s of track\.csv", note)  # 0.1 Hz/s, and 1 mHz
     swings, alone = both.runs[0].swings, found.runs[0].swings
     assert swings[1].vertical.value == pytest.approx(1.12, abs=1e-3)
