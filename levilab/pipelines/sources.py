@@ -309,14 +309,16 @@ def collect(paths: Sequence[Path], needs: Needs[R], options: Callable[[Path], In
     """Find the inputs at the paths that suit an analysis, the same data once.
 
     A run folder or a file is taken, or refused with a reason; a folder is searched for runs and data files, and what
-    does not suit there is skipped.  Raises DataError.
+    does not suit there is skipped.  Of several paths, as a pattern `runs/*` has them, those that levilab has written
+    itself are left out.  Raises DataError.
 
     Args:
         paths: run folders, data files, folders to search.
         needs: of the analysis.
         options: how an input is read.
     """
-    return join([find(path, needs, options) for path in paths])
+    own = _own(paths)
+    return join([find(path, needs, options) for path in paths if path not in own or len(own) == len(paths)])
 
 
 def find(path: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) -> Found[R]:
@@ -560,10 +562,14 @@ def data_files(root: Path) -> list[Path]:
 def other_files(root: Path) -> list[Path]:
     """Find the other files at or below a folder, but for those that levilab or a computer's desktop keeps there."""
     others = [path for path in _files(root) if path.suffix.casefold() not in SEARCHED]
-    results = [path for path in others if _RESULT.search(path.name)]
-    own = {*results, *(path for path in others if path.name.endswith(_CORRECTION))}
-    own |= {result.with_name(f"{_RESULT.sub('', result.name)}{_analysis_of(result)}.png") for result in results}
-    return sorted(path for path in others if path not in own)
+    return sorted(set(others) - _own(others))
+
+
+def _own(paths: Sequence[Path]) -> set[Path]:
+    """Return those of files that levilab has written: results, their figures, corrections of columns."""
+    results = [path for path in paths if _RESULT.search(path.name)]
+    figures = {result.with_name(f"{_RESULT.sub('', result.name)}{_analysis_of(result)}.png") for result in results}
+    return {*results, *(path for path in paths if path in figures or path.name.endswith(_CORRECTION))}
 
 
 def _analysis_of(result: Path) -> str:

@@ -161,6 +161,19 @@ def test_a_folder_names_every_file_that_it_leaves_out_by_kind_and_number(tmp_pat
             save(analysis, found)
 
 
+@pytest.mark.usefixtures("undrawn_figures")
+def test_of_a_pattern_what_levilab_has_written_is_left_out(tmp_path):
+    for seed in (1, 2):
+        spin_down_csv(tmp_path / f"run{seed}.csv", seed=seed)
+    for analysis, found in analyze_suiting([tmp_path], {}):
+        save(analysis, found)
+    results = sorted(tmp_path.glob("*result.json"))
+    found = SPINDOWN.analyze(sorted(tmp_path.iterdir()), SpinDownOptions())
+    assert (len(found.sources), len(results)) == (2, 1)
+    with pytest.raises(DataError, match="name the folder of the run instead"):
+        SPINDOWN.analyze(results, SpinDownOptions())
+
+
 def test_what_another_analysis_reads_is_left_out_of_one_alone(tmp_path, sample_data):
     folder_of_a_student(tmp_path, sample_data)
     found = SPINDOWN.analyze([tmp_path], SpinDownOptions())
