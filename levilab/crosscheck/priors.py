@@ -1,5 +1,7 @@
 """The priors of the cross-check: a row for each number that a trial draws, with its reason."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

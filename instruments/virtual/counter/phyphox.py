@@ -15,13 +15,11 @@ from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
 import numpy as np
-from numpy.typing import NDArray
 
 from instruments.clock import Clock
 from instruments.virtual.core.device import Answer, VirtualInstrument
+from instruments.virtual.core.signal import Array
 from instruments.virtual.core.steps import Steps
-
-Array = NDArray[np.float64]
 
 #: Buffers of the app's own magnetometer experiment → column of its samples, and their names in an export.
 _BUFFERS = {"mag_time": 0, "magX": 1, "magY": 2, "magZ": 3, "mag": 4, "magAccuracy": 5}

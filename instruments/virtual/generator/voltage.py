@@ -9,11 +9,9 @@ from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from instruments.virtual.core.signal import Array
 from instruments.virtual.generator.channel import Output
-
-Array = NDArray[np.float64]
 
 #: Noise holds each value so long [s]: its bandwidth is 100 kHz, that of a 33500B after ``*RST``.
 _NOISE_CELL = 5e-6

@@ -1,5 +1,7 @@
 """Sweeps of the drive with the fitted line, the drive's frequencies and the u of the points of a result."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from analysis.precession.sweep import EXCLUDED_P, Sweep, fit_sweep

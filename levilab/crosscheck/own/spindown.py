@@ -1,10 +1,13 @@
 """Spin-downs with the fitted constants, times, scatter, correlation, gates and number of runs of a result."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.budget import gate_bias, printed_step
 from analysis.spindown.combine import combine
 from analysis.spindown.drag import LAWS
@@ -18,9 +21,6 @@ from levilab.pipelines.spindown.analysis import EXPERIMENT, SpinDownAnalysis
 from levilab.present.numbers import how_many
 from levilab.simulator import laws
 from levilab.texts.text import Text
-
-Array = np.ndarray[tuple[int], np.dtype[np.float64]]
-
 
 #: Processor time of the fits of one run [s]: of any, and for a reading.
 _COST_S, _COST_OF_READING_S = 0.006, 2e-5

@@ -3,6 +3,8 @@
 The random numbers follow from the readings' hashes, so that the same result has the same trials.
 """
 
+from __future__ import annotations
+
 import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType

@@ -6,6 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError
 from analysis.precession.coherence import Coherence, coherence, pulse_times
 from analysis.precession.sweep import Sweep, SweepFit, fit_sweep
@@ -18,9 +19,6 @@ from levilab.pipelines.precession.readings import SweepReadings
 from levilab.pipelines.precession.words import remarks_of, verdict
 from levilab.pipelines.sources import Source
 from levilab.runs.traces import StoredTrace
-
-Array = np.ndarray[tuple[int], np.dtype[np.float64]]
-
 
 #: The experiment whose runs it takes, and whose settings count.
 EXPERIMENT = "precession"

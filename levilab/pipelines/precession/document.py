@@ -5,6 +5,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.budget import Budget, Component, printed_step, rest, u_of_step
 from analysis.numbers import digits
 from analysis.precession.line import Line
@@ -25,9 +26,6 @@ from levilab.pipelines.precession.words import PRECESSION_ROW, QUANTITIES, inter
 from levilab.pipelines.row import find_all, symbols_of
 from levilab.pipelines.sources import Source
 from levilab.texts.text import Text
-
-Array = np.ndarray[tuple[int], np.dtype[np.float64]]
-
 
 #: Relative uncertainties of the drive's frequency that differ by less than this are those of one clock.
 _ONE_CLOCK = 1e-3
