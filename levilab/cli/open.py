@@ -168,7 +168,8 @@ def _print_doubts(look: "Look", run: "UnderstoodRun") -> None:
         ]
         if doubt.kind == "titles":  # each column could be each of them
             keys = dict.fromkeys(key for choice in doubt.choices for key in choice.columns)
-            answers = [("by their numbers", ",".join(f"{key}=NUMBER" for key in keys))]
+            with_unit = [(text, columns) for text, columns in answers if "[" in columns]
+            answers = [*with_unit, ("by their numbers", ",".join(f"{key}=NUMBER" for key in keys))]
         for text, columns in answers:
             console.print(escape(f'  {in_language(text)}: levilab open {as_typed(look.path)} --columns "{columns}"'))
     if run.problem and not run.doubts and run.problem != look.problem:

@@ -599,6 +599,12 @@ def _which_columns(layout: Layout, names: Collection[str]) -> Doubt | None:
         for name in names
         for k in numeric
     )
+    if _SPIN in names:
+        choices += tuple(
+            Choice(Said("{title}, as turns since the start", title=title.get(k, str(k + 1))), {"f": f"{k + 1} [turns]"})
+            for k in numeric
+            if len(counted := _numbers(layout, k)) > 2 and {b - a for a, b in pairwise(counted)} == {1}
+        )
     asked, *others = map(_in_words, names)
     for one in others:
         asked = Said("{first} and which {second}", first=asked, second=one)

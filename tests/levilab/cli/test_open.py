@@ -35,6 +35,14 @@ def test_a_question_has_its_answers_as_commands(doubtful):
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("undrawn_figures")
+def test_numbered_pulses_may_be_turns_since_the_start(tmp_path):
+    (tmp_path / "p.csv").write_text("Pulse,micros\n" + "".join(f"{n},{26316 * n}\n" for n in range(1, 40)), "utf-8")
+    asked = command("open", "p.csv", cwd=tmp_path)
+    assert 'Pulse, as turns since the start: levilab open p.csv --columns "f=1 [turns]"' in asked.out
+    ended = command("open", "p.csv", "--columns", "f=1 [turns]", "--json", cwd=tmp_path)
+    assert ended.status == 0, ended.err
+
+
 def test_an_answer_is_kept_analyzed_and_reported(doubtful):
     words = ("--columns", "t=1,f=2 [rad/s]", "--keep", "-o", "my.html")
     ended = command("open", "my.csv", *words, cwd=doubtful.parent)
