@@ -95,11 +95,11 @@ def parse_toml(text: str) -> dict[str, Any]:
     return table
 
 
-def read_toml(file: Path | Traversable, refusal: type[LevilabError], missing: str) -> dict[str, Any]:
+def read_toml(file: Path | Traversable, refusal: type[LevilabError], missing: str, expected: str) -> dict[str, Any]:
     """Return the content of a TOML file.
 
     Raises:
-        refusal: it cannot be read; where there is no such file with the text `missing`.
+        refusal: it cannot be read; it says what is expected, or where there is no such file the text `missing`.
     """
     try:
         return parse_toml(file.read_bytes().decode("utf-8-sig"))
@@ -107,11 +107,12 @@ def read_toml(file: Path | Traversable, refusal: type[LevilabError], missing: st
         raise refusal(missing) from None
     except OSError as error:
         if file.is_dir():
-            raise refusal("{path}: is a folder; a TOML file is expected", path=file) from None
-        what = "{path}: cannot be read ({why}): a TOML file is expected"
-        raise refusal(what, path=file, why=error.strerror) from error
+            raise refusal("{path}: is a folder; {expected}", path=file, expected=expected) from None
+        what = "{path}: cannot be read ({why}); {expected}"
+        raise refusal(what, path=file, why=error.strerror, expected=expected) from error
     except ValueError as error:
-        raise refusal("{path}: not readable as TOML: {why}", path=file, why=error) from error
+        what = "{path}: not readable as TOML: {why}; {expected}"
+        raise refusal(what, path=file, why=error, expected=expected) from error
 
 
 #: Ends of names of files that people give where a folder is expected.

@@ -123,4 +123,5 @@ def read_bench(path: Path, tables: type[C], *, instead: str = ", or try `mock`")
 def read_table(path: Path, *, instead: str = ", or try `mock`") -> dict[str, Any]:
     """Return the content of a bench file, whatever it is; see `read_bench`.  Raises ConfigError."""
     missing = "{path}: there is no such file: describe your bench in it (docs/bench.md){instead}"
-    return read_toml(path, ConfigError, Text(missing, path=path, instead=instead))
+    expected = "a TOML file is expected, as docs/bench.md describes"
+    return read_toml(path, ConfigError, Text(missing, path=path, instead=instead), expected)

@@ -109,7 +109,7 @@ def read_device(path: Path) -> Device:
     """Return the device described in a TOML file.  Raises DeviceError."""
     advice = "a TOML file with [base] and [top] is expected, as sample_data/device.toml"
     missing = Text("{path:s}: there is no such file; {advice}", path=path, advice=advice)
-    table = read_toml(path, DeviceError, missing)
+    table = read_toml(path, DeviceError, missing, advice)
     try:
         return Device.model_validate(table)
     except ValidationError as error:

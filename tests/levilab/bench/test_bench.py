@@ -381,7 +381,7 @@ def test_an_empty_description_is_a_bench_without_instruments(tmp_path):
         ("[counter]\nmodel = '53230A'", "counter.address: is missing"),
         ("counter = 3", "counter = '3'"),
         ("[spin]\ngate = 1\nlevel = 2", "(and 1 more)"),
-        ("[spin\n", "not readable as TOML"),
+        ("[spin\n", "; a TOML file is expected, as docs/bench.md describes"),
         ("[spin]\ngate_s = 1,0", "; write a decimal point, not a comma"),
         ("[spin]\ngate_s = 1 s", "; write the number without its unit"),
         ("[spin]\ngate_s = 12", "gate_s = 12 must be shorter than interval_s = 10"),

@@ -136,7 +136,7 @@ def test_a_file_that_does_not_go_is_named_with_what_is_wrong(tmp_path, content, 
 
 
 def test_a_folder_is_no_scene(tmp_path):
-    with pytest.raises(SceneError, match="is a folder; a TOML file is expected"):
+    with pytest.raises(SceneError, match="is a folder; a TOML file is expected, or the name of a scene"):
         read_scene(tmp_path)
 
 

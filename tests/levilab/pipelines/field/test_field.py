@@ -181,7 +181,7 @@ def test_a_moment_needs_the_mass(scan):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("[base", "not readable as TOML"),
+        ("[base", "; a TOML file with [base] and [top] is expected, as sample_data/device.toml"),
         ("[base]\ninner_radius = 0.03", "base.inner_radius is no key known here"),
         ("[base]\ninner_radius_m = '3 cm'", "write the number without its unit"),
         ("[top]\ninertia_axial_kg_m2 = 1e-6", "both inertias are expected"),
