@@ -10,7 +10,7 @@ import typer
 
 from levilab.cli.options import SCENES, Json, Settings, argument, flag, named_scene, option, place, quantity
 from levilab.cli.output import interruptible, message, print_json, result
-from levilab.errors import DataError, UsageError, WorkersLost
+from levilab.errors import DataError, UsageError, WorkersLost, as_typed
 from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
@@ -216,7 +216,7 @@ def _show(store: Store, *, as_json: bool) -> list[Path]:
         message(
             Text(
                 "{n} of {all} points are known; levilab sweep {path:s} --resume goes on",
-                n=summary.points, all=store.plan.size, path=store.path,
+                n=summary.points, all=store.plan.size, path=as_typed(store.path),
             )
         )  # fmt: skip
     return pictures

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from analysis.numbers import digits
+from levilab.errors import as_typed
 from levilab.files import writing
 from levilab.motion.report import SYNTHETIC, command_text, scene_blocks
 from levilab.present.document.blocks import (
@@ -93,7 +94,7 @@ def _warnings(store: Store, summary: Summary) -> Iterator[Warnings]:
     if left := store.plan.size - summary.points:
         text = Text(
             "{left} of {all} points are not computed; levilab sweep {path:s} --resume goes on",
-            left=left, all=store.plan.size, path=store.path,
+            left=left, all=store.plan.size, path=as_typed(store.path),
         )  # fmt: skip
         yield Warnings(((text,),))
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from levilab.errors import UsageError
+from levilab.errors import UsageError, as_typed
 from levilab.simulator.scene import Scene
 from levilab.simulator.single import LONGEST_S
 from levilab.sweeps.adaptive import begin_adaptive, is_adaptive
@@ -90,7 +90,8 @@ def store_for(
 
 
 def _existing_store(request: SweepRequest, plan: Plan, path: Path, *, resume: bool) -> Store:
-    there = f"it is there already: levilab sweep {path} shows it, `resume` goes on with it; or take another place"
+    shows = f"levilab sweep {as_typed(path)} shows it, `resume` goes on with it"
+    there = f"it is there already: {shows}; or take another place"
     if not resume and not (path / "zarr.json").exists():
         raise UsageError("out", "it is there already, and no store of a sweep: take another place", value=path)
     store = Store.open(path, writable=True)

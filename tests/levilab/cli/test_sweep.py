@@ -70,8 +70,11 @@ def test_after_ctrl_c_the_printed_command_continues_to_the_same_result(shown, tm
     assert ended.status == 130
     kept = "levilab: interrupted, 2 of 4 chunks are kept in map.zarr; go on with: levilab sweep map.zarr --resume"
     assert ended.err.splitlines()[-1] == kept
-    part = command("sweep", "map.zarr", cwd=tmp_path)
+    (tmp_path / "map.zarr").rename(tmp_path / "my map.zarr")
+    part = command("sweep", "my map.zarr", cwd=tmp_path)
     assert "400 of them computed" in part.out
+    assert 'levilab sweep "my map.zarr" --resume goes on' in part.err
+    (tmp_path / "my map.zarr").rename(tmp_path / "map.zarr")
     ended = command("sweep", "map.zarr", "--resume", cwd=tmp_path)
     assert "going on: 2 of 4 chunks are done" in ended.err
     assert ended.out == shown[1]
