@@ -4,9 +4,9 @@ In a window the place x + iy is a sum of waves: the backward and the forward slo
 a frequency and a slope, and of lines of the second and third order, at sums and differences of the slow swings' and
 the vertical swing's frequencies, since the field changes with height.  One of these lies within 0.2 Hz of the
 backward swing: a fit without it is wrong by tens of millihertz.  Where the height is known, it gives the vertical
-swing.  Noise is white.  Amplitudes are linear; frequencies follow by Gauss and Newton from the peaks of a spectrum,
-from several starts.  The likeliest fit is not always the right one, as a line beside a swing may be the stronger one:
-others are kept as its rivals.
+swing.  Noise that is correlated is worth fewer readings.  Amplitudes are linear; frequencies follow by Gauss and
+Newton from the peaks of a spectrum, from several starts.  The likeliest fit is not always the right one, as a line
+beside a swing may be the stronger one: others are kept as its rivals.
 """
 
 from __future__ import annotations
@@ -198,7 +198,8 @@ def swings_in_window(t: Array, s: Places, heights: Array | None = None, *, risin
         return _fit(t, s, np.array(start), np.array(slopes), _expected(t, heights, slow), rows=rows, rise=rise)
 
     fits = [fit(start) for start in starts]
-    best = _likeliest(fits)[0]
+    worth = _worth(_likeliest(fits)[0].rest)
+    best = _likeliest(fits, worth)[0]
     # either swing, or both, may be the line that the other makes with the vertical swing, and the true one a weak line
     (back, ahead), rise = best.swings.frequency.tolist(), best.vertical(t, s).value
     weak = -_weak(t, best.rest.conj()), _weak(t, best.rest)
@@ -206,16 +207,26 @@ def swings_in_window(t: Array, s: Places, heights: Array | None = None, *, risin
     fits += [fit(np.array(slow), ahead - back) for slow in turned]
     fits += [fit(np.array(slow), rise) for slow in ((back, ahead), (ahead - rise, back + rise))]
     line, mirror = _precession(t, best.rest), _precession(t, best.rest.conj())
-    ends = [fit(one.swings.frequency, one.swings.vertical.value, line) for one in _likeliest(fits)]
-    first, *rivals = (replace(one.swings, vertical=one.vertical(t, s)) for one in _likeliest(ends))
+    ends = [fit(one.swings.frequency, one.swings.vertical.value, line) for one in _likeliest(fits, worth)]
+    worth = _worth(_likeliest(ends, worth)[0].rest)
+    first, *rivals = (
+        replace(one.swings, vertical=one.vertical(t, s), misfit=worth * one.swings.misfit, u=one.swings.u / worth**0.5)
+        for one in _likeliest(ends, worth)
+    )
     return replace(first, backwards=0.0 if mirror is None else mirror.amplitude, rivals=tuple(rivals))
 
 
-def _likeliest(fits: Sequence[_Fit]) -> list[_Fit]:
-    """Return the likeliest of unlike fits, the likeliest first."""
+def _worth(rest: Places) -> float:
+    """Return the independent readings that each one is worth, as residuals of an AR(1) process have it."""
+    correlation = float(np.vdot(rest[:-1], rest[1:]).real / np.linalg.norm(rest) ** 2)
+    return float(np.clip((1 - correlation) / (1 + correlation), 1 / rest.size, 1.0))
+
+
+def _likeliest(fits: Sequence[_Fit], worth: float = 1.0) -> list[_Fit]:
+    """Return the likeliest of unlike fits, the likeliest first; worth: independent readings that each one is worth."""
 
     def improbable(fit: _Fit) -> float:
-        return fit.swings.misfit + fit.swings.weakness
+        return worth * fit.swings.misfit + fit.swings.weakness
 
     kept: list[_Fit] = []
     for one in sorted(fits, key=improbable):
