@@ -489,3 +489,10 @@ def test_u_of_few_readings_with_a_tilt_is_no_smaller_than_their_noise(n, largest
         noisy = spin("disc", time, 40.0, 2.34e-4) + rng.normal(0, SIGMA, n)
         start = spin_down_fit.fit_spin_down(time, noisy, laws=["disc"]).fit("disc").parameters["start_frequency"]
         assert abs(start.value - 40.0) < largest * start.u
+
+
+def test_rough_readings_cannot_tell():
+    verdict = fit_spin_down(T, readings(sigma=3.0), 3.0).verdict
+    assert verdict.excluded == ()
+    assert {"stokes", "newton", "disc"} <= {*verdict.indistinguishable, *verdict.weak}
+    assert not verdict.decided

@@ -51,7 +51,7 @@ class Screen(io.StringIO):
 
 
 def test_a_table_is_as_wide_as_the_terminal_and_wider_into_a_file(monkeypatch):
-    monkeypatch.setattr(shutil, "get_terminal_size", lambda: os.terminal_size((57, 24)))
+    monkeypatch.setattr(shutil, "get_terminal_size", lambda *_, **__: os.terminal_size((57, 24)))
     monkeypatch.setattr(sys, "stdout", Screen())
     assert terminal.terminal().width == 57
     monkeypatch.setattr(sys, "stdout", io.StringIO())

@@ -200,3 +200,9 @@ def test_without_the_extra_the_message_says_how_to_install_it(tmp_path, monkeypa
     assert ended.status == 1
     assert 'pip install ".[pdf]"' in ended.err
     assert not (tmp_path / "x.pdf").exists()
+
+
+def test_another_ending_is_wrong_usage_and_says_which_two_work(tmp_path):
+    ended = command("report", ROOT / "sample_data/spin-down-1", "-o", "x.docx", cwd=tmp_path)
+    assert ended.status == 2
+    assert ".html or .pdf" in ended.err

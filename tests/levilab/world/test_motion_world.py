@@ -509,3 +509,17 @@ def test_the_pull_of_bursts_is_that_of_a_moment_that_leans_with_the_top(spin):
     resonance = math.sqrt(torque / (top.inertia_transverse_kg_m2 - top.inertia_axial_kg_m2)) / (2 * math.pi)
     assert response(gained, 0).pull == pytest.approx(fixed / (1 - (resonance / spin) ** 2), rel=0.015)
     # 1 %: the spin moves within the second, the more the nearer the resonance
+
+
+def test_before_time_zero_there_is_no_top():
+    turns, up = turns_of(Flight(TILTED), np.array([-1.0, -1e-9, 0.0]))
+    assert up.tolist() == [False, False, True]
+    assert turns[0] == 0.0
+
+
+def test_the_noise_is_as_large_as_asked_for_and_another_with_another_seed():
+    fallen = world(FALLING, tape=Tape(noise=0.02), seed=1)
+    light = fallen.light(10.0, 1e-4, 40_000)
+    assert light.std() == pytest.approx(0.02, rel=4 / math.sqrt(2 * 40_000))
+    other = world(FALLING, tape=Tape(noise=0.02), seed=2).light(10.0, 1e-4, 40_000)
+    assert abs(np.corrcoef(light, other)[0, 1]) < 4 / math.sqrt(40_000)

@@ -267,3 +267,9 @@ def test_the_command_names_its_file(levilab, tmp_path):
     assert done.stdout == "wrote spin-down-1.zip\n"
     refused = levilab("export", str(RUN), check=1)
     assert "spin-down-1.zip is there already: give another name with --out, or --force to replace it" in refused.stderr
+
+
+def test_hdf5_is_opened_by_xarray_with_what_the_extra_brings(tmp_path):
+    written(RUN, tmp_path / "run.h5")
+    with xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf") as data:
+        assert data["spin_frequency_hz"].sel(time_s=190.0).item() == 21.75
