@@ -229,3 +229,17 @@ def whitening(time: Array, rho: float) -> Callable[[Array], Array]:
     r = rho ** (steps / np.median(steps))
     root = np.sqrt(1 - r**2)
     return lambda rows: np.concatenate([rows[..., :1], (rows[..., 1:] - r * rows[..., :-1]) / root], axis=-1)
+
+
+def independent(count: int, correlation: float) -> float:
+    """Return the number of independent readings whose mean is known as well as that of an AR(1) process.
+
+    Args:
+        count: of the readings.
+        correlation: of neighbours, 0 to 1.
+
+    >>> [round(independent(10, r), 3) for r in (0.0, 0.9, 1.0)]
+    [10.0, 1.374, 1.0]
+    """
+    apart = np.arange(1, count)
+    return count / (1 + 2 * float(np.sum((1 - apart / count) * correlation**apart)))

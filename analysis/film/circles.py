@@ -5,13 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from analysis.arrays import Array
+from analysis.arrays import Array, Picture
 from analysis.film.errors import NoTop
-
-Picture = NDArray[np.floating] | NDArray[np.uint8]
-
 
 #: Steepest edges whose pixels vote, as a part of all pixels.
 _EDGES = 0.15

@@ -1,12 +1,9 @@
 """A light dot on the stem of a top, in one picture: the middle of what is brighter than half of its height."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from analysis.arrays import Picture
 from analysis.film.circles import Circle
-
-Picture = NDArray[np.floating] | NDArray[np.uint8]
-
 
 #: How far from the rim's middle the dot is looked for, in radii of the rim: a mark begins beyond.
 _REACH = 0.32

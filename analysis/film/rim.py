@@ -10,13 +10,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from analysis.arrays import Array
+from analysis.arrays import Array, Picture
 from analysis.film.circles import Circle
-
-Picture = NDArray[np.floating] | NDArray[np.uint8]
-
 
 #: Directions of rays.
 RAYS = 128

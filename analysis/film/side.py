@@ -12,15 +12,11 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-from analysis.arrays import Array
+from analysis.arrays import Array, Picture
 from analysis.film.circles import Circle, changing_part
 from analysis.film.errors import NoTop
 from analysis.film.rim import RAYS, Rim, fit_shifts, shifts_of
-
-Picture = NDArray[np.floating] | NDArray[np.uint8]
-
 
 #: Rays across each long and each short edge, and the part of the edge that they cover.
 _LONG, _SHORT, _COVERED = 44, 20, 0.95

@@ -22,12 +22,14 @@ from numpy.typing import NDArray
 from analysis.arrays import Array
 from analysis.errors import AnalysisError, NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewReadings
 from analysis.lines import Line, spectral_lines
+from analysis.residuals import independent
 from analysis.sway.vertical import (
     ALONE,
     BESIDE,
     CUBIC,
     VERTICAL_U_HZ,
     Beside,
+    Places,
     Vertical,
     beside,
     of_heights,
@@ -38,8 +40,6 @@ from analysis.sway.vertical import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-
-Places = NDArray[np.complex128]
 
 #: Length of a window [s]: in a longer one the precession's slope changes.  Least number of samples of a window.
 WINDOW_S, FEWEST = 20.0, 100
@@ -198,8 +198,7 @@ def swings_in_window(t: Array, s: Places, heights: Array | None = None, *, risin
         return _fit(t, s, np.array(start), np.array(slopes), _expected(t, heights, slow), rows=rows, rise=rise)
 
     fits = [fit(start) for start in starts]
-    worth = _worth(_likeliest(fits)[0].rest)
-    best = _likeliest(fits, worth)[0]
+    best = _likeliest(fits)[0]
     # either swing, or both, may be the line that the other makes with the vertical swing, and the true one a weak line
     (back, ahead), rise = best.swings.frequency.tolist(), best.vertical(t, s).value
     weak = -_weak(t, best.rest.conj()), _weak(t, best.rest)
@@ -207,23 +206,25 @@ def swings_in_window(t: Array, s: Places, heights: Array | None = None, *, risin
     fits += [fit(np.array(slow), ahead - back) for slow in turned]
     fits += [fit(np.array(slow), rise) for slow in ((back, ahead), (ahead - rise, back + rise))]
     line, mirror = _precession(t, best.rest), _precession(t, best.rest.conj())
-    ends = [fit(one.swings.frequency, one.swings.vertical.value, line) for one in _likeliest(fits, worth)]
-    worth = _worth(_likeliest(ends, worth)[0].rest)
+    ends = [fit(one.swings.frequency, one.swings.vertical.value, line) for one in _likeliest(fits)]
+    likeliest = _likeliest(ends)
+    worth = _worth(likeliest[0].rest)
     first, *rivals = (
         replace(one.swings, vertical=one.vertical(t, s), misfit=worth * one.swings.misfit, u=one.swings.u / worth**0.5)
-        for one in _likeliest(ends, worth)
+        for one in likeliest
     )
     return replace(first, backwards=0.0 if mirror is None else mirror.amplitude, rivals=tuple(rivals))
 
 
 def _worth(rest: Places) -> float:
-    """Return the independent readings that each one is worth, as residuals of an AR(1) process have it."""
+    """Return the independent readings that each one is worth, by the correlation of neighbouring residuals."""
     correlation = float(np.vdot(rest[:-1], rest[1:]).real / np.linalg.norm(rest) ** 2)
-    return float(np.clip((1 - correlation) / (1 + correlation), 1 / rest.size, 1.0))
+    return independent(rest.size, max(correlation, 0.0)) / rest.size
 
 
-def _likeliest(fits: Sequence[_Fit], worth: float = 1.0) -> list[_Fit]:
-    """Return the likeliest of unlike fits, the likeliest first; worth: independent readings that each one is worth."""
+def _likeliest(fits: Sequence[_Fit]) -> list[_Fit]:
+    """Return the likeliest of unlike fits, the likeliest first; readings count as the best fit's residuals have it."""
+    worth = _worth(min(fits, key=lambda one: one.swings.misfit + one.swings.weakness).rest)
 
     def improbable(fit: _Fit) -> float:
         return worth * fit.swings.misfit + fit.swings.weakness

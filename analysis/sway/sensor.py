@@ -15,16 +15,13 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.arrays import Array
 from analysis.sway.lines import PRECESSION_HZ, SLOW_HZ
-from analysis.sway.vertical import GRADIENT_PER_M
+from analysis.sway.vertical import GRADIENT_PER_M, Places
 
 if TYPE_CHECKING:
     from analysis.sway.lines import Swings
-
-Places = NDArray[np.complex128]
 
 _MU0_4PI = 1e-7  # [T m/A]
 #: Samples at either end that the filter's edge spoils.

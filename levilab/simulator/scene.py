@@ -362,8 +362,8 @@ def _scenes_folder() -> Traversable:
 
 def _read_file(file: Traversable | Path, name: str) -> Scene:
     """Return the scene of a file; its name is `name` unless the file says another.  Raises SceneError."""
-    missing = "{file:s}: there is no such file; scenes that come with levilab are {names:s}, each a TOML file to copy"
-    missing = Text(missing, file=file, names=", ".join(presets()))
+    text = "{file:s}: there is no such file; scenes that come with levilab are {names:s}, each a TOML file to copy"
+    missing = Text(text, file=file, names=", ".join(presets()))
     table = read_toml(file, SceneError, missing, "a TOML file is expected, or the name of a scene")
     try:
         return scene_of({"name": name} | table)

@@ -48,7 +48,7 @@ class Silent(Display):
 
 
 class Meanwhile(Silent):
-    """Does something after so many readings."""
+    """Does something after a number of readings."""
 
     def __init__(self, after, do):
         super().__init__()
@@ -61,7 +61,7 @@ class Meanwhile(Silent):
 
 
 class Impatient(Meanwhile):
-    """Presses Ctrl-C, or sends another signal, after so many readings."""
+    """Presses Ctrl-C, or sends another signal, after a number of readings."""
 
     def __init__(self, most, number=signal.SIGINT):
         super().__init__(most, lambda: signal.raise_signal(number))

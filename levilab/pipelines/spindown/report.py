@@ -10,6 +10,7 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.numbers import digits
+from analysis.residuals import independent
 from analysis.spindown.combine import CombinedLaw, Mean
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown
@@ -344,7 +345,7 @@ def count_table(analysis: SpinDownAnalysis, *, symbols: bool = False) -> Table |
                     without_unit(resonance) if resonance else "—",
                     Text("{hz:n}", hz=plain(float(added[-1]), 2)) if tilt else "—",
                     Text("{rho:.2f} ± {u:.2f}", rho=rho, u=seen.u) if seen else "none",
-                    Text("{worth:n} of {n}", worth=digits(n * (1 - rho) / (1 + rho)), n=n) if seen else str(n),
+                    Text("{worth:n} of {n}", worth=digits(independent(n, rho)), n=n) if seen else str(n),
                 )
             )
         )

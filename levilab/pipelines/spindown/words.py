@@ -13,6 +13,7 @@ import numpy as np
 from analysis.arrays import Array
 from analysis.numbers import digits
 from analysis.remarks import Remark
+from analysis.residuals import independent
 from analysis.spindown.combine import Combined, CombinedLaw
 from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.fit import SpinDown
@@ -352,16 +353,6 @@ _OF_A_LAW = frozenset({
 _MOST_TIMES = 1000
 
 
-def _independent(count: float, correlation: float) -> float:
-    """Return the number of independent readings whose mean is known as well as that of an AR(1) process.
-
-    >>> [round(_independent(10, r), 3) for r in (0.0, 0.9, 1.0)]
-    [10.0, 1.374, 1.0]
-    """
-    apart = np.arange(1, int(count))
-    return count / (1 + 2 * float(np.sum((1 - apart / count) * correlation**apart)))
-
-
 def _outlier(of: Remark) -> str:
     time, frequency, off, times, stated, kept, falling = of.values
     many = Text("more than {most}", most=_MOST_TIMES) if times >= _MOST_TIMES else digits(times)
@@ -446,7 +437,7 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyT
             r=of.values[0],
             u=of.values[1],
             n=of.values[2],
-            worth=digits(_independent(of.values[2], of.values[0])),
+            worth=digits(independent(round(of.values[2]), of.values[0])),
         ),
         "changed": Doubting(
             lambda of: Text(

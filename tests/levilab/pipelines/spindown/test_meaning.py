@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 from matplotlib.text import Text
+from scipy.linalg import toeplitz
 
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.figure import spindown_figure
-from levilab.pipelines.spindown.report import meaning, spindown_part, spindown_tables
+from levilab.pipelines.spindown.report import count_table, meaning, spindown_part, spindown_tables
 from levilab.pipelines.spindown.words import SYMBOLS
 from levilab.present.document.blocks import Verdict
 from levilab.present.numbers import with_uncertainty
@@ -25,6 +26,19 @@ def test_runs_whose_drag_differs_are_not_said_to_agree(tmp_path):
     scatter = meaning(analysis)[-1]
     assert SYMBOLS["c32"] in scatter
     assert "agree" not in scatter
+
+
+def test_note_and_table_have_one_number_of_independent_readings(tmp_path):
+    rng, residuals, time = np.random.default_rng(10), [], 10.0 * np.arange(12)
+    for _ in time:
+        residuals.append(0.9 * residuals[-1] + 0.19**0.5 * rng.normal() if residuals else rng.normal())
+    spin = 40 * (1 + 2.34e-4 * np.sqrt(2 * np.pi * 40) * time / 2) ** -2 + 0.03 * np.array(residuals)
+    np.savetxt(path := tmp_path / "my.csv", np.column_stack([time, spin]), delimiter=",", header="t,f", comments="")
+    analysis = SPINDOWN.analyze([path], SpinDownOptions())
+    correlation = toeplitz(analysis.runs[0].correlation.value ** np.arange(12.0))
+    worth = f"{12**2 / correlation.sum():.2g}"  # the variance of a reading over that of the mean
+    assert f"12 readings are worth as much as {worth} independent ones" in " ".join(analysis.all_warnings)
+    assert f"{worth} of 12" in count_table(analysis).rows[0].cells[-1]
 
 
 def test_text_figure_and_tables_have_one_verdict(tmp_path):
