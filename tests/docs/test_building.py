@@ -62,21 +62,21 @@ def test_an_indented_block_of_a_docstring_is_code_and_doctests_stay():
     assert as_markup(["of `Error`s"]) == ["of `Error`\\ s"]
 
 
-@pytest.mark.parametrize(("text", "found"), [
-    ('<script src="https://cdn.example/x.js"></script>', ["https://cdn.example/x.js"]),
-    ('<link rel="stylesheet" href="//fonts.example/a.css">', ["//fonts.example/a.css"]),
-    ('<img src="_images/a.png"><a href="https://example.org">there</a>', []),
+@pytest.mark.parametrize(("name", "text", "found"), [
+    ("a.html", '<script src="https://cdn.example/x.js"></script>', ["https://cdn.example/x.js"]),
+    ("a.html", '<link rel="stylesheet" href="//fonts.example/a.css">', ["//fonts.example/a.css"]),
+    ("a.css", '@import "https://fonts.example/a.css"; b { background: url(a.png) }', ["https://fonts.example/a.css"]),
+    ("a.html", '<img src="_images/a.png"><a href="https://example.org">there</a>', []),
 ])  # fmt: skip
-def test_what_a_page_loads_from_elsewhere_is_found(tmp_path, text, found):
-    (tmp_path / "page.html").write_text(text, encoding="utf-8")
-    assert [address for _, address in loaded_from_elsewhere(tmp_path)] == found
+def test_what_a_page_loads_from_elsewhere_is_found(tmp_path, name, text, found):
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    assert loaded_from_elsewhere(tmp_path) == [(name, address) for address in found]
 
 
-def test_a_font_from_elsewhere_in_a_style_sheet_is_found(tmp_path):
-    (tmp_path / "a.css").write_text(
-        '@import "https://fonts.example/a.css"; b { background: url(a.png) }', encoding="utf-8"
-    )
-    assert loaded_from_elsewhere(tmp_path) == [("a.css", "https://fonts.example/a.css")]
+def test_a_command_that_is_wider_than_the_page_goes_on_below(page):
+    page.set_content(f"<pre>$ levilab sweep {'--sweep start.spin_hz=18:90:145 ' * 9}</pre>")
+    page.add_style_tag(path=DOCS / "building/style/site.css")
+    assert page.evaluate("document.documentElement.scrollWidth - innerWidth") == 0
 
 
 def test_the_search_ranks_pages_of_users_before_those_of_developers(page):
