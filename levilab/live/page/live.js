@@ -28,7 +28,6 @@ const OLD_S = 3;
 const OWN_BENCH = ".";
 /** What a practice bench's oscilloscope shows, from above. */
 const CHANNELS = ["tape", "drive", "laser"];
-const SET_UP = phrase("The bench is being set up: some seconds, up to a minute at the first start, which compiles.");
 const PAUSED = phrase("The view is paused, and shows nothing of what the bench would do: “Go on” first.");
 const NO_VALUE = phrase("––.––––");
 const SLIP_HZ = 0.2, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive, on a ramp, too; while it swings
@@ -249,7 +248,7 @@ function show() {
   const state = stateOf();
   if (practice && !space) {
     put(by("no-space"), {hidden: state !== "setup"});
-    write("no-space", SET_UP);
+    write("no-space", phrase("The bench is being set up, for {time} so far: some seconds, up to a minute at the first start, which compiles.", {time: lapse(performance.now() / 1000)}));
   }
   put(document.body.dataset, {state});
   write("state-word", STATES[state] || state);

@@ -1,12 +1,15 @@
 // What an analysis says, always in one order: doubts, the answer, figures, all else in a fold, the link to the report.
 
 import {GONE, read} from "./connection.js";
-import {LANGUAGE, by, make, phrase, put, typeset, write} from "./words.js";
+import {LANGUAGE, by, lapse, make, phrase, put, typeset, write} from "./words.js";
 
 /** Sentences that are the answer: the value with its uncertainty, and what it means; the others are in the fold. */
 const ANSWER = 2;
 /** What is under way, by the step that the server names; "" once all is there. */
-const STEPS = {analyze: phrase("Analyzing…"), report: phrase("The report is being written…"), "": ""};
+const STEPS = {
+  analyze: phrase("Analyzing: some seconds, the first time longer."),
+  report: phrase("The report is being written, with a simulation of the run: up to a minute."), "": "",
+};
 
 /**
  * Ask for an analysis, and show its answer in the elements of the page's part "result".  Nothing is shown
@@ -19,6 +22,7 @@ const STEPS = {analyze: phrase("Analyzing…"), report: phrase("The report is be
  * @returns whether the report was written, too.
  */
 export async function showResult(begin, at, wanted, analyzed) {
+  const began = performance.now();
   const fill = (id, tag, texts) => by(id).replaceChildren(...texts.map((text) => {
     const one = make(tag);
     typeset(one, text);
@@ -32,7 +36,7 @@ export async function showResult(begin, at, wanted, analyzed) {
     by("figures").replaceChildren();
     put(by("more"), {hidden: texts.length <= ANSWER && !warnings.length, open: false});
     put(by("report"), {hidden: true});
-    say(step);
+    say(step, began);
   };
   clear([], "analyze");
   const wrong = await begin();
@@ -56,15 +60,16 @@ export async function showResult(begin, at, wanted, analyzed) {
         src: `${at}/${figure}?${Date.now()}`, alt: phrase("figure of the {analysis} analysis", {analysis: found.analysis}),
       })));
     }
-    say(found.step);
+    say(found.step, began);
     if (found.step) continue;
     put(by("report"), {href: `${at}/${found.report}`, hidden: !found.report});
     return Boolean(found.report);
   }
 }
 
-/** Say what is under way. */
-function say(step) {
+/** Say what is under way, how long it takes, and since when it is. */
+function say(step, began) {
   put(by("progress"), {hidden: !step});
   write("writing", STEPS[step]);
+  write("so-far", step && lapse((performance.now() - began) / 1000));
 }

@@ -7,7 +7,6 @@ const FIELDS = ["top", "washers", "temperature"];
 
 /** @param {string} token of a page that may give commands. */
 export function openTune(token) {
-  by("washers-open").addEventListener("click", () => by("washers").show());  // beside the bench, which goes on
   const trials = [];
   let advice = null;
 

@@ -121,7 +121,7 @@ def test_an_answer_is_shown_in_one_order_and_nothing_before_it_is_whole(hall, wa
     until(page, "window.levilab?.look")
     page.click("#analyze")
     wait_for(file.with_name("steps.csv.spindown.png").exists)
-    until(page, "document.getElementById('writing').textContent === 'Analyzing…'")
+    until(page, "/^Analyzing: .*\\.\\s+\\d+ s/.test(document.querySelector('.foot').innerText)")
     with page.expect_response("**/analysis?*"), page.expect_response("**/analysis?*"):
         pass
     assert page.evaluate(ANSWER) == [0, 0, 0, 0, 0, False, True]
