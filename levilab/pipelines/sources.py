@@ -27,7 +27,7 @@ from levilab.formats.waveforms.record import SEARCHED
 from levilab.pipelines.correction import corrected_parts, describe, place_of_correction, read_correction
 from levilab.pipelines.options import InputOptions
 from levilab.present.clock import local
-from levilab.present.numbers import how_many, list_in_words, short_name
+from levilab.present.numbers import filled, how_many, list_in_words, short_name
 from levilab.runs.find import RECORD, find_runs, no_such_path
 from levilab.runs.run import READINGS, Run
 from levilab.texts.note import Note, of_file
@@ -50,10 +50,16 @@ class Doubting:
 
 
 def note_of(of: Remark, table: Mapping[str, str | Callable[..., str] | Doubting], *values: Any, **named: Any) -> Note:
-    """Return a remark as a note, whose sentence stands in a table by its kind, or is made there of values."""
+    """Return a remark as a note, whose sentence stands in a table by its kind, or is made there of values.
+
+    The fields of a sentence are the remark's values in their order, but for its ``{name}`` and ``{law}``.
+    """
     row = table[of.kind]
     said = row.text if isinstance(row, Doubting) else row
-    text = said if isinstance(said, str) else said(*values, **named)
+    if not isinstance(said, str):
+        text = said(*values, **named)
+    else:
+        text = filled(said, of.values, name=of.name, law=of.law) if "{" in said else said
     return Note(f"{of.kind} {of.law} {of.name}", text, is_doubt=isinstance(row, Doubting))
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from analysis.numbers import digits, with_minus
 from analysis.numbers import how_many as counted
 from levilab.present.units import unit
-from levilab.texts.text import Text
+from levilab.texts.text import Text, fields_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -130,6 +130,26 @@ def pulses_too_many(pulses: int) -> str:
     if abs(pulses) == 1:
         return Text("{size} pulse too many" if pulses > 0 else "{size} pulse too few", size=1)
     return Text("{size} pulses too many" if pulses > 0 else "{size} pulses too few", size=abs(pulses))
+
+
+def filled(template: str, values: Iterable[float], **named: str) -> Text:
+    """Return a sentence whose fields are the values, in the order in which they stand there.
+
+    ``:n`` writes a number with two digits, a probability p with one.
+
+    Args:
+        template: of the sentence.
+        values: of its fields; there may be more of them.
+        named: fields that are none of the values, where they stand in it.
+
+    >>> filled("{law} scatters {times:n} times as much (p = {p:n}) in {n:.0f} runs", (1.234, 0.0123, 5.0), law="linear")
+    'linear scatters 1.2 times as much (p = 0.01) in 5 runs'
+    """
+    rest, found = iter(values), dict[str, Any]()
+    for name, how in dict(fields_of(template)).items():
+        value: Any = named[name] if name in named else next(rest)
+        found[name] = digits(value, 1 if name == "p" else 2) if how == "n" else value
+    return Text(template, **found)
 
 
 def list_in_words(names: Sequence[str]) -> str:

@@ -106,6 +106,11 @@ class Sentences(Text):
         return tuple(self.values.values())
 
 
+def fields_of(template: str) -> list[tuple[str, str]]:
+    """Return the names of the values in a template, and how each is written."""
+    return _FIELD.findall(template)
+
+
 def text_from(table: Any, otherwise: str = "") -> str:
     """Return the text of a table that `Text.as_table` made; another text where it is none."""
     try:

@@ -180,11 +180,10 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(
             chi=digits(reduced, 3),
             factor=digits(math.sqrt(reduced), 3),
         ),
-        "scan overstated": lambda reduced: Text(
+        "scan overstated": (
             "the readings scatter far less than their stated uncertainties (χ²/dof = {chi:n}): what is "
             "common to all of them, such as the scale of the instrument, belongs into gain_u and "
-            "background_u_t",
-            chi=digits(reduced),
+            "background_u_t"
         ),
         "contradicts": _contradicts,
         "no strength": Doubting("the strength is not significantly different from zero: was the probe near the base?"),

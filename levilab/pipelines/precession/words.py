@@ -116,27 +116,19 @@ def _point(points: tuple[Point, ...], k: float) -> str:
 _REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(
     {
         "many miscounts": Doubting(
-            lambda _, named, n: Text(
-                "{named:.0f} of {n:.0f} points look like miscounts: too many to leave out, so the line goes "
-                "through all of them; look at the laser's signal and the trigger level",
-                named=named,
-                n=n,
-            )
+            "{named:.0f} of {n:.0f} points look like miscounts: too many to leave out, so the line goes "
+            "through all of them; look at the laser's signal and the trigger level"
         ),
         "miscount": _miscount,
         "unexplained": _miscount,
-        "sweep scatters": lambda _, scale, p: Text(
+        "sweep scatters": (
             "the points scatter {times:n} times as much as their u says (p = {p:n}): all uncertainties "
-            "are enlarged by that",
-            times=digits(scale),
-            p=digits(p, 1),
+            "are enlarged by that"
         ),
-        "sweep overstated": lambda _, chi_square, freedom: Text(
+        "sweep overstated": (
             "the points scatter much less than their u says (χ² of {chi:n} for {freedom:.0f} degrees of "
             "freedom): their u is too large, and so is that of the line; gates in a row scatter more "
-            "than their mean, for a locked top swings about its drive and comes back",
-            chi=digits(chi_square),
-            freedom=freedom,
+            "than their mean, for a locked top swings about its drive and comes back"
         ),
         "sweep exact": "the points lie on the line to the last digit: without their u nothing can be tested; give it",
         "moves the slope": lambda points, k, change, share: Text(
@@ -150,16 +142,12 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(
             point=_point(points, k),
             leverage=leverage,
         ),
-        "uncertain drive": lambda _, worst: Text(
-            "u of the drive's frequency is up to {times:n} u of the precession: let it count with `orthogonal` = True",
-            times=digits(worst),
+        "uncertain drive": (
+            "u of the drive's frequency is up to {times:n} u of the precession: let it count with `orthogonal` = True"
         ),
-        "uncertain clock": lambda _, share, of_slope, u: Text(
+        "uncertain clock": (
             "u of the drive's frequency is {share:n} of it at all points, as that of a clock: the slope "
-            "is uncertain by {slope:n} beside its u of {u:n}",
-            share=digits(share),
-            slope=digits(of_slope),
-            u=digits(u),
+            "is uncertain by {slope:n} beside its u of {u:n}"
         ),
         "drive u unknown": "u of the drive's frequency is not known and taken as large as that of the precession",
         "spin off": Doubting(
@@ -170,11 +158,9 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(
                 way="below" if off < 0 else "above",
             )
         ),
-        "slopes differ": lambda _, n, p: Text(
+        "slopes differ": (
             "the slopes of the {n:.0f} runs differ by more than their u says (p = {p:n}): the line "
-            "through all points has too small a u; look at the runs one by one",
-            n=n,
-            p=digits(p, 1),
+            "through all points has too small a u; look at the runs one by one"
         ),
     }
 )

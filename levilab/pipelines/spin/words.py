@@ -5,7 +5,7 @@ from types import MappingProxyType
 
 from analysis.numbers import digits
 from analysis.pulses import Finding
-from levilab.present.numbers import enumeration, how_many
+from levilab.present.numbers import enumeration, filled, how_many
 from levilab.texts.text import Text
 
 
@@ -16,15 +16,16 @@ def finding_text(found: Finding, part: str = "window") -> str:
     'record 2: 1 turn has no pulse'
     """
     whole = (int(value) if float(value).is_integer() else value for value in found.values)  # a result has 31.0
-    text = _SENTENCES[found.name, found.of](*whole)
+    said = _SENTENCES[found.name, found.of]
+    text = filled(said, whole) if isinstance(said, str) else said(*whole)
     if not found.where:
         return text
     first, number, of = found.where
     if number == 1:
         return Text("{part} {first}: {text}", part=part, first=first, text=text)
     which = Text("all {of}", of=of) if number == of else Text("{number} of {of}", number=number, of=of)
-    said = "in {which} {parts}, as in {part} {first}: {text}"
-    return Text(said, which=which, parts=f"{part}s", part=part, first=first, text=text)
+    sample = "in {which} {parts}, as in {part} {first}: {text}"
+    return Text(sample, which=which, parts=f"{part}s", part=part, first=first, text=text)
 
 
 def _hum(*lines: float) -> str:
@@ -118,28 +119,23 @@ def _fold_by_slope(rate: float, *folds: float) -> str:
     )  # fmt: skip
 
 
-#: Name and case of a finding → its values as a sentence.
-_SENTENCES: Mapping[tuple[str, str], Callable[..., str]] = MappingProxyType({
+#: Name and case of a finding → its sentence, with its values in their order, or what makes one of them.
+_SENTENCES: Mapping[tuple[str, str], str | Callable[..., str]] = MappingProxyType({
     ("missing", ""): _missing,
     ("doubled", ""): lambda n: Text("{pulses} beside the turns' own left out", pulses=how_many(n, "pulse")),
     ("wrong", ""): lambda n: Text("{pulses} not at the place of a turn left out", pulses=how_many(n, "pulse")),
     ("jump", ""): _jump,
-    ("half", ""): lambda: Text("two equal pulses a turn: half the frequency fitted too, and was not taken"),
+    ("half", ""): "two equal pulses a turn: half the frequency fitted too, and was not taken",
     ("double", "height"): _double("has another height"),
     ("double", "place"): _double("is not half-way between its neighbours"),
-    ("mains", ""): lambda hertz: Text(
-        "the frequency is {hertz:g} Hz and stays: is it the mains (a lamp, hum), or a drive locked to them?",
-        hertz=hertz,
-    ),
+    ("mains", ""): "the frequency is {hertz:g} Hz and stays: is it the mains (a lamp, hum), or a drive locked to them?",
     ("hum", ""): _hum,
-    ("clipped", ""): lambda: Text("the tops of the pulses are flat: the detector or the converter is saturated"),
+    ("clipped", ""): "the tops of the pulses are flat: the detector or the converter is saturated",
     ("gap", ""): lambda seconds: Text("the signal is constant for {s:n} s in all", s=digits(seconds, 3)),
-    ("not-finite", ""): lambda n: Text("{n} samples are no finite numbers and do not count", n=n),
-    ("wander", ""): lambda size: Text("the baseline wanders by {size:n} and was taken off", size=digits(size)),
-    ("coarse", ""): lambda n: Text("a turn has {n:n} samples only: a faster top may look the same", n=digits(n, 2)),
-    ("fast", ""): lambda a, b: Text(
-        "{a:.4g} Hz is too fast for a hand: without a drive there are two marks at {b:.4g} Hz; cover one", a=a, b=b
-    ),
+    ("not-finite", ""): "{n} samples are no finite numbers and do not count",
+    ("wander", ""): "the baseline wanders by {size:n} and was taken off",
+    ("coarse", ""): "a turn has {n:n} samples only: a faster top may look the same",
+    ("fast", ""): "{a:.4g} Hz is too fast for a hand: without a drive there are two marks at {b:.4g} Hz; cover one",
     ("correlated", "pulses"): _correlated("pulses"),
     ("correlated", "turns"): _correlated("turns"),
     ("scattered", "in u"): _scattered("a mean pulse does not show it, so their own places are in the uncertainty"),
@@ -153,13 +149,9 @@ _SENTENCES: Mapping[tuple[str, str], Callable[..., str]] = MappingProxyType({
     ("folded", ""): _folded,
     ("fold-doubt", ""): _fold_doubt,
     ("fold-by-slope", ""): _fold_by_slope,
-    ("regular", ""): lambda *_: Text(
-        "the samples lie more evenly than their times say: the times tell nothing above half the rate"
-    ),
-    ("weak", ""): lambda *_: Text("the line hardly stands out of the noise: bring the magnetometer nearer"),
-    ("on-mains", ""): lambda *_: Text(
-        "the line lies on 50 or 60 Hz: is it the mains, or a drive locked to them?"
-    ),
+    ("regular", ""): "the samples lie more evenly than their times say: the times tell nothing above half the rate",
+    ("weak", ""): "the line hardly stands out of the noise: bring the magnetometer nearer",
+    ("on-mains", ""): "the line lies on 50 or 60 Hz: is it the mains, or a drive locked to them?",
     ("no-pulses", ""): _no_pulses("no pulses that return regularly"),
     ("no-pulses", "hum"): _no_pulses("hum of the mains, and no pulses that return regularly"),
 })  # fmt: skip

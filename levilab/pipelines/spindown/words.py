@@ -378,28 +378,15 @@ def _few_runs(of: Remark) -> str:
 _REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyType(
     {
         "not converged": "the fit did not converge, the numbers are those of the best point found",
-        "no freedom": lambda of: Text(
+        "no freedom": (
             "{n:.0f} parameters pass through {n:.0f} readings, so nothing shows their uncertainty: "
-            "record more readings, or state the uncertainty of each",
-            n=of.values[0],
+            "record more readings, or state the uncertainty of each"
         ),
         "not separated": "the readings do not separate the parameters, so these have no uncertainty",
-        "out of range": lambda of: Text(
-            "{name} is too large or too small for a number, as it depends exponentially on the exponent", name=of.name
-        ),
-        "negative": lambda of: Text(
-            "{name} is negative by {times:.1f} standard uncertainties, which no drag can be",
-            name=of.name,
-            times=of.values[0],
-        ),
-        "undetermined": lambda of: Text(
-            "{name} is not determined, as it depends exponentially on the exponent", name=of.name
-        ),
-        "factor": lambda of: Text(
-            "{name} is known only to a factor of about {times:n}, as it depends exponentially on the exponent",
-            name=of.name,
-            times=digits(of.values[0]),
-        ),
+        "out of range": "{name} is too large or too small for a number, as it depends exponentially on the exponent",
+        "negative": "{name} is negative by {times:.1f} standard uncertainties, which no drag can be",
+        "undetermined": "{name} is not determined, as it depends exponentially on the exponent",
+        "factor": "{name} is known only to a factor of about {times:n}, as it depends exponentially on the exponent",
         "outlier": _outlier,
         "calculated": Doubting(
             lambda of: Text(
@@ -419,10 +406,9 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyT
             law=law_names([of.law or ""]),
             times=digits(of.values[0]),
         ),
-        "overstated": lambda of: Text(
+        "overstated": (
             "the readings scatter only {times:n} times as much about the best law as their stated uncertainties say: "
-            "are these too large?",
-            times=digits(of.values[0]),
+            "are these too large?"
         ),
         "few readings": lambda of: Text(
             "{n:.0f} readings are too few for AICc: BIC compares the laws, as sure as the stated uncertainties are"
@@ -448,23 +434,16 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyT
                 p=digits(min(of.values[1] * of.values[2], 1.0)),
             )
         ),
-        "mixed u": lambda of: Text(
+        "mixed u": (
             "{some:.0f} of {all:.0f} runs give no uncertainties of their readings: theirs come from the "
-            "scatter about each law",
-            some=of.values[0],
-            all=of.values[1],
+            "scatter about each law"
         ),
         "one run": (
             "this is one run: another of the same top may differ by more than its u (draught, temperature, the start): "
             "record several"
         ),
         "few runs": _few_runs,
-        "missing": lambda of: Text(
-            "{some:.0f} of {all:.0f} runs have no {name} and are not in its mean",
-            some=of.values[0],
-            all=of.values[1],
-            name=of.name,
-        ),
+        "missing": "{some:.0f} of {all:.0f} runs have no {name} and are not in its mean",
         "scatters": lambda of: Text(
             "{symbol} scatters between the runs {times:n} times as much as each fit's own uncertainty "
             "explains: the runs differ, so trust the scatter, not the fit of one run",
