@@ -2,21 +2,12 @@
 
 from typing import ClassVar
 
-from instruments.drivers.generator.drive import (
-    DriveGenerator,
-    LoadSetting,
-    OutputSwitch,
-    amplitude_setting,
-    burst_setting,
-    burst_word,
-    frequency_setting,
-    offset_setting,
-)
+from instruments.drivers.generator import drive
 from instruments.drivers.setting import Setting
 from instruments.ieee488 import INFINITY, Form
 
 
-class Agilent33220A(DriveGenerator):
+class Agilent33220A(drive.DriveGenerator):
     """Agilent 33220A: one channel, 20 MHz, an older dialect.
 
     Source: Agilent 33220A User's Guide, chapter 4; public drivers of the model.  It has no triangle of its own: that
@@ -31,13 +22,13 @@ class Agilent33220A(DriveGenerator):
 
     waveform = Setting("FUNC", str, choices=("SINusoid", "SQUare", "RAMP"), answers=("PULSe", "NOISe", "DC", "USER"))
     symmetry = Setting("FUNC:RAMP:SYMM", float, unit="percent", low=0.0, high=100.0)
-    frequency = frequency_setting(20e6, digits=14)
-    amplitude = amplitude_setting(20e-3)
-    offset = offset_setting(digits=14)
-    load = LoadSetting("OUTP:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
-    output = OutputSwitch("OUTP", bool)
-    burst_cycles = burst_setting("BURS:NCYC", 1.0, 50_000.0)
-    gate_polarity = burst_word("BURS:GATE:POL", "NORMal", "INVerted")
-    trigger_source = burst_word("TRIG:SOUR", "IMMediate", "EXTernal", "BUS")
-    trigger_slope = burst_word("TRIG:SLOP", "POSitive", "NEGative")
-    trigger_delay = burst_setting("TRIG:DEL", 0.0, 85.0, unit="s")
+    frequency = drive.frequency_setting(20e6, digits=14)
+    amplitude = drive.amplitude_setting(20e-3)
+    offset = drive.offset_setting(digits=14)
+    load = drive.LoadSetting("OUTP:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
+    output = drive.OutputSwitch("OUTP", bool)
+    burst_cycles = drive.burst_setting("BURS:NCYC", 1.0, 50_000.0)
+    gate_polarity = drive.burst_word("BURS:GATE:POL", "NORMal", "INVerted")
+    trigger_source = drive.burst_word("TRIG:SOUR", "IMMediate", "EXTernal", "BUS")
+    trigger_slope = drive.burst_word("TRIG:SLOP", "POSitive", "NEGative")
+    trigger_delay = drive.burst_setting("TRIG:DEL", 0.0, 85.0, unit="s")

@@ -2,21 +2,12 @@
 
 from typing import ClassVar
 
-from instruments.drivers.generator.drive import (
-    DriveGenerator,
-    LoadSetting,
-    OutputSwitch,
-    amplitude_setting,
-    burst_setting,
-    burst_word,
-    frequency_setting,
-    offset_setting,
-)
+from instruments.drivers.generator import drive
 from instruments.drivers.setting import Setting
 from instruments.ieee488 import INFINITY, Form
 
 
-class RigolDG1000Z(DriveGenerator):
+class RigolDG1000Z(drive.DriveGenerator):
     """Rigol DG800 and DG1000Z: DG811 to DG832, DG1022Z to DG1062Z; the first channel drives the coil.
 
     Sources: DG800 Programming Guide, pages 2-43 (``:OUTPut``) and 2-72 (numbers with seven digits, ``1.000000E+02``),
@@ -37,19 +28,19 @@ class RigolDG1000Z(DriveGenerator):
         answers=("PULSe", "NOISe", "DC", "USER", "ARB", "HARMonic", "SEQ", "PRBS", "DUALtone"),
     )
     symmetry = Setting("FUNC:RAMP:SYMM", float, unit="percent", low=0.0, high=100.0)
-    frequency = frequency_setting(60e6, digits=7)
-    amplitude = amplitude_setting(2e-3)
-    offset = offset_setting(digits=7)
-    load = LoadSetting("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
-    output = OutputSwitch("OUTP1", bool)
-    burst_mode = burst_word("BURS:MODE", "TRIGgered", "INFinity", "GATed")
-    gate_polarity = burst_word("BURS:GATE:POL", "NORMal", "INVerted")
-    burst_phase = burst_setting("BURS:PHAS", 0.0, 360.0, unit="deg")
+    frequency = drive.frequency_setting(60e6, digits=7)
+    amplitude = drive.amplitude_setting(2e-3)
+    offset = drive.offset_setting(digits=7)
+    load = drive.LoadSetting("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
+    output = drive.OutputSwitch("OUTP1", bool)
+    burst_mode = drive.burst_word("BURS:MODE", "TRIGgered", "INFinity", "GATed")
+    gate_polarity = drive.burst_word("BURS:GATE:POL", "NORMal", "INVerted")
+    burst_phase = drive.burst_setting("BURS:PHAS", 0.0, 360.0, unit="deg")
     #: The guides print an answer of this one in either form.
-    burst_cycles = burst_setting("BURS:NCYC", 1.0, 1e6, form=Form(r"\d+|\d\.\d{6}E[+-]\d{2}", "10"))
-    trigger_source = burst_word("BURS:TRIG:SOUR", "INTernal", "EXTernal", "MANual")
-    trigger_slope = burst_word("BURS:TRIG:SLOP", "POSitive", "NEGative")
-    trigger_delay = burst_setting("BURS:TDEL", 0.0, 85.0, unit="s")
+    burst_cycles = drive.burst_setting("BURS:NCYC", 1.0, 1e6, form=Form(r"\d+|\d\.\d{6}E[+-]\d{2}", "10"))
+    trigger_source = drive.burst_word("BURS:TRIG:SOUR", "INTernal", "EXTernal", "MANual")
+    trigger_slope = drive.burst_word("BURS:TRIG:SLOP", "POSitive", "NEGative")
+    trigger_delay = drive.burst_setting("BURS:TDEL", 0.0, 85.0, unit="s")
 
     def field_of(self, answer: str, header: str, key: str) -> str:
         """Return the answer, ON and OFF as 1 and 0."""

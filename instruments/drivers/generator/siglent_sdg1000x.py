@@ -4,15 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from instruments.drivers.generator import OPEN_V
-from instruments.drivers.generator.drive import (
-    DriveGenerator,
-    LimitedSetting,
-    LoadSetting,
-    OutputSwitch,
-    burst_setting,
-    burst_word,
-)
+from instruments.drivers.generator import OPEN_V, drive
 from instruments.drivers.setting import Setting
 from instruments.errors import CommandRefused
 from instruments.ieee488 import INFINITY, Form
@@ -37,7 +29,7 @@ class _LongWord(Setting[str]):
 
 
 @dataclass(eq=False)
-class _Load(LoadSetting):
+class _Load(drive.LoadSetting):
     """The load, which is HZ (high impedance) for open terminals."""
 
     def _parse(self, answer: str, form: Form) -> bool | float | str:
@@ -55,7 +47,7 @@ class _Whole(Setting[float]):
         return f"{value:.0f}"
 
 
-class SiglentSDG1000X(DriveGenerator):
+class SiglentSDG1000X(drive.DriveGenerator):
     """Siglent SDG1000X: SDG1032X, SDG1062X; two channels, of which the first drives the coil.
 
     Source: SDG Programming Guide PG02-E04A as public drivers and an emulator that was compared with an SDG1032X quote
@@ -86,7 +78,7 @@ class SiglentSDG1000X(DriveGenerator):
         answers=("PULSE", "NOISE", "ARB", "DC", "PRBS", "IQ"),
         key="WVTP",
     )
-    frequency = LimitedSetting(
+    frequency = drive.LimitedSetting(
         *("C1:BSWV", float, "Hz", 1e-6, 60e6),
         key="FRQ",
         form=_HERTZ,
@@ -94,7 +86,7 @@ class SiglentSDG1000X(DriveGenerator):
         digits=10,
         quantity="frequency_hz",
     )
-    amplitude = LimitedSetting(
+    amplitude = drive.LimitedSetting(
         *("C1:BSWV", float, "Vpp", 2e-3, 20.0),
         key="AMP",
         form=_VOLTS,
@@ -103,7 +95,7 @@ class SiglentSDG1000X(DriveGenerator):
         quantity="amplitude_vpp",
         partner="offset_v",
     )
-    offset = LimitedSetting(
+    offset = drive.LimitedSetting(
         *("C1:BSWV", float, "V", -OPEN_V, OPEN_V),
         key="OFST",
         form=_VOLTS,
@@ -113,15 +105,15 @@ class SiglentSDG1000X(DriveGenerator):
     )
     #: Whole ohms; a fraction is cut off.
     load = _Load("C1:OUTP", float, unit="ohm", low=50.0, high=INFINITY, key="LOAD", resolution=1.0, digits=6)
-    output = OutputSwitch("C1:OUTP", bool)
+    output = drive.OutputSwitch("C1:OUTP", bool)
     burst = Setting("C1:BTWV", bool, key="STATE", on_demand=True)
-    burst_mode = burst_word("C1:BTWV", "GATE", "NCYC", key="GATE_NCYC")
-    gate_polarity = burst_word("C1:BTWV", "POS", "NEG", key="PLRT")
+    burst_mode = drive.burst_word("C1:BTWV", "GATE", "NCYC", key="GATE_NCYC")
+    gate_polarity = drive.burst_word("C1:BTWV", "POS", "NEG", key="PLRT")
     burst_cycles = _Whole("C1:BTWV", float, low=1.0, high=1e6, key="TIME", on_demand=True)
-    burst_phase = burst_setting("C1:BTWV", 0.0, 360.0, unit="deg", key="STPS")
-    trigger_source = burst_word("C1:BTWV", "EXT", "INT", "MAN", key="TRSR")
-    trigger_slope = burst_word("C1:BTWV", "RISE", "FALL", key="EDGE")
-    trigger_delay = burst_setting("C1:BTWV", 0.0, 100.0, unit="s", key="DLAY", form=_SECONDS)
+    burst_phase = drive.burst_setting("C1:BTWV", 0.0, 360.0, unit="deg", key="STPS")
+    trigger_source = drive.burst_word("C1:BTWV", "EXT", "INT", "MAN", key="TRSR")
+    trigger_slope = drive.burst_word("C1:BTWV", "RISE", "FALL", key="EDGE")
+    trigger_delay = drive.burst_setting("C1:BTWV", 0.0, 100.0, unit="s", key="DLAY", form=_SECONDS)
 
     def field_of(self, answer: str, header: str, key: str) -> str:
         """Return the value behind its name; that of an output, which has none, is the first field."""

@@ -13,15 +13,7 @@ from dataclasses import dataclass, field
 from enum import Enum, IntEnum, auto
 from typing import NamedTuple
 
-from instruments.virtual.servers.clients import (
-    FIRST_WORDS,
-    MOST_CLIENTS,
-    Disconnected,
-    Link,
-    Listener,
-    ServedInstrument,
-    first_of,
-)
+from instruments.virtual.servers import clients
 
 #: Prologue, message type, control code, message parameter, length of the payload (2.4).
 HEADER = struct.Struct("!2sBBIQ")
@@ -122,7 +114,7 @@ class Channel:
         while length:
             piece = await self._reader.read(min(length, 1 << 16))
             if not piece:
-                raise Disconnected
+                raise clients.Disconnected
             length -= len(piece)
 
     def send(self, message: Message) -> None:
@@ -136,14 +128,14 @@ class Channel:
     async def fail(self, code: Fatal, why: str) -> None:
         """Send FatalError with a reason, and end the connection.  Raises Disconnected."""
         self.send(Message(Type.FATAL_ERROR, code, payload=why.encode()))
-        raise Disconnected
+        raise clients.Disconnected
 
 
 #: The newest revision spoken here, and the longest payload sent until the client states its own limit [bytes].
 VERSION, DEFAULT_PAYLOAD = 0x0200, 1 << 18
 
 #: How long a client may take for its second channel [s], by the wall clock.
-SECOND_CHANNEL = FIRST_WORDS
+SECOND_CHANNEL = clients.FIRST_WORDS
 
 #: The MessageID that a client begins with (3.1), the step from one message to the next, and where it wraps.
 _FIRST_ID, _STEP, _IDS = 0xFFFFFF00, 2, 1 << 32
@@ -189,7 +181,7 @@ TRANSITIONS: dict[State, dict[Event, State]] = {
 class Client:
     """One client: its link, its two channels, and the state of each."""
 
-    link: Link
+    link: clients.Link
     synchronous: Channel
     asynchronous: Channel | None = None  # None until the client has opened it
     both_connected: asyncio.Event = field(default_factory=asyncio.Event)
@@ -235,7 +227,7 @@ class Client:
                 await self._handle(message)
             elif message.type in {Type.FATAL_ERROR, Type.ERROR}:
                 if message.type == Type.FATAL_ERROR:
-                    raise Disconnected
+                    raise clients.Disconnected
             else:
                 self.refuse(self.synchronous, message)
 
@@ -368,7 +360,7 @@ class Client:
 
     def disconnect(self, channel: Channel, message: Message) -> None:
         """FatalError: the client has ended the session.  Raises Disconnected."""
-        raise Disconnected
+        raise clients.Disconnected
 
     def go_remote(self, channel: Channel, message: Message) -> None:
         """AsyncRemoteLocalControl: confirm; there is no front panel to lock (6.9)."""
@@ -397,16 +389,16 @@ _ASYNC_HANDLERS: dict[int, Callable[[Client, Channel, Message], None]] = {
 class HislipServer:
     """Both channels of all clients of one instrument, on one port, whose only subaddress is hislip0."""
 
-    def __init__(self, instrument: ServedInstrument) -> None:
+    def __init__(self, instrument: clients.ServedInstrument) -> None:
         self._instrument = instrument
         self._clients: dict[int, Client] = {}
         self._numbers = itertools.count(1)
-        self.listener = Listener(instrument, self._talk, most=2 * MOST_CLIENTS)
+        self.listener = clients.Listener(instrument, self._talk, most=2 * clients.MOST_CLIENTS)
 
     async def _talk(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         channel = Channel(reader, writer)
         try:
-            async with asyncio.timeout(FIRST_WORDS):
+            async with asyncio.timeout(clients.FIRST_WORDS):
                 first = await channel.receive()
         except TimeoutError:
             return
@@ -423,14 +415,16 @@ class HislipServer:
         asked = first.payload.decode("latin-1").lower()
         if asked not in {"", "hislip0"}:
             await channel.fail(Fatal.BAD_INITIALIZATION, "the only subaddress here is hislip0")
-        if len(self._clients) >= MOST_CLIENTS:
-            await channel.fail(Fatal.TOO_MANY_CLIENTS, f"at most {MOST_CLIENTS} clients")
+        if len(self._clients) >= clients.MOST_CLIENTS:
+            await channel.fail(Fatal.TOO_MANY_CLIENTS, f"at most {clients.MOST_CLIENTS} clients")
         number = next(number for number in (n % 0xFFFF for n in self._numbers) if number not in self._clients)
-        client = self._clients[number] = Client(Link(self._instrument), channel)
+        client = self._clients[number] = Client(clients.Link(self._instrument), channel)
         version = min(first.parameter >> 16, VERSION)
         channel.send(Message(Type.INITIALIZE_RESPONSE, parameter=version << 16 | number))
         try:
-            await first_of(client.listen(), client.answer(), client.gone.wait(), _wait_for_second_channel(client))
+            await clients.first_of(
+                client.listen(), client.answer(), client.gone.wait(), _wait_for_second_channel(client)
+            )
         finally:
             client.gone.set()
             client.link.close()
@@ -446,7 +440,7 @@ class HislipServer:
         client.both_connected.set()
         channel.send(Message(Type.ASYNC_INITIALIZE_RESPONSE))
         try:
-            await first_of(client.listen_asynchronous(), client.gone.wait())
+            await clients.first_of(client.listen_asynchronous(), client.gone.wait())
         except (EOFError, OSError):
             # its last commands may wait in the synchronous channel
             await client.link.linger(client.synchronous_ended.wait)

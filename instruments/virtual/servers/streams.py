@@ -11,16 +11,7 @@ import os
 from collections.abc import Awaitable, Callable
 
 from instruments.virtual.bench.session import LinkLost
-from instruments.virtual.servers.clients import (
-    CHUNK,
-    FIRST_WORDS,
-    Disconnected,
-    Link,
-    Listener,
-    ServedInstrument,
-    first_of,
-    log,
-)
+from instruments.virtual.servers import clients
 
 try:
     import pty
@@ -31,7 +22,7 @@ else:
     HAS_PSEUDO_TERMINALS = True
 
 
-def socket_listener(instrument: ServedInstrument) -> Listener:
+def socket_listener(instrument: clients.ServedInstrument) -> clients.Listener:
     """Return a listener that serves an instrument over bare TCP."""
 
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -41,11 +32,11 @@ def socket_listener(instrument: ServedInstrument) -> Listener:
 
         await converse(instrument, lambda: reader.read(1 << 16), send)
 
-    return Listener(instrument, talk)
+    return clients.Listener(instrument, talk)
 
 
 async def converse(
-    instrument: ServedInstrument, read: Callable[[], Awaitable[bytes]], send: Callable[[bytes], Awaitable[None]]
+    instrument: clients.ServedInstrument, read: Callable[[], Awaitable[bytes]], send: Callable[[bytes], Awaitable[None]]
 ) -> None:
     """Let a client talk to an instrument until it goes away.
 
@@ -57,7 +48,7 @@ async def converse(
         read: waits for bytes, at least one; returns none where the stream has ended.
         send: sends bytes; waits while the other side takes none.
     """
-    link = Link(instrument, stream=True)
+    link = clients.Link(instrument, stream=True)
     received: asyncio.Queue[bytes] = asyncio.Queue(1)
 
     async def receive() -> None:
@@ -69,11 +60,11 @@ async def converse(
         while True:
             await link.write(await received.get())
             while await link.wait_for_answer(give_up=link.is_idle):
-                await send(link.take(CHUNK)[0])
+                await send(link.take(clients.CHUNK)[0])
             received.task_done()
 
     try:
-        await first_of(receive(), work())
+        await clients.first_of(receive(), work())
     finally:
         link.close()
 
@@ -87,7 +78,7 @@ class PseudoTerminal:
         name: of the device file.
     """
 
-    def __init__(self, instrument: ServedInstrument) -> None:
+    def __init__(self, instrument: clients.ServedInstrument) -> None:
         self._instrument = instrument
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)  # no echo, no conversion of line ends
@@ -107,7 +98,7 @@ class PseudoTerminal:
             except LinkLost:
                 pass
             except Exception:  # noqa: BLE001 - logged; the next client shall find the line alive
-                log.exception("a virtual instrument failed; its serial line begins again")
+                clients.log.exception("a virtual instrument failed; its serial line begins again")
 
     async def read(self) -> bytes:
         """Wait for bytes, and return them."""
@@ -136,24 +127,24 @@ class PseudoTerminal:
             os.close(end)
 
 
-def http_listener(instrument: ServedInstrument) -> Listener:
+def http_listener(instrument: clients.ServedInstrument) -> clients.Listener:
     """Return a listener that serves an instrument over HTTP, as an app on a phone: a connection for each request."""
 
     async def talk(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         try:
-            async with asyncio.timeout(FIRST_WORDS):
+            async with asyncio.timeout(clients.FIRST_WORDS):
                 head = await reader.readuntil(b"\r\n\r\n")
         except (TimeoutError, asyncio.LimitOverrunError, asyncio.IncompleteReadError):
-            raise Disconnected from None
-        link = Link(instrument)
+            raise clients.Disconnected from None
+        link = clients.Link(instrument)
         try:
             await link.write(head.partition(b"\r\n")[0])
             ended = False
             while not ended and await link.wait_for_answer(give_up=link.is_idle):
-                data, ended = link.take(CHUNK)
+                data, ended = link.take(clients.CHUNK)
                 writer.write(data)
                 await writer.drain()
         finally:
             link.close()
 
-    return Listener(instrument, talk)
+    return clients.Listener(instrument, talk)

@@ -18,7 +18,7 @@ def hang_guard():
 @pytest.fixture(autouse=True)
 def patient_servers(monkeypatch):
     """A client that a busy machine delays is not sent away."""
-    monkeypatch.setattr("instruments.virtual.servers.hislip.FIRST_WORDS", AT_MOST)
+    monkeypatch.setattr("instruments.virtual.servers.clients.FIRST_WORDS", AT_MOST)
     monkeypatch.setattr("instruments.virtual.servers.hislip.SECOND_CHANNEL", AT_MOST)
 
 

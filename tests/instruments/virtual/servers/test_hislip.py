@@ -13,7 +13,7 @@ from support.served import NETWORK, NO_ERROR, Thing, channels, header, send, unt
 
 
 def test_one_session_too_many_gets_a_fatal_error(served, monkeypatch):
-    monkeypatch.setattr("instruments.virtual.servers.hislip.MOST_CLIENTS", 1)
+    monkeypatch.setattr("instruments.virtual.servers.clients.MOST_CLIENTS", 1)
     channels(served)
     one_more = served.bare("hislip")
     send(one_more, Type.INITIALIZE, 0, 0x01000000, b"hislip0")
@@ -144,7 +144,7 @@ def test_one_channel_alone_carries_nothing(served):
 
 @pytest.mark.parametrize("words", [b"", b"HS\0"])
 def test_a_connection_that_does_not_begin_is_closed(served, monkeypatch, words):
-    monkeypatch.setattr("instruments.virtual.servers.hislip.FIRST_WORDS", 0.01)
+    monkeypatch.setattr("instruments.virtual.servers.clients.FIRST_WORDS", 0.01)
     bare = served.bare("hislip")
     bare.sendall(words)
     assert bare.recv(10) == b""
