@@ -247,11 +247,7 @@ def drive_up(session: Session[D], to: float | None = None) -> Motor | None:
     for tries in range(1, _TRIES_TO_HOLD + 1):
         spin = spin_now(session)
         if spin is None:
-            raise (
-                _did_not_follow(session, target, Text("{seen}; then it fell", seen=seen))
-                if seen
-                else _no_light(session)
-            )
+            raise (_did_not_follow(session, target, Text("{seen}; then it fell", seen)) if seen else _no_light(session))
         session.stop.check()  # the drive does not go on once the end was asked for
         try:
             return _bring_up(session, spin, target)
@@ -263,12 +259,7 @@ def drive_up(session: Session[D], to: float | None = None) -> Motor | None:
             seen = str(lost)
             session.event(
                 RunEvent.NOT_HELD,
-                Text(
-                    "try {tries} of {most}: the drive does not hold the top, {seen}",
-                    tries=tries,
-                    most=_TRIES_TO_HOLD,
-                    seen=seen,
-                ),
+                Text("try {tries} of {most}: the drive does not hold the top, {seen}", tries, _TRIES_TO_HOLD, seen),
             )
     raise _did_not_follow(session, target, seen)
 
@@ -338,12 +329,7 @@ def _take_hold(session: Session[D], spin: float) -> float:
         seen = spin_now(session, GRIP_GATE_S)
         session.bench.generator.frequency = grip.follow(seen)
         session.progress(
-            Text(
-                "the drive takes hold: count {count} of {counts}, {drive:.2f} Hz",
-                count=grip.counts,
-                counts=COUNTS,
-                drive=grip.drive,
-            ),
+            Text("the drive takes hold: count {count} of {counts}, {drive:.2f} Hz", grip.counts, COUNTS, grip.drive),
             grip.counts / COUNTS,
         )
     prepare_counter_again(session)
@@ -360,9 +346,7 @@ def _ramp(session: Session[D], start: float, target: float) -> float:
         drive = start + (target - start) * k / steps
         session.bench.generator.frequency = drive
         session.progress(
-            Text(
-                "drive at {drive:.2f} Hz{end}", drive=drive, end=_ramp_end(session, target, (steps - k) * RAMP_STEP_S)
-            ),
+            Text("drive at {drive:.2f} Hz{end}", drive, _ramp_end(session, target, (steps - k) * RAMP_STEP_S)),
             k / steps,
         )
         session.wait(RAMP_STEP_S)
@@ -445,15 +429,10 @@ def compare_with_drive(session: Session[D], slip: Slip) -> None:
 def slip_as_text(slip: Slip) -> str:
     """Return the meaning of a tape that does not turn with the drive."""
     counted = f"{slip.spin:.2f}({max(round(100 * slip.u), 1)})"
-    seen = Text(
-        "the drive holds the top at {drive:.2f} Hz, but the counter sees {counted:n} Hz",
-        drive=slip.drive,
-        counted=counted,
-    )
+    seen = Text("the drive holds the top at {drive:.2f} Hz, but the counter sees {counted:n} Hz", slip.drive, counted)
     if slip.difference > 0:
         return Text(
-            "{seen}: no tape overtakes the drive; is there a second bright mark, or is the trigger level too low?",
-            seen=seen,
+            "{seen}: no tape overtakes the drive; is there a second bright mark, or is the trigger level too low?", seen
         )
     return Text(
         "{seen}: LOOSE WASHERS, the tape slips by {slip:.2f} Hz; fix the washers to the top, for"
@@ -496,11 +475,7 @@ def is_over(session: Session[D]) -> bool:
         return False
     session.event(
         RunEvent.LONGEST,
-        Text(
-            "{longest:g} s are over ({experiment:s}.longest_s)",
-            longest=longest,
-            experiment=session.writer.record.experiment,
-        ),
+        Text("{longest:g} s are over ({experiment:s}.longest_s)", longest, session.writer.record.experiment),
     )
     return True
 
@@ -573,9 +548,7 @@ class _Sweep:
             except (NotHeld, DidNotFollow) as lost:
                 self.at, tries, reason = None, tries + 1, str(lost)
                 text = Text(
-                    "the top was lost at the point of {drive:g} Hz, or on the way to it: {reason}",
-                    drive=drive,
-                    reason=reason,
+                    "the top was lost at the point of {drive:g} Hz, or on the way to it: {reason}", drive, reason
                 )
                 session.event(
                     RunEvent.LOCK_LOST,

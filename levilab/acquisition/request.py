@@ -241,9 +241,7 @@ def _refuse_unused(options: AcquisitionOptions, config: BenchConfig, experiment:
             why = ": the counter counts; leave out one of the two" if options.counter and options.scope else ""
             raise UsageError(
                 option,
-                Text(
-                    "is not used by these settings of levilab acquire {experiment}{why}", experiment=experiment, why=why
-                ),
+                Text("is not used by these settings of levilab acquire {experiment}{why}", experiment, why),
                 value=text,
             )
 
@@ -409,9 +407,7 @@ def request_at(wiring: Wiring, scene: Scene, experiment: str, options: Acquisiti
         UsageError: there is no such experiment, or no such setting.
     """
     if experiment not in EXPERIMENTS:
-        raise UsageError(
-            "experiment", Text("one of {known} is expected", known=", ".join(EXPERIMENTS)), value=experiment
-        )
+        raise UsageError("experiment", Text("one of {known} is expected", ", ".join(EXPERIMENTS)), value=experiment)
     config = chosen_settings(experiment, options)
     config = config.model_copy(update={"visa_library": "@levilab", "limits": wiring.limits, **VIRTUAL})
     config = _for_scene(config, experiment, scene)

@@ -394,9 +394,7 @@ class Session(Generic[S]):
             except InstrumentError as again:
                 self.event(
                     RunEvent.NOT_REACHED,
-                    Text(
-                        "{kind}, try {tries} of {most}: {why}", kind=kind, tries=tries, most=len(REOPENING_S), why=again
-                    ),
+                    Text("{kind}, try {tries} of {most}: {why}", kind, tries, len(REOPENING_S), again),
                 )
             else:
                 self.doing.lost.discard(kind)

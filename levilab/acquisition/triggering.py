@@ -249,9 +249,7 @@ class Motor:
             times.append(self.session.now())
         self.gains.append((times, spins))
         slope, _, _ = slope_of(times, spins)
-        text = Text(
-            "gains {slope:.3f} Hz/s at the full amplitude, about {mean:.2f} Hz", slope=slope, mean=np.mean(spins)
-        )
+        text = Text("gains {slope:.3f} Hz/s at the full amplitude, about {mean:.2f} Hz", slope, np.mean(spins))
         self.session.event(RunEvent.GAIN, text, times_s=times, spins_hz=spins)
         self.pull = max(slope / (1 - share), self.pull / _MOST_CHANGE)
         self._trend = 0.0

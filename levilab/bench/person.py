@@ -27,9 +27,7 @@ class PlaceProbe(Task):
     @property
     def prompt(self) -> str:
         """With what can be typed."""
-        return Text(
-            "{text} Put the probe there, on the axis, or type the height in mm at which it stands.", text=self.text
-        )
+        return Text("{text} Put the probe there, on the axis, or type the height in mm at which it stands.", self.text)
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ class AcquireGroup(NamedLast):
             args = self.with_name_first(args) or ctx.fail(
                 Text(
                     "name the experiment, as levilab acquire spin {options:s}: {names:s}",
-                    options=" ".join(args), names=", ".join(self.commands),
+                    " ".join(args), ", ".join(self.commands),
                 )
             )  # fmt: skip
         return super().parse_args(ctx, args)
@@ -166,13 +166,7 @@ def acquire_experiment(
             called = EXPERIMENTS[experiment].called + "s" * (readings != 1)
             result(
                 in_language(
-                    Text(
-                        "{status}: {count} {called} in {folder}",
-                        status=run.status,
-                        count=readings,
-                        called=called,
-                        folder=str(run.folder),
-                    )
+                    Text("{status}: {count} {called} in {folder}", run.status, readings, called, str(run.folder))
                 )
             )
         if run.status == "interrupted":

@@ -106,9 +106,7 @@ def as_text(study: Study, symbols: Mapping[str, str] | None = None) -> str:
             else Text(", as far as so few trials show ({some} of {all})", some=study.trials, all=TRIALS)
         )
         texts.append(
-            Text(
-                "Values and uncertainties of this analysis are right for readings such as these{so_far}.", so_far=so_far
-            )
+            Text("Values and uncertainties of this analysis are right for readings such as these{so_far}.", so_far)
         )
     else:
         wrong = tuple(_name(one.quantity, {}) for one in study.spreads if one.verdict is Verdict.WRONG)
@@ -162,9 +160,7 @@ def _about_student(study: Study, symbols: Mapping[str, str]) -> Iterator[str]:
         share = Text("{percent:.0f} %", percent=100 * fewest.wanted_coverage)
         of = enumeration([_name(name, symbols) for name in few])
         yield Text(
-            "As u of {of} comes from the scatter of few values, {share} within 1 u are right (Student's t).",
-            of=of,
-            share=share,
+            "As u of {of} comes from the scatter of few values, {share} within 1 u are right (Student's t).", of, share
         )
         if freedom <= LONG_TAILS:
             degrees = Text("{degrees} of freedom", degrees=how_many(freedom, "degree"))

@@ -97,18 +97,13 @@ def problem_of(key: str, value: float, factor: float = 1.0, *, asks: bool = True
     if own is None:  # no row: in the quantity's own unit
         own, factor, typed = units[0], 1.0, value
     said = Text(
-        "a number from {low:g} to {high:g}{unit:s} is expected",
-        low=low / factor,
-        high=high / factor,
-        unit=f" {own.sign}".rstrip(),
+        "a number from {low:g} to {high:g}{unit:s} is expected", low / factor, high / factor, f" {own.sign}".rstrip()
     )
     for one in units:
         meant = typed * one.factor + one.shift
         if asks and one is not own and low <= meant <= high and meant:
             asked = "Were {units} meant?  {typed:g} {sign:s} are {meant:.6g}"
             return Text(
-                "{said}.  {asked}",
-                said=said,
-                asked=Text(asked, units=one.name, typed=typed, sign=one.sign, meant=meant / factor),
+                "{said}.  {asked}", said, Text(asked, units=one.name, typed=typed, sign=one.sign, meant=meant / factor)
             )
     return said

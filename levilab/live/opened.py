@@ -104,9 +104,7 @@ class Opened:
         """
         name = plain_name(name)
         if name.casefold().endswith(ENDING):
-            raise CannotTake(
-                Text("{name} says how a data file is read: drop the data file, and correct it here", name=name)
-            )
+            raise CannotTake(Text("{name} says how a data file is read: drop the data file, and correct it here", name))
         size, digest, part = 0, hashlib.sha256(), self.folder / f".incoming-{secrets.token_hex(8)}"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -116,11 +114,7 @@ class Opened:
                     size += len(piece)
                     if size > MOST_BYTES:
                         raise CannotTake(
-                            Text(
-                                "{name}: is larger than {most} MB: levilab open reads it",
-                                name=name,
-                                most=MOST_BYTES >> 20,
-                            )
+                            Text("{name}: is larger than {most} MB: levilab open reads it", name, MOST_BYTES >> 20)
                         )
                     digest.update(piece)
                     file.write(piece)
@@ -129,9 +123,7 @@ class Opened:
                 part.rename(place)
         except OSError as error:
             raise CannotTake(
-                Text(
-                    "{name}: cannot be kept in {folder} ({why})", name=name, folder=str(self.folder), why=error.strerror
-                )
+                Text("{name}: cannot be kept in {folder} ({why})", name, str(self.folder), error.strerror)
             ) from error
         finally:  # the file is closed by now: Windows removes none that is open
             with contextlib.suppress(OSError):
@@ -205,9 +197,4 @@ def _size_of_film(path: Path) -> str:
         film = open_film(path)
     except NoFilm:  # sound alone, or without the extra: its sound is still read
         return ""
-    return Text(
-        "a film of {width} × {height} pixels, {length:.1f} s",
-        width=film.width,
-        height=film.height,
-        length=film.duration or 0.0,
-    )
+    return Text("a film of {width} × {height} pixels, {length:.1f} s", film.width, film.height, film.duration or 0.0)

@@ -70,10 +70,7 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
     elif about:
         u, note = (
             None,
-            Text(
-                "not known for {driver}: the option --clock-u gives it, from its manual",
-                driver=driver or "this instrument",
-            ),
+            Text("not known for {driver}: the option --clock-u gives it, from its manual", driver or "this instrument"),
         )
     else:
         u, note = None, "no instrument is recorded: the option --clock-u gives it, from the manual"
@@ -142,9 +139,7 @@ def budget_table(budget: Budget, shown: Mapping[str, str] | None = None) -> Tabl
     rows.append(Row(("combined: u", "", "", "", _number(budget.u, budget.unit), "100 %"), "together"))
     left_out = budget.left_out
     rows += [
-        Row((Text("{source} (not in u)", source=cells[0]), *cells[1:]))
-        for one in left_out
-        if (cells := _cells(budget, one))
+        Row((Text("{source} (not in u)", cells[0]), *cells[1:])) for one in left_out if (cells := _cells(budget, one))
     ]
     if any(one.contribution for one in left_out):
         rows.append(
@@ -168,12 +163,7 @@ def title_of(budget: Budget, shown: Mapping[str, str] | None = None) -> str:
     """Return the result, with its uncertainty."""
     name = (shown or {}).get(budget.quantity, budget.quantity.replace("_", " "))
     of = Text(" ({model})", model=budget.model) if budget.model else ""
-    return Text(
-        "{name} = {value:n}{of}",
-        name=name,
-        value=with_uncertainty(Estimate(budget.value, budget.u, budget.unit)),
-        of=of,
-    )
+    return Text("{name} = {value:n}{of}", name, with_uncertainty(Estimate(budget.value, budget.u, budget.unit)), of)
 
 
 def _cells(budget: Budget, one: Component) -> tuple[str, ...]:
@@ -221,10 +211,7 @@ def sentences_of(budget: Budget, shown: Mapping[str, str] | None = None) -> list
     if largest is not None:
         texts.append(
             Text(
-                "{percent} of u² of {name} comes from: {source}.",
-                percent=_percent(budget.share(largest)),
-                name=name,
-                source=largest.source,
+                "{percent} of u² of {name} comes from: {source}.", _percent(budget.share(largest)), name, largest.source
             )
         )
         texts += [Text("It gets smaller with {remedy}.", remedy=largest.remedy)] if largest.remedy else []
@@ -347,9 +334,6 @@ EXPLAINED = (
 def notes_of(budgets: Sequence[Budget]) -> list[str]:
     """Return the sources of the numbers in the rows, each once."""
     said = (
-        Text("{source}: {note}", source=one.source, note=one.note)
-        for budget in budgets
-        for one in budget.components
-        if one.note
+        Text("{source}: {note}", one.source, one.note) for budget in budgets for one in budget.components if one.note
     )
     return list(dict.fromkeys(said))

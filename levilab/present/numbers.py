@@ -78,9 +78,7 @@ def column(estimates: Iterable[Estimate | None]) -> list[str]:
     if ordinary and min(u for _, u in known) < MOST_DECIMALS:
         return [without_unit(one) if one else "—" for one in cells]
     return [
-        "—"
-        if one is None or one.value is None
-        else Text("{number:n}", number=_number(one.value, one.u, ordinary=ordinary))
+        "—" if one is None or one.value is None else Text("{number:n}", _number(one.value, one.u, ordinary=ordinary))
         for one in cells
     ]
 

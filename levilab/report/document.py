@@ -270,14 +270,9 @@ def banner_of(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner 
         return Banner("SYNTHETIC.", "This run did not come from a real bench. How it was made stands in its run.json.")
     how = "How each was made stands in its run.json."
     if len(made_up) == total:
-        return Banner(
-            "SYNTHETIC.", Sentences(Text("None of these {total} runs came from a real bench.", total=total), how)
-        )
+        return Banner("SYNTHETIC.", Sentences(Text("None of these {total} runs came from a real bench.", total), how))
     said = Text(
-        "{some} of {total} runs did not come from a real bench ({names}).",
-        some=len(made_up),
-        total=total,
-        names=list_in_words(made_up),
+        "{some} of {total} runs did not come from a real bench ({names}).", len(made_up), total, list_in_words(made_up)
     )
     if not mixed and files:
         said = Text(

@@ -237,9 +237,7 @@ def _instrument(about: Mapping[str, Any]) -> tuple[str, ...]:
     if isinstance(at_end, dict):
         return where, settings_in_words(at_end)
     if isinstance(at_start, dict):
-        return where, Text(
-            "at the start, no later settings are recorded: {settings}", settings=settings_in_words(at_start)
-        )
+        return where, Text("at the start, no later settings are recorded: {settings}", settings_in_words(at_start))
     return where, "settings not recorded"
 
 

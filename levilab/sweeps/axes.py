@@ -323,6 +323,4 @@ def in_words(axis: Axis) -> str:
     spaced = Text("{count}, logarithmic", count=count) if axis.scale == "log" else count
     least, most = axis.values.min(), axis.values.max()
     ends = Text("from {least:g} to {most:g}", least=least, most=most) if most > least else f"{least:g}"
-    return Text(
-        "{key:s} {ends:n}{unit}, {count}", key=axis.key, ends=ends, unit="" if unit == "1" else f" {unit}", count=spaced
-    )
+    return Text("{key:s} {ends:n}{unit}, {count}", axis.key, ends, "" if unit == "1" else f" {unit}", spaced)

@@ -57,7 +57,7 @@ def language_of(code: str) -> Language:
 class Text(str):
     """A sentence with values.  It is the English sentence, and `in_language` says it in others.
 
-    >>> said = Text("the top follows the drive at {drive:.2f} Hz", drive=30)
+    >>> said = Text("the top follows the drive at {drive:.2f} Hz", 30)
     >>> said, in_language(said, "de")
     ('the top follows the drive at 30.00 Hz', 'der Kreisel folgt dem Antrieb bei 30,00 Hz')
 
@@ -70,8 +70,17 @@ class Text(str):
     template: str
     values: Mapping[str, Any]
 
-    def __new__(cls, template: str, /, **values: Any) -> Self:
-        """Make the English sentence; the value of an error is its text."""
+    def __new__(cls, template: str, /, *in_order: Any, **values: Any) -> Self:
+        """Make the English sentence; the value of an error is its text.
+
+        Args:
+            template: of the sentence.
+            in_order: its values in the order in which their names first stand in it, but for those given by name.
+            values: its values by their names.
+        """
+        if in_order:
+            names = [name for name in dict(fields_of(template)) if name not in values]
+            values |= zip(names, in_order, strict=True)
         values = {name: _known(one) for name, one in values.items()}
         self = super().__new__(cls, _fill(template, values, ENGLISH))
         self.template, self.values = template, MappingProxyType(values)

@@ -252,11 +252,7 @@ def _read(session: Session[FieldSettings], height: float) -> float:
     flux_density = session.bench.magnetometer.flux_density()
     if flux_density is None:
         limit = session.settings.range_t
-        seen = (
-            Text("beyond the range of {range:g} mT", range=1e3 * limit)
-            if limit
-            else "beyond what the probe can measure"
-        )
+        seen = Text("beyond the range of {range:g} mT", 1e3 * limit) if limit else "beyond what the probe can measure"
         raise ExperimentFailed(
             "the flux density at {height:.1f} mm is {seen}: choose a larger one (field.range_t in the "
             "bench file), or begin higher up (field.lowest_m)",

@@ -147,9 +147,7 @@ def _with_a_top(
 def _have_the_next_top(session: Session[LimitSettings]) -> bool:
     """See that the next top floats; where none does, ask for one, and return True.  Raises ExperimentFailed."""
     settings, number = session.settings, len(session.rows)
-    session.progress(
-        Text("top {number} of {all}", number=number + 1, all=settings.repetitions), number / settings.repetitions
-    )
+    session.progress(Text("top {number} of {all}", number + 1, settings.repetitions), number / settings.repetitions)
     spin = spin_now(session) if number else None
     if spin is not None and spin > settings.drive_frequency_hz:  # the last one only lost its lock
         _coast_down(session)
@@ -381,9 +379,7 @@ def _say_how_it_was_lost(
     cause = cause_of_loss(lag, fell=kind is RunEvent.TOP_LOST)
     known = {} if math.isnan(lag) else {"lag_turns": lag}
     behind = Text(", the lag behind the drive grew by {lag:.2f} turns in the end", lag=lag) if known else ""
-    text = Text(
-        "{what} at {spin:.2f} Hz: {lost}; {cause}{behind}", what=what, spin=spin, lost=lost, cause=cause, behind=behind
-    )
+    text = Text("{what} at {spin:.2f} Hz: {lost}; {cause}{behind}", what, spin, lost, cause, behind)
     session.event(
         kind, text,
         spin_frequency_hz=spin, drive_frequency_hz=lost.drive, top=len(session.rows), cause=cause, **known,

@@ -395,10 +395,7 @@ def _check_pulses(session: Session[PrecessionSettings], laser: Gates) -> None:
 
 def _say_what_was_miscounted(session: Session[PrecessionSettings], laser: Gates, found: Rate, drive: float) -> None:
     """Note an event where gates of the laser were left out, or had no count."""
-    said = [
-        Text("gate {number} has {pulses}", number=gate + 1, pulses=pulses_too_many(pulses))
-        for gate, pulses in found.wrong
-    ]
+    said = [Text("gate {number} has {pulses}", gate + 1, pulses_too_many(pulses)) for gate, pulses in found.wrong]
     if found.missing:
         said.append(Text("{missing} of {all} gates have no count", missing=found.missing, all=len(laser)))
     if said:

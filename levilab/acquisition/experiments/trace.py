@@ -182,10 +182,7 @@ def _note_what_was_cut_short(session: Session[TraceSettings]) -> None:
     more = sum(time >= last for time in described_times(folder)) - (channels if session.rows else 0)
     if more > 0:
         text = Text(
-            "record {number} was cut short after {some} of {all} channels; it is taken again",
-            number=number,
-            some=more,
-            all=channels,
+            "record {number} was cut short after {some} of {all} channels; it is taken again", number, more, channels
         )
         session.event(RunEvent.CUT_SHORT, text, record=number)
 
@@ -221,9 +218,7 @@ def _drive(session: Session[TraceSettings]) -> None:
     session.bench.generator.prepare(
         waveform="SIN", frequency_hz=settings.drive_frequency_hz, amplitude_vpp=settings.drive_amplitude_vpp
     )
-    session.event(
-        RunEvent.DRIVE_ON, Text("drive on at {drive_frequency_hz:g} Hz", drive_frequency_hz=settings.drive_frequency_hz)
-    )
+    session.event(RunEvent.DRIVE_ON, Text("drive on at {drive_frequency_hz:g} Hz", settings.drive_frequency_hz))
     session.bench.generator.output = True
     session.bench.record_settings("generator")
 
@@ -270,11 +265,7 @@ class _Watch:
         elif spin is not None and self.lost and not lost:
             session.event(
                 RunEvent.LOCKED,
-                Text(
-                    "record {number} shows a tape of {spin:.2f} Hz: the top follows the drive again",
-                    number=number,
-                    spin=spin,
-                ),
+                Text("record {number} shows a tape of {spin:.2f} Hz: the top follows the drive again", number, spin),
             )
         self.lost = lost
 
@@ -363,13 +354,7 @@ def _why_no_trigger(session: Session[TraceSettings]) -> str:
             "{said}: is the signal plugged in there, and does it cross this level (trace.trigger_level_v)?", said=said
         )
     advice = "is the top up and lit?" if low < level < high or high - low < 0.1 else "set trace.trigger_level_v between"
-    return Text(
-        "{said}: the signal there lies between {low:.2f} and {high:.2f} V; {advice}",
-        said=said,
-        low=low,
-        high=high,
-        advice=advice,
-    )
+    return Text("{said}: the signal there lies between {low:.2f} and {high:.2f} V; {advice}", said, low, high, advice)
 
 
 def _channel_in_message(settings: TraceSettings) -> int:
@@ -414,9 +399,7 @@ def _problem(trace: Trace, settings: TraceSettings) -> str:
     clipped = float(trace.clipped.mean())
     if clipped > _CLIPPED_SHARE:
         return Text(
-            "{what} is beyond the screen for {percent:.2g} % of it: raise trace.volts_per_division",
-            what=what,
-            percent=100 * clipped,
+            "{what} is beyond the screen for {percent:.2g} % of it: raise trace.volts_per_division", what, 100 * clipped
         )
     return ""
 

@@ -50,8 +50,7 @@ def trials_of(found: FieldAnalysis) -> Own:
     which = "the first scan" if len(found.runs) > 1 else "the scan"
     return Own(
         about=Text(
-            "{scan} again from the fitted base: calliper, zero, scale, heights and readings drawn by their u",
-            scan=which,
+            "{scan} again from the fitted base: calliper, zero, scale, heights and readings drawn by their u", which
         ),
         trial=trial,
         cost_s=_COST_S,

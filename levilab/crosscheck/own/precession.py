@@ -38,9 +38,7 @@ def trials_of(found: PrecessionAnalysis) -> Own:
         )
 
     return Own(
-        about=Text(
-            "{n} points on the fitted line, at these frequencies of the drive, with their scatter", n=drive.size
-        ),
+        about=Text("{n} points on the fitted line, at these frequencies of the drive, with their scatter", drive.size),
         trial=trial,
         cost_s=_COST_S,
         hypothesis="the true line",

@@ -30,10 +30,7 @@ def _why_not(found: Stability, *, hides: bool) -> str:
         ""
         if hides
         else Text(
-            ": {mass:.2f} g, and {light:.2f} to {heavy:.2f} g float",
-            mass=1e3 * mass,
-            light=1e3 * window.light,
-            heavy=1e3 * window.heavy,
+            ": {mass:.2f} g, and {light:.2f} to {heavy:.2f} g float", 1e3 * mass, 1e3 * window.light, 1e3 * window.heavy
         )
     )
     return Text("the top is {too} for this base{masses}", too=too, masses=masses)
@@ -78,9 +75,4 @@ def cause_of_fall(
             high=high,
             fell=fell,
         )
-    return Text(
-        "the spin could hold it, from {low:.1f} to {high:.1f} Hz, so it swung too far: {fell}",
-        low=low,
-        high=high,
-        fell=fell,
-    )
+    return Text("the spin could hold it, from {low:.1f} to {high:.1f} Hz, so it swung too far: {fell}", low, high, fell)

@@ -61,9 +61,7 @@ def _finding(analysis: FieldAnalysis) -> str:
         return said
     mass = with_uncertainty(QUANTITIES["mass_to_set"].show(values["mass_to_set"]))
     low, high = (1e2 * (values[name].value or 0.0) for name in ("lowest_height", "highest_height"))
-    return Text(
-        "{said}; tops float from {low:.2f} to {high:.2f} cm, set {mass:n}", said=said, low=low, high=high, mass=mass
-    )
+    return Text("{said}; tops float from {low:.2f} to {high:.2f} cm, set {mass:n}", said, low, high, mass)
 
 
 # --- field and residuals -------------------------------------------------------------------------------

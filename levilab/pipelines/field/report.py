@@ -181,14 +181,9 @@ def _in_words(_: Source[FieldReadings], run: FieldRun, *__: object) -> tuple[str
     scan = run.scan
     low, high = 1e2 * scan.height[0], 1e2 * scan.height[-1]
     text = Text(
-        "{n} heights, {low:n} cm to {high:n} cm",
-        n=scan.statistics.n,
-        low=with_decimals(low, 2),
-        high=with_decimals(high, 2),
+        "{n} heights, {low:n} cm to {high:n} cm", scan.statistics.n, with_decimals(low, 2), with_decimals(high, 2)
     )
-    u = Text(
-        "u of a reading against the fit: {low:.0f} µT to {high:.0f} µT", low=1e6 * scan.u.min(), high=1e6 * scan.u.max()
-    )
+    u = Text("u of a reading against the fit: {low:.0f} µT to {high:.0f} µT", 1e6 * scan.u.min(), 1e6 * scan.u.max())
     return text, Text("{u}, that of its height included", u=u)
 
 
@@ -248,9 +243,7 @@ def _meaning(analysis: FieldAnalysis) -> Iterator[str]:
     if reduced is None:
         yield "No uncertainty of the readings is given, so whether a ring describes the field is not tested."
     elif all(remark.kind != "scan scatters" for remark in scan.remarks):
-        yield Text(
-            "A uniform ring describes the readings to their uncertainties (χ²/dof = {chi:n}).", chi=digits(reduced)
-        )
+        yield Text("A uniform ring describes the readings to their uncertainties (χ²/dof = {chi:n}).", digits(reduced))
     else:
         yield (
             Text(

@@ -85,8 +85,7 @@ def scan_as_text(scan: FieldScan, floating: Floating | None) -> str:
     """Return what a scan says, in a few sentences."""
     base = Text(
         "The base has the strength ρ = {strength:n}, its middle at {origin:n}; its field points {pole} above it.",
-        strength=_format("strength", scan.parameters["strength"]), origin=_format("origin", scan.parameters["origin"]),
-        pole=_pole(scan),
+        _format("strength", scan.parameters["strength"]), _format("origin", scan.parameters["origin"]), _pole(scan),
     )  # fmt: skip
     tops = _advice(floating.values) if floating else ("No top floats above this base.",)
     return Sentences(*tops, base, *_learned(scan))
@@ -114,8 +113,7 @@ def _learned(scan: FieldScan) -> Iterator[str]:
     for one, other in pairs:
         yield Text(
             "{one} and {other} can hardly be distinguished (correlation {correlation:n}).",
-            one=one.replace("_", " ").capitalize(), other=other.replace("_", " "),
-            correlation=digits(scan.correlation(one, other)),
+            one.replace("_", " ").capitalize(), other.replace("_", " "), digits(scan.correlation(one, other)),
         )  # fmt: skip
 
 

@@ -66,10 +66,7 @@ class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
         """What the data say, in a few sentences."""
         spins = [run.spin.value or 0.0 for run in self.runs]
         several = Text(
-            "One top was held at {n} spins, {low:.1f} Hz to {high:.1f} Hz.",
-            n=len(spins),
-            low=min(spins),
-            high=max(spins),
+            "One top was held at {n} spins, {low:.1f} Hz to {high:.1f} Hz.", len(spins), min(spins), max(spins)
         )
         last = (several,) if len(spins) > 1 else text_of(self.runs[0]).each
         return Sentences(*_of_laws(self.combined), *last)
@@ -95,8 +92,7 @@ def text_of(run: Hold) -> Sentences:
 def _of_laws(found: HeldTogether) -> Iterable[str]:
     if best := found.best:
         constants = [
-            Text("{symbol} = {value:n}", symbol=SYMBOLS[name], value=with_uncertainty(one))
-            for name, one in best.constants.items()
+            Text("{symbol} = {value:n}", SYMBOLS[name], with_uncertainty(one)) for name, one in best.constants.items()
         ]
         yield Text("The {law} law fits best: {how}.", law=law_names([best.name]), how=enumeration(constants))
         if (chi := best.statistics.reduced_chi_square) is not None:

@@ -93,12 +93,7 @@ def hold_part(analysis: HoldAnalysis) -> ReportPart:
 def _in_words(source: Source[HoldReadings], *_: object) -> tuple[str, ...]:
     one = source.readings
     return (
-        Text(
-            "{readings} from {begin:.1f} s to {end:.1f} s",
-            readings=how_many(len(one), "reading"),
-            begin=one.time[0],
-            end=one.time[-1],
-        ),
+        Text("{readings} from {begin:.1f} s to {end:.1f} s", how_many(len(one), "reading"), one.time[0], one.time[-1]),
         Text("{measured} of the gain at the full amplitude", measured=how_many(len(one.gains), "measurement")),
     )
 

@@ -409,9 +409,7 @@ def warnings_of(statistics: Statistics) -> list[Note]:
     texts: dict[str, str] = {}
     if statistics.outliers:
         numbers = tuple(i + 1 for i in statistics.outliers)
-        texts["outliers"] = Text(
-            "limits that do not belong to the others: {numbers}; the mean has them", numbers=numbers
-        )
+        texts["outliers"] = Text("limits that do not belong to the others: {numbers}; the mean has them", numbers)
     if statistics.drifts and statistics.trend:
         texts["drifts"] = Text(
             "the limit drifts by {trend:n} a repetition: the mean is of no fixed state of the top; look for its mass, "

@@ -93,9 +93,7 @@ def _about_scatter(limits: Limits) -> str:
     text = Text("standard deviation of one top from another {s:n} Hz, of {n} tops", s=digits(scatter), n=found.n)
     if found.between and found.between.value:
         beyond = digits(found.between.value)
-        text = Text(
-            "{tops}; {n} runs differ by {hz:n} Hz beyond that, which is in it", tops=text, n=found.runs, hz=beyond
-        )
+        text = Text("{tops}; {n} runs differ by {hz:n} Hz beyond that, which is in it", text, found.runs, beyond)
     return Text("{tops}; what the counter and the moment of the fall leave to each limit is part of it", tops=text)
 
 

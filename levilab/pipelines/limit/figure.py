@@ -186,10 +186,7 @@ def _upper_title(group: Limits) -> str:
     lock, top = group.ends.get(RunEvent.LOCK_LOST, 0), group.ends.get(RunEvent.TOP_LOST, 0)
     how = Text(" (lost by the drive {lost} ×, fell {fell} ×)", lost=lock, fell=top) if lock or top else ""
     if group.causes:
-        how = Text(
-            " ({causes})",
-            causes=tuple(Text("{cause} {n} ×", cause=str(c), n=n) for c, n in sorted(group.causes.items())),
-        )
+        how = Text(" ({causes})", tuple(Text("{cause} {n} ×", str(c), n) for c, n in sorted(group.causes.items())))
     return Text("Upper limit of a driven top{how}", how=how)
 
 

@@ -258,9 +258,7 @@ def _meaning(group: Limits) -> Iterator[str]:
             )
         )
         return
-    yield Text(
-        "The {which} limit is {limit:n}: {why}.", which=group.which, limit=with_uncertainty(mean), why=_WHY[group.which]
-    )
+    yield Text("The {which} limit is {limit:n}: {why}.", group.which, with_uncertainty(mean), _WHY[group.which])
     yield from (_CAUSES[cause] for cause in _CAUSES if group.causes.get(cause))
     if group.which == "upper" and group.device.is_thesis and ISLANDS_HZ[0] < mean.value < ISLANDS_HZ[1]:
         yield (
@@ -276,8 +274,7 @@ def _meaning(group: Limits) -> Iterator[str]:
         return
     ratio = found.scatter.value / mean.u
     yield Text(
-        "One top is lost {hz:n} Hz from another, so a single one may be off by that much.",
-        hz=digits(found.scatter.value),
+        "One top is lost {hz:n} Hz from another, so a single one may be off by that much.", digits(found.scatter.value)
     )
     if ratio > 1:
         yield Text("The mean of {n} is {times:n} times as good.", n=found.n, times=digits(ratio))
@@ -292,6 +289,4 @@ def _meaning(group: Limits) -> Iterator[str]:
         value, u = MEASURED_HZ, MEASURED_U_HZ
         away = abs(mean.value - value) / math.hypot(mean.u, u)
         said = "which agrees" if away < 2 else Text("{away:n} u from it: another top, or mass", away=digits(away))
-        yield Text(
-            "The thesis's ten tops have {spin:n}, {said}.", spin=with_uncertainty(Estimate(value, u, "Hz")), said=said
-        )
+        yield Text("The thesis's ten tops have {spin:n}, {said}.", with_uncertainty(Estimate(value, u, "Hz")), said)

@@ -83,9 +83,7 @@ def lines_table(analysis: PrecessionAnalysis) -> Table:
     rows.append(
         Row(
             (
-                Text("all points: {line}", line=line_name(analysis.combined))
-                if total > 1
-                else line_name(analysis.combined),
+                Text("all points: {line}", line_name(analysis.combined)) if total > 1 else line_name(analysis.combined),
                 *_line_cells(analysis.combined),
             ),
             together,
@@ -342,9 +340,7 @@ def _uncertainty(source: Source[SweepReadings], run: PrecessionRun, options: Pre
         return Text(
             "u of a point: {u}, from the gates of all points, the swing about the drive taken off", u=size_of_u(u)
         )
-    return Text(
-        "u of a point: {u}, {source}", u=size_of_u(u), source=origin_of_u(source, "precession_frequency_u_hz", options)
-    )
+    return Text("u of a point: {u}, {source}", size_of_u(u), origin_of_u(source, "precession_frequency_u_hz", options))
 
 
 # --- what it means ---
@@ -359,8 +355,7 @@ def _meaning(fit: SweepFit) -> Iterator[str]:
     slope = with_uncertainty(slope_of(fit))
     if fit.p_locked is None or not line.u_slope:
         yield Text(
-            "The line rises by {slope:n}; how far that may be off these points do not say, so nothing is tested.",
-            slope=slope,
+            "The line rises by {slope:n}; how far that may be off these points do not say, so nothing is tested.", slope
         )
         return
     if fit.locked:

@@ -45,8 +45,7 @@ def _about_lock(fit: SweepFit) -> str:
     return Text(
         "The stem does not go round once for each turn of the drive: slope 1 and intercept 0 are excluded (p = {p:n}), "
         "and the precession that was counted lies {off:n} Hz {side} the drive at {drive:.4g} Hz.",
-        p=plain(p, 1), off=digits(abs(_offset(fit))), side="above" if _offset(fit) > 0 else "below",
-        drive=fit.line.centre,
+        plain(p, 1), digits(abs(_offset(fit))), "above" if _offset(fit) > 0 else "below", fit.line.centre,
     )  # fmt: skip
 
 
@@ -99,9 +98,7 @@ def _miscount(points: tuple[Point, ...], k: float, gates_known: float = 1.0) -> 
     assert point.miscount is not None
     gate = "" if gates_known else "; whether whole pulses are missing only the counter's gate could say"
     end = (
-        ("" if point.used else ", left out of the line")
-        if point.miscount.named
-        else Text("{gate} (it stays in)", gate=gate)
+        ("" if point.used else ", left out of the line") if point.miscount.named else Text("{gate} (it stays in)", gate)
     )
     return Text(
         "point {number:.0f}, {hz:.5g} Hz at a drive of {drive:.5g} Hz: {what}{end}",

@@ -437,9 +437,7 @@ def in_a_sentence(run: SpinRun) -> str:
     )
     drive = _about_drive(run)
     if len(series) == 1:
-        return Sentences(
-            Text("The spin is {at}, its slope {slope:n}.", at=at, slope=with_uncertainty(spin.chirp)), drive
-        )
+        return Sentences(Text("The spin is {at}, its slope {slope:n}.", at, with_uncertainty(spin.chirp)), drive)
     phases = tuple(
         Text("{kind} {start:.1f} to {end:.1f} s", kind=kind, start=round(start, 1) + 0.0, end=end)
         for kind, start, end in series.phases[:6]
@@ -473,9 +471,7 @@ def _about_drive(run: SpinRun) -> str:
     locked = abs(off.value) <= NOT_LOCKED * off.u
     return Text(
         "The top {follows} the drive: while it is held, the spin less the drive's frequency is {off:n}{beware}.",
-        follows="is locked to" if locked else "is not locked to",
-        off=with_uncertainty(off),
-        beware=" (if it is the spin: the drive's coil has a field of this frequency, too)"
-        if run.line and locked
-        else "",
+        "is locked to" if locked else "is not locked to",
+        with_uncertainty(off),
+        " (if it is the spin: the drive's coil has a field of this frequency, too)" if run.line and locked else "",
     )

@@ -142,9 +142,7 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
     warnings += [text for waveform in found for text in waveform.warnings]
     if chosen.casefold() in NO_SPIN:
         what = NO_SPIN[chosen.casefold()]
-        warnings.append(
-            Note("no spin", Text("the frequency of {chosen:s} is no spin, but {what}", chosen=chosen, what=what))
-        )
+        warnings.append(Note("no spin", Text("the frequency of {chosen:s} is no spin, but {what}", chosen, what)))
     if options.channel is None and len(names) > 1:
         warnings.append(Note("channels", Text(_CHOSEN, names=(*names,), chosen=chosen)))
     return Records(run.folder, of_channel, chosen, None, tuple(warnings))

@@ -324,13 +324,7 @@ def _in_words(source: Source[Records], run: SpinRun, *_: object) -> tuple[str, .
         else Text("{n} pulses, {missing} missing", n=run.spin.pulses, missing=run.spin.missing)
     )
     of = Text("{which}: {found}", which=run.which, found=found) if run.which else found
-    what = (
-        "samples"
-        if run.line
-        else "pulse times"
-        if records.pulses
-        else Text("samples of {channel}", channel=records.channel)
-    )
+    what = "samples" if run.line else "pulse times" if records.pulses else Text("samples of {channel}", records.channel)
     return Text("{kind}; {n} {what}", kind=records.kind, n=count, what=what), of
 
 

@@ -84,7 +84,7 @@ def _unlike(hertz: float, time: float, other_hertz: float, other_time: float, nu
         "neighbouring windows have {hertz:.4g} Hz at {time:.4g} s and {other_hertz:.4g} Hz at {other_time:.4g} s: "
         "pulses are missing or doubled in a pattern{often}",
         hertz=hertz, time=time, other_hertz=other_hertz, other_time=other_time,
-        often=Text(" ({number} times)", number=number) if number > 1 else "",
+        often=Text(" ({number} times)", number) if number > 1 else "",
     )  # fmt: skip
 
 

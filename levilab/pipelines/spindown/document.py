@@ -180,13 +180,9 @@ def _better_readings(source: Source[SpinReadings]) -> str:
         return "more readings in the same time, or a longer gate"
     longer = min(_LONGER * gate, _MOST_OF_INTERVAL * interval)
     if longer < 2 * gate:
-        return Text(
-            "more runs: their mean over N is better by √N (the gate, {gate:g} s, can hardly be longer)", gate=gate
-        )
+        return Text("more runs: their mean over N is better by √N (the gate, {gate:g} s, can hardly be longer)", gate)
     return Text(
-        "a gate of {longer:g} s instead of {gate:g} s, where single pulses scatter, or by more runs",
-        longer=longer,
-        gate=gate,
+        "a gate of {longer:g} s instead of {gate:g} s, where single pulses scatter, or by more runs", longer, gate
     )
 
 
@@ -219,9 +215,7 @@ def _budget_of_mean(analysis: SpinDownAnalysis, law: str, name: str, mean: Mean)
     remedy = Text("more runs: it takes {more} instead of {n} to halve it", more=_TO_HALVE * n, n=n)
     rows: list[Component] = []
     if of_readings >= by_runs * (1 - 1e-9):
-        note: str = Text(
-            "the runs scatter by no more ({scatter:n}) than their readings explain", scatter=digits(mean.scatter)
-        )
+        note: str = Text("the runs scatter by no more ({scatter:n}) than their readings explain", digits(mean.scatter))
         rows.append(
             Component("runs", "readings of the runs", "A", of_readings * math.sqrt(n), mean.unit, 1 / math.sqrt(n),
                       note=note, remedy=remedy)

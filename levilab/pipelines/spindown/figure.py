@@ -109,9 +109,7 @@ def _unit(analysis: SpinDownAnalysis) -> _Unit:
     residuals = [run.fit(analysis.combined.best).residuals for run in analysis.runs]
     floor = 1e-12 * float(analysis.runs[0].frequency[0])  # readings that a law describes exactly
     scatter = max(float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))), floor)
-    words = Text(
-        "the scatter about the {law} law ({hz:n} Hz)", law=law_names([analysis.combined.best]), hz=digits(scatter)
-    )
+    words = Text("the scatter about the {law} law ({hz:n} Hz)", law_names([analysis.combined.best]), digits(scatter))
     return _Unit([np.full(len(one), scatter) for one in residuals], scatter, "scatter", words)
 
 

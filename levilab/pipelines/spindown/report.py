@@ -135,24 +135,16 @@ def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
         off = value.value / KARMAN - 1
         u = value.u / KARMAN
         way = "above the value" if off > 0 else "below the value"
-        compared = Text(
-            "{symbol} lies {percent:n} % {way}", symbol=SYMBOLS[name], percent=digits(100 * abs(off)), way=way
-        )
+        compared = Text("{symbol} lies {percent:n} % {way}", SYMBOLS[name], digits(100 * abs(off)), way)
         karman = "von Kármán for a bare disc as large as the thesis's top, 2.235×10⁻⁴"
         if abs(off) < _DIFFERS * u:
             yield Text("{symbol} agrees with the value of {karman}.", symbol=SYMBOLS[name], karman=karman)
         elif off > 0:
             yield Text(
-                "{lies} of {karman}: rim, stem and washers drag, too, if this top is as large.",
-                lies=compared,
-                karman=karman,
+                "{lies} of {karman}: rim, stem and washers drag, too, if this top is as large.", compared, karman
             )
         else:
-            yield Text(
-                "{lies} of {karman}: this top is smaller or heavier, if nothing drives it.",
-                lies=compared,
-                karman=karman,
-            )
+            yield Text("{lies} of {karman}: this top is smaller or heavier, if nothing drives it.", compared, karman)
 
 
 def _exponent(analysis: SpinDownAnalysis) -> Iterator[str]:
@@ -166,9 +158,7 @@ def _exponent(analysis: SpinDownAnalysis) -> Iterator[str]:
     if exponent.value is None or not exponent.u:
         return
     away = {name: abs(exponent.value - n) / exponent.u for name, n in _POWERS.items()}
-    near = [
-        Text("{law} ({n:g})", law=law_names([name]), n=_POWERS[name]) for name, far in away.items() if far < _DIFFERS
-    ]
+    near = [Text("{law} ({n:g})", law_names([name]), _POWERS[name]) for name, far in away.items() if far < _DIFFERS]
     far = [
         Text("{law} ({n:g}) by {far:.0f} u", law=law_names([name]), n=_POWERS[name], far=far)
         for name, far in away.items()
@@ -684,9 +674,7 @@ def _uncertainty(source: Source[SpinReadings], fit: SpinDown, options: SpinDownO
     """Return how large u of a reading is, and where it comes from."""
     if fit.u is None:
         return "u of a reading: not known, taken from the scatter about each law"
-    return Text(
-        "u of a reading: {u}, {source}", u=size_of_u(fit.u), source=origin_of_u(source, "spin_frequency_u_hz", options)
-    )
+    return Text("u of a reading: {u}, {source}", size_of_u(fit.u), origin_of_u(source, "spin_frequency_u_hz", options))
 
 
 def _residuals(source: Source[SpinReadings], fit: SpinDown, law: str) -> dict[int, float]:
@@ -732,9 +720,7 @@ def _points_of_run(k: int, name: str, run: SpinDown, analysis: SpinDownAnalysis)
     for law in run.fits:
         left = zip(heads, law.residuals.tolist(), u, strict=True)
         name = law_names([law.name])
-        texts = tuple(
-            Text("{head:n}\nν − {law} law = {off:n} Hz", head=head, law=name, off=off(r, u_)) for head, r, u_ in left
-        )
+        texts = tuple(Text("{head:n}\nν − {law} law = {off:n} Hz", head, name, off(r, u_)) for head, r, u_ in left)
         yield Points(f"residuals-{law.name}-{k}", texts)
         if law.name == analysis.combined.best:
             yield Points(f"readings-{k}", texts)
@@ -758,12 +744,5 @@ def _fall(source: Source[SpinReadings], fit: SpinDown) -> str:
 def _falls_in_short(analysis: SpinDownAnalysis, seen: int) -> str:
     """Return between which spins the tops fell."""
     last = sorted(float(run.frequency[-1]) for run in analysis.runs)
-    span = Text(
-        "{low:.2f} Hz to {high:.2f} Hz, {middle:.2f} Hz in the middle",
-        low=last[0],
-        high=last[-1],
-        middle=last[len(last) // 2],
-    )
-    return Text(
-        "Seen in {seen} of {n} runs. The last reading that was fitted is {span}.", seen=seen, n=len(last), span=span
-    )
+    span = Text("{low:.2f} Hz to {high:.2f} Hz, {middle:.2f} Hz in the middle", last[0], last[-1], last[len(last) // 2])
+    return Text("Seen in {seen} of {n} runs. The last reading that was fitted is {span}.", seen, len(last), span)

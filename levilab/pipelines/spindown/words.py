@@ -268,9 +268,7 @@ def _how(law: str, constants: Mapping[str, Estimate]) -> str:
 def _constants(of: Mapping[str, Estimate]) -> str:
     """Return the constants of a law with their u, of a single one also its relative u; empty where none has a u."""
     known = {name: one for name, one in of.items() if one.value is not None and one.u}
-    texts = [
-        Text("{symbol} = {value:n}", symbol=SYMBOLS[name], value=with_uncertainty(one)) for name, one in known.items()
-    ]
+    texts = [Text("{symbol} = {value:n}", SYMBOLS[name], with_uncertainty(one)) for name, one in known.items()]
     if len(known) != 1 or len(of) != 1:
         return enumeration(texts) if texts else ""
     (one,) = known.values()

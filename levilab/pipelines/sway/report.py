@@ -125,13 +125,7 @@ def _in_words(source: Source[SwayReadings], run: SwayRun, *_: object) -> tuple[s
     size = 1e3 * math.sqrt(max(one.size for one in run.swings))
     rate = (len(time) - 1) / float(time[-1] - time[0])
     return (
-        Text(
-            "{n} places from {begin:.1f} s to {end:.1f} s, {rate:.0f} a second",
-            n=len(time),
-            begin=time[0],
-            end=time[-1],
-            rate=rate,
-        ),
+        Text("{n} places from {begin:.1f} s to {end:.1f} s, {rate:.0f} a second", len(time), time[0], time[-1], rate),
         Text("swings: {size:.2g} mm at most, root of the sum of both amplitudes' squares", size=size),
         Text("residuals of a coordinate: standard deviation {noise:.2g} mm at most", noise=noise),
     )

@@ -114,9 +114,7 @@ def read_film(path: Path, options: VideoOptions) -> FilmReadings:
     with file_errors(path), path.open("rb") as stream:
         head = stream.read(_HEAD)
     if kind_of_bytes(head, path.suffix) is not AUDIO:
-        raise DoesNotSuit(
-            Text("{path:s}: holds no film that can be read: give the file that the camera wrote", path=path)
-        )
+        raise DoesNotSuit(Text("{path:s}: holds no film that can be read: give the file that the camera wrote", path))
     given = [name for name in ("scale", "rim", "base") if getattr(options, f"{name}_m") is not None]
     wanted = Text(
         "`rim`, the diameter of the top's rim; `base`, the outer diameter of the base; or `scale`, metres in a pixel"

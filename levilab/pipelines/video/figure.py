@@ -33,9 +33,7 @@ def video_figure(analysis: VideoAnalysis) -> Figure:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, sum(heights) + _ROOM * (len(shown) + 1)))
         spin = analysis.runs[0].spin
-        turns = (
-            Text("Its mark turns at {spin}", spin=with_uncertainty(spin)) if spin else "The top in the first picture"
-        )
+        turns = Text("Its mark turns at {spin}", with_uncertainty(spin)) if spin else "The top in the first picture"
         headline(figure, turns)
         top = _ROOM
         for height, (source, run) in zip(heights, shown, strict=True):

@@ -350,9 +350,7 @@ def verdict(of: Class) -> str:
         (group,), (mark,) = of.groups, of.marks
         return Text("{name:s} alone measured this: {mark}.", name=group.source.name, mark=mark.word)
     texts = [
-        Text(
-            "{mean} is the mean of {groups}{truth}.", mean=_mean(one), groups=_count(of, one), truth=_beside_truth(one)
-        )
+        Text("{mean} is the mean of {groups}{truth}.", _mean(one), _count(of, one), _beside_truth(one))
         for one in of.quantities
     ]
     return Sentences(_count_marks(of), *_scenes(of), *texts)
@@ -419,9 +417,7 @@ def _agreement(of: Compared) -> str:
     if together is None or together.scatter is None:
         return "there is no other group to compare it with"
     if together.p < DIFFER:
-        return Text(
-            "the groups differ by {scatter}, more than their u, as different tops do", scatter=_scatter(of, together)
-        )
+        return Text("the groups differ by {scatter}, more than their u, as different tops do", _scatter(of, together))
     return Text("the groups agree within their u: they differ by {scatter}", scatter=_scatter(of, together))
 
 

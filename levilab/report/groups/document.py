@@ -225,9 +225,7 @@ def _draw(of: Class) -> Figure:
 def _made_by(paths: Sequence[Path], name: str) -> Note:
     typed = " ".join([*(shlex.quote(str(path)) for path in paths), *language_option()])
     each = "each group's readings, figure and budget of uncertainties are in that of levilab report"
-    return Note(
-        Text("Made by: levilab class {paths:s} -o {out:s}; {each}.", paths=typed, out=shlex.quote(name), each=each)
-    )
+    return Note(Text("Made by: levilab class {paths:s} -o {out:s}; {each}.", typed, shlex.quote(name), each))
 
 
 SPREADSHEET = ".xlsx"
