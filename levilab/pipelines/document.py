@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeAlias, g
 
 from pydantic import BeforeValidator, Field, PlainSerializer, create_model
 
+from analysis.errors import AnalysisError
 from levilab.errors import DataError, UsageError, unquote
 from levilab.files import finite
 from levilab.formats.device import Device
@@ -84,7 +85,7 @@ class Analysis(Needs[Any], Generic[A]):
     Attributes:
         kind: what was found, an Analyzed.
         options: of the analysis.
-        fit: one input; raises DataError, which names the file.
+        fit: one input; raises AnalysisError, or DataError that names the file.
         combine: all inputs together.
         mixed: what is wrong with numbers over real and synthetic inputs; empty where there are none.
         of_files: names of options that say nothing about runs, whose columns are known.
@@ -166,9 +167,16 @@ class Analysis(Needs[Any], Generic[A]):
 
         def one(source: Source[Any]) -> Done:
             own = replace(options, **source.kept)
-            return source, self.fit(source, own), Origin(own, NOW)
+            return source, self.find_in(source, own), Origin(own, NOW)
 
         return self.gather(paths, found, options, one)
+
+    def find_in(self, source: Source[Any], options: Any) -> Any:
+        """Return what is found of one input.  Raises DataError, which names the file."""
+        try:
+            return self.fit(source, options)
+        except AnalysisError as error:
+            raise DataError("{path:s}: {error}", path=source.data, error=error) from error
 
     def gather(
         self,
@@ -369,7 +377,7 @@ class Analysis(Needs[Any], Generic[A]):
         else:
             return self._read_one(source, earlier)
         origin = Origin(options, Text(FOR_THIS_PAGE, why=why), lacks_result=earlier is None)
-        return source, self.fit(source, options), origin
+        return source, self.find_in(source, options), origin
 
     def _read_one(self, source: Source[Any], earlier: Earlier[Any]) -> Done:
         """Read the result of one input.  Raises DataError."""

@@ -4,11 +4,9 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from analysis.errors import AnalysisError
 from analysis.field.fit import FieldScan, fit_scan
 from analysis.field.floating import Floating, KnownTop, follow
 from analysis.uncertainty import Estimate
-from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.field.device import known_of, known_top, usual
 from levilab.pipelines.field.readings import FieldReadings
@@ -77,22 +75,19 @@ class FieldAnalysis(Analyzed[FieldReadings, FieldRun, None, FieldOptions]):
 
 
 def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> FieldRun:
-    """Fit one input, and compute what follows.  Raises DataError, which names the file."""
+    """Fit one input, and compute what follows.  Raises AnalysisError."""
     readings = source.readings
     known = known_of(source, options.device)
-    try:
-        top, warnings = known_top(source, options, usual(readings.height_u))
-        scan = fit_scan(
-            readings.height,
-            readings.flux_density,
-            known,
-            readings.u,
-            0.0 if readings.height_u is None else readings.height_u,
-            free_radii=options.free_radii,
-        )
-        floating = follow(scan, top)
-    except AnalysisError as error:
-        raise DataError("{path:s}: {error}", path=source.data, error=error) from error
+    top, warnings = known_top(source, options, usual(readings.height_u))
+    scan = fit_scan(
+        readings.height,
+        readings.flux_density,
+        known,
+        readings.u,
+        0.0 if readings.height_u is None else readings.height_u,
+        free_radii=options.free_radii,
+    )
+    floating = follow(scan, top)
     if floating is None:
         warnings = ["no top of this kind floats above this base at any mass and spin: are radii and inertias right?"]
     if readings.u is None:

@@ -258,13 +258,10 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
 
 
 def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
-    """Analyze one input.  Raises DataError, which names the file."""
+    """Analyze one input.  Raises AnalysisError, DataError."""
     device = device_of(source)
     which = _which(source, device)
-    try:
-        statistics = summarize(_sample(source, which, options))
-    except AnalysisError as error:
-        raise DataError("{path:s}: {error}", path=source.data, error=error) from error
+    statistics = summarize(_sample(source, which, options))
     conditions = _conditions(source, which, device)
     events = source.run.events() if source.run else []
     kinds = Counter(str(event["kind"]) for event in events)

@@ -74,7 +74,7 @@ class PrecessionAnalysis(Analyzed[SweepReadings, PrecessionRun, SweepFit, Preces
 
 
 def fit_source(source: Source[SweepReadings], options: PrecessionOptions) -> PrecessionRun:
-    """Return the line through one sweep, and the coherence of its records.  Raises DataError, which names the file."""
+    """Return the line through one sweep, and the coherence of its records.  Raises AnalysisError."""
     readings = source.readings
     u = readings.u if options.reading_u is None else np.full(len(readings), options.reading_u)
     sweep = Sweep(
@@ -87,10 +87,7 @@ def fit_source(source: Source[SweepReadings], options: PrecessionOptions) -> Pre
         gate_s=gate_of(source, EXPERIMENT),
         gates=readings.laser,
     )
-    try:
-        fit = fit_sweep(sweep, orthogonal=options.orthogonal, keep_miscounts=options.keep_outliers)
-    except AnalysisError as error:
-        raise DataError("{path:s}: {error}", path=source.data, error=error) from error
+    fit = fit_sweep(sweep, orthogonal=options.orthogonal, keep_miscounts=options.keep_outliers)
     coherences, warnings = _coherences(source)
     return PrecessionRun(fit, coherences, warnings)
 

@@ -4,7 +4,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from analysis.errors import AnalysisError
 from analysis.spindown.combine import Combined, CombinedLaw, combine
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown, fit_spin_down
@@ -66,23 +65,20 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
 
 
 def fit_source(source: Source[SpinReadings], options: SpinDownOptions) -> SpinDown:
-    """Fit all laws to one input.  Raises DataError, with the name of the file."""
+    """Fit all laws to one input.  Raises AnalysisError."""
     readings = source.readings
-    try:
-        return fit_spin_down(
-            readings.time,
-            readings.frequency,
-            readings.u if options.reading_u is None else options.reading_u,
-            laws=options.laws or tuple(LAWS),
-            keep_outliers=options.keep_outliers,
-            tilt=options.tilt == "fitted" or (options.tilt == "auto" and not readings.upright),
-            release=readings.release,
-            gate=gate_of(source, EXPERIMENT),
-            top=top_of_device(options.device),
-            correlated=options.correlation == "fitted",
-        )
-    except AnalysisError as error:
-        raise DataError("{path:s}: {error}", path=source.data, error=error) from error
+    return fit_spin_down(
+        readings.time,
+        readings.frequency,
+        readings.u if options.reading_u is None else options.reading_u,
+        laws=options.laws or tuple(LAWS),
+        keep_outliers=options.keep_outliers,
+        tilt=options.tilt == "fitted" or (options.tilt == "auto" and not readings.upright),
+        release=readings.release,
+        gate=gate_of(source, EXPERIMENT),
+        top=top_of_device(options.device),
+        correlated=options.correlation == "fitted",
+    )
 
 
 def top_of_device(device: Device | None) -> Top:

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.errors import AnalysisError
 from analysis.numbers import digits
 from analysis.sway import Geometry, Swings, choose_lines, geometric_magnetism, mirrored, swings_of
 from levilab.errors import DataError
@@ -94,7 +93,7 @@ class SwayAnalysis(EachAlone[SwayReadings, SwayRun, SwayOptions]):
 
 
 def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRun:
-    """Find the swings of one input, and what they say.  Raises DataError, which names the file."""
+    """Find the swings of one input, and what they say.  Raises AnalysisError, DataError."""
     readings = source.readings
     spin = np.full(len(readings), options.spin_hz) if options.spin_hz is not None else readings.spin
     if spin is None:
@@ -112,17 +111,14 @@ def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRu
         found = swings_of(readings.time, places, readings.height, rising=sensor is not None)
         return [sensor.corrected(one) for one in found] if sensor else found
 
-    try:
-        swings = look(places)
-        view = mirrored(swings)
-        beside = sensor is not None and not sensor.above  # they see a precession that is one of their own tilt
-        if view if not beside else np.mean([one.split for one in swings]) < 0:
-            swings = look(places.conj())
-        at = np.interp([one.time for one in swings], readings.time, np.abs(spin))
-        swings = choose_lines(swings, at, known)
-        geometry = geometric_magnetism(swings, at, known)
-    except AnalysisError as error:
-        raise DataError("{path:s}: {error}", path=source.data, error=error) from error
+    swings = look(places)
+    view = mirrored(swings)
+    beside = sensor is not None and not sensor.above  # they see a precession that is one of their own tilt
+    if view if not beside else np.mean([one.split for one in swings]) < 0:
+        swings = look(places.conj())
+    at = np.interp([one.time for one in swings], readings.time, np.abs(spin))
+    swings = choose_lines(swings, at, known)
+    geometry = geometric_magnetism(swings, at, known)
     return SwayRun(tuple(swings), at, geometry, False if beside else view, _in_words(geometry), unknown)
 
 

@@ -249,15 +249,13 @@ class VideoAnalysis(EachAlone[FilmReadings, Video, VideoOptions]):
 
 
 def analyze_source(source: Source[FilmReadings], options: VideoOptions) -> Video:
-    """Follow the top in a film and find its spin.  Raises DataError: no top that can be followed."""
+    """Follow the top in a film and find its spin.  Raises AnalysisError: no top that can be followed; DataError."""
     film = source.readings.film
     bar = ShareBar("following the top", line_every=30.0)
     try:
         start, stop = options.start_s or 0.0, np.inf if options.stop_s is None else options.stop_s
         followed = follow(film, start, stop, bar, with_dot=bool(options.stem_m), beside=options.beside)
         return _video(film, options, followed)
-    except AnalysisError as error:
-        raise DataError(Text("{path:s}: {why}", path=film.path, why=error)) from error
     finally:
         bar.close()
 
