@@ -152,7 +152,8 @@ QUEUE = {"an empty error queue": _errors(_report_none), "an error in the queue":
 
 def _operations(driver, of_its_kind):
     """Those of every driver, those of its kind, and asking for each of its settings."""
-    operations = ANY | (QUEUE if driver.raise_errors is ScpiInstrument.raise_errors else {}) | of_its_kind
+    has_queue = driver.HAS_ERROR_QUEUE and driver.raise_errors is ScpiInstrument.raise_errors
+    operations = ANY | (QUEUE if has_queue else {}) | of_its_kind
     found = {f"setting {row.name}": _setting(row.name) for row in driver.declared_settings() if not row.on_demand}
     for row in driver.CHANNEL.declared_settings() if hasattr(driver, "CHANNEL") else ():
         found[f"setting channel1_{row.name}"] = _channel_setting(row.name)
@@ -371,7 +372,8 @@ def hasty_clients():
         mock.patch.object(pyvisa_py.protocols.hislip, "time", SimpleNamespace(sleep=lambda _: None)),
         mock.patch.object(pyvisa_py.tcpip.Vxi11CoreClient, "destroy_link", return_value=0),
         mock.patch.object(serial, "protocol_handler_packages", ["serial.urlhandler", "instruments.virtual.bench"]),
-        mock.patch.multiple(instruments.virtual.servers.hislip, FIRST_WORDS=AT_MOST, SECOND_CHANNEL=AT_MOST),
+        mock.patch.object(instruments.virtual.servers.hislip.clients, "FIRST_WORDS", AT_MOST),
+        mock.patch.object(instruments.virtual.servers.hislip, "SECOND_CHANNEL", AT_MOST),
     ):
         yield
 
