@@ -33,6 +33,7 @@ class ScpiInstrument:
         MODELS: regular expression that the whole model field of ``*IDN?`` must match.
         SERIAL: the factory settings of its serial line; empty where it has none.
         NUMBER: the form in which it prints numbers, where a setting or a question has none of its own.
+        HAS_ERROR_QUEUE: whether it has one.  Without, each setting is asked for after it was sent.
         ANSWERS_JOINED: whether one message may have several questions, and is answered with semicolons between the
             answers (IEEE 488.2, 8.4.1).  One that answers in another way is asked one by one; see `settings`.
         transport: the link.
@@ -46,6 +47,7 @@ class ScpiInstrument:
     MODELS: ClassVar[str] = ".*"
     SERIAL: ClassVar[Mapping[str, Any]] = {}
     NUMBER: ClassVar[Form] = NUMERIC
+    HAS_ERROR_QUEUE: ClassVar[bool] = True
     ANSWERS_JOINED: ClassVar[bool] = False
 
     transport: Transport
@@ -157,12 +159,12 @@ class ScpiInstrument:
         self.raise_errors(message)
 
     def raise_errors(self, after: str) -> None:
-        """Empty the error queue; raise CommandRefused if there was anything in it.
+        """Empty the error queue, if it has one; raise CommandRefused if there was anything in it.
 
         Entries look like ``+0,"No error"`` or, from some makers, ``0,"No error"``.
         """
         entries: list[str] = []
-        for _ in range(_LONGEST_ERROR_QUEUE):
+        for _ in range(_LONGEST_ERROR_QUEUE if self.HAS_ERROR_QUEUE else 0):
             answer = self.transport.query("SYST:ERR?")
             entry = _QUEUE_ENTRY.fullmatch(answer)
             if not entry:
@@ -278,15 +280,14 @@ class ScpiInstrument:
         return answer
 
     def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
-        """Check a setting that was sent, where an instrument has no error queue; by default do nothing.
+        """Ask for a setting that was sent, where the instrument has no error queue.
 
         Raises:
             OutOfRange: it has set another number.
             CommandRefused: it has not taken the setting.
         """
-
-    def ask_back(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
-        """Check that the instrument has taken a setting, for `confirm`."""
+        if self.HAS_ERROR_QUEUE:
+            return
         now = getattr(self, setting.name)
         if not setting.differs(value, now, rounding=self.rounding(setting)):
             return

@@ -67,6 +67,7 @@ class SiglentSDG1000X(drive.DriveGenerator):
 
     MODELS: ClassVar[str] = r"SDG1\d{3}X( Plus)?"
     NUMBER: ClassVar[Form] = _NUMBER
+    HAS_ERROR_QUEUE = False
     OUTPUT: ClassVar[str] = "C1:OUTP"
     BURST = ("NCYC", "EXT", "FALL", "RISE")
     #: The first field of an output's answer, and the switch that it stands for.
@@ -130,16 +131,9 @@ class SiglentSDG1000X(drive.DriveGenerator):
         value = pairs.get(key, answer)
         return self._STATES.get(value, value)
 
-    def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
-        """Ask for it: there is no error queue."""
-        self.ask_back(setting, value)
-
     def forget_errors(self) -> None:
         """Ask for answers with headers; there is no error queue."""
         self.transport.write("CHDR SHORT")
-
-    def raise_errors(self, after: str) -> None:
-        """Do nothing: there is no error queue."""
 
     def _set_burst(self, **burst: Any) -> None:
         """Choose bursts first: before, the instrument takes none of their fields."""

@@ -2,7 +2,7 @@
 
 import struct
 from collections.abc import Iterator, Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +44,7 @@ class _SiglentChannel(Channel):
     """An input of an SDS1000X-E."""
 
     HEAD: ClassVar[str] = "C{}:"
+    HAS_ERROR_QUEUE = False
 
     display = Setting("TRA", bool)
     inverted = Setting("INVS", bool)
@@ -57,10 +58,6 @@ class _SiglentChannel(Channel):
         """Return the text behind the header; a switch as 0 or 1."""
         text = _after_header(answer, self.header_in_use(header))
         return {"ON": "1", "OFF": "0"}.get(text, text)
-
-    def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
-        """Ask for it: there is no error queue."""
-        self.ask_back(setting, value)
 
 
 def _single(value: float) -> float:
@@ -87,6 +84,7 @@ class SiglentSDS1000XE(Scope):
     """
 
     MODELS: ClassVar[str] = r"SDS1\d{3}X-[EU]"
+    HAS_ERROR_QUEUE = False
     CHANNEL = _SiglentChannel
     SOURCE = "C{}"
     STOP = "TRMD STOP"
@@ -129,16 +127,9 @@ class SiglentSDS1000XE(Scope):
             raise ValueError(answer)  # a trigger of another kind
         return rest.removeprefix(f"{key},").partition(",")[0]
 
-    def confirm(self, setting: Setting[Any], value: bool | float | str) -> None:  # noqa: FBT001
-        """Ask for it: there is no error queue."""
-        self.ask_back(setting, value)
-
     def forget_errors(self) -> None:
         """Ask for answers with headers; there is no error queue."""
         self.transport.write("CHDR SHORT")
-
-    def raise_errors(self, after: str) -> None:
-        """Do nothing: there is no error queue."""
 
     # --- preparing ---
 
