@@ -104,6 +104,15 @@ def test_a_serial_line_asks_who_is_there_after_each_new_start(clock):
     assert port.sent == [b"\n", b"*IDN?\n", b"READ?\n"]
 
 
+def test_a_name_that_comes_too_late_is_not_the_answer_to_the_next_question(clock):
+    port = Port(Resynchronising.QUESTION, clock, {b"READ?\n": b"+1.0\n"})
+    one = link(port)
+    with pytest.raises(NoAnswer):
+        one.query("*IDN?")
+    port.answers[b"*IDN?\n"] = 2 * IDENTITY  # the late one, and the one that is asked for before the next message
+    assert [one.query("READ?"), one.query("READ?")] == ["+1.0", "+1.0"]
+
+
 def test_a_line_that_talks_on_without_a_name_is_silent_in_the_end(clock):
     port = Port(Resynchronising.QUESTION, clock, {})
     port.line = lambda _: clock.sleep(0.3) or b"+1.0\n"
