@@ -58,7 +58,7 @@ lint: setup  ## style, types, import rules, and the number of lines
 	$(BIN)/lint-imports --no-cache
 	@$(BIN)/python tests/support/size.py
 
-all-pythons: setup  ## the tests, but slow ones of numbers, against the wheel, on every other Python from 3.11 on that is installed
+all-pythons: setup  ## the tests, but slow ones that are the same on every Python, against the wheel, on each other Python here (3.11 on)
 	@# pyenv shows only the versions that PYENV_VERSION names
 	@if command -v pyenv >/dev/null; then \
 	  PYENV_VERSION="$$(pyenv version-name):$$(pyenv versions --bare | tr '\n' ':')"; export PYENV_VERSION; fi; \

@@ -45,8 +45,12 @@ SLOW = """
     test_browser.py
     test_documentation.py
 """
-#: Rooms whose slow tests are of numbers, which no version of Python changes: the other Pythons leave them out.
-NUMBERS = "analysis levilab/crosscheck levilab/motion levilab/reproduce levilab/simulator levilab/stability"
+#: Rooms of processes, sockets and types, whose slow tests a version of Python may change: `make all-pythons` leaves out
+#: all other slow ones, and .github/workflows/tests.yml carries out every test on each version.
+VERSIONED = """
+    levilab/cli  levilab/live/test_doors.py  levilab/live/test_hostile.py  levilab/live/test_serve.py
+    levilab/notebook  levilab/runs  levilab/sweeps  levilab/workers
+"""
 #: Files with tests of ten seconds and more: they go first of all, so that at the end no worker waits for another's.
 LONGEST = """
     levilab/live/test_practice.py  levilab/live/test_open.py  levilab/reproduce/test_run.py  test_documentation.py
@@ -73,16 +77,16 @@ def pytest_collection():
 def pytest_collection_modifyitems(items):
     """Mark what is slow, and let it go first, the longest before the others."""
     tests = Path(__file__).parent
-    slow, numbers, longest = (
-        [(tests / name).resolve() for name in names.split()] for names in (SLOW, NUMBERS, LONGEST)
+    slow, versioned, longest = (
+        [(tests / name).resolve() for name in names.split()] for names in (SLOW, VERSIONED, LONGEST)
     )
-    assert all(path.exists() for path in slow + numbers + longest), "tests/conftest.py names a file that is gone"
+    assert all(path.exists() for path in slow + versioned + longest), "tests/conftest.py names a file that is gone"
     is_slow = functools.cache(lambda file: any(file.is_relative_to(path) for path in slow))
     for item in items:
         if is_slow(item.path):
             item.add_marker(pytest.mark.slow)
-        if item.get_closest_marker("slow") and any(item.path.is_relative_to(room) for room in numbers):
-            item.add_marker(pytest.mark.numbers)
+        if item.get_closest_marker("slow") and not any(item.path.is_relative_to(room) for room in versioned):
+            item.add_marker(pytest.mark.any_python)
     items.sort(key=lambda item: (item.path not in longest, item.get_closest_marker("slow") is None))
 
 
