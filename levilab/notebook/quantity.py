@@ -23,15 +23,8 @@ from levilab.present.numbers import in_one_line, without_unit
 V = TypeVar("V")
 #: Name in another library (uncertainties, lmfit, pint) → attribute.
 ALSO: Mapping[str, str] = MappingProxyType({
-    "nominal_value": "n",
-    "std_dev": "s",
-    "stderr": "s",
-    "error": "s",
-    "uncertainty": "s",
-    "std": "s",
-    "sigma": "s",
-    "magnitude": "n",
-    "units": "unit",
+    "nominal_value": "n", "magnitude": "n", "units": "unit",
+    **dict.fromkeys(("std_dev", "stderr", "error", "uncertainty", "std", "sigma"), "s"),
 })  # fmt: skip
 #: Name in lmfit → where it stands.
 _INSTEAD = {
@@ -41,6 +34,8 @@ _INSTEAD = {
 }
 #: Functions of numpy that are taken of a quantity, as a number without a unit.
 _FUNCTIONS = frozenset({"sqrt", "exp", "log", "log10", "sin", "cos", "tan"})
+#: A u that a format has rounded to zero.
+_LOST_U = re.compile(r"(?:\+/-|±|\\pm|\d\()\s*0*\.?0+(?![\d.])")
 
 
 def _comparison(compare: Callable[[float, float], bool]) -> Any:
@@ -75,17 +70,17 @@ def _number(operate: Callable[[Any, Any], Any]) -> Any:
 class Quantity(Estimate):
     """A quantity with its standard uncertainty: `value`, `u` (None where not determined), `unit`, and `interval`.
 
-    It prints as value(u); `float` takes its value, a format such as `.3g` or `.1uS` is one of `uncertainties`.  Sums
-    of quantities in one unit, and multiples, are quantities; products and powers are numbers of `uncertainties`
-    without a unit.  In sums and comparisons a number counts in the quantity's unit, and a quantity must have the same
-    one.  Quantities of one fit stay correlated: a quantity less itself is 0 without an uncertainty.  `interval` are the
-    ends of a 68 % interval: as the analysis found it, else the value less and plus u.
+    It prints as value(u); `float` takes its value, a format such as `.3g` or `.1uS` is one of `uncertainties`, with
+    more digits where u would be 0.  Sums of quantities in one unit, and multiples, are quantities; products and powers
+    are numbers of `uncertainties` without a unit.  In sums and comparisons a number counts in the quantity's unit, and
+    a quantity must have the same one.  Quantities of one fit stay correlated: a quantity less itself is 0 without an
+    uncertainty.  `interval` are the ends of a 68 % interval: as the analysis found it, else the value less and plus u.
 
     >>> c = Quantity(0.003262, 2.3e-5, "1/s")
     >>> c, 2 * c, c - c
     (0.003262(23) 1/s, 0.00652(5) 1/s, 0 1/s)
-    >>> print(f"{c:.1uS}", c * c)
-    0.00326(2) 1/s (1.064+/-0.015)e-05
+    >>> print(f"{c:.1uS}", f"{c:.1e}", c * c)
+    0.00326(2) 1/s (3.26+/-0.02)e-03 1/s (1.064+/-0.015)e-05
     >>> print(np.sqrt(c), 2**c, round(c, 4))
     0.05711+/-0.00020 1.002264+/-0.000016 0.0033
     >>> float(c), c.n, c.s
@@ -111,6 +106,8 @@ class Quantity(Estimate):
         if not spec:
             return repr(self)
         number = format(self.to_ufloat() if self.u else float(self), spec if self.u else _of_float(spec))
+        if self.u and _LOST_U.search(number):
+            number = format(self.to_ufloat(), re.sub(r"\.\d+", ".1u", spec))
         return number if self.unit == "1" else f"{number} {self.unit}"
 
     def _repr_latex_(self) -> str:

@@ -53,12 +53,8 @@ _MOST_ROWS, _MOST_INPUTS, _MOST_READINGS = 20, 20, 5
 _ELSEWHERE = "choose another `folder`"
 #: Statistics of a model in a fit report: key in result.json → as people write it.
 _STATISTICS = {
-    "n": "n",
-    "reduced_chi_square": "reduced χ²",
-    "rms_residual": "rms residual",
-    "aicc": "AICc",
-    "weight": "weight",
-}
+    "n": "n", "reduced_chi_square": "reduced χ²", "rms_residual": "rms residual", "aicc": "AICc", "weight": "weight",
+}  # fmt: skip
 
 
 class _Name(str):
@@ -124,6 +120,18 @@ class AnalysisResult(Exportable):
 
     def _elsewhere(self, name: str) -> str:
         return self.values._elsewhere(name)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, AnalysisResult) and self._identity == other._identity
+
+    def __hash__(self) -> int:
+        return hash(self._identity)
+
+    @cached_property
+    def _identity(self) -> tuple[str, ...]:
+        """What two results share that are equal: digests of the inputs, and what was found of them how."""
+        found = [self.document[name] for name in ("settings", "values", "models")]
+        return self.kind, *(source.sha256 for source in self.found.sources), as_json(found)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a pickle holds: the analysis by its name, and the DataFrames' files with their content."""
