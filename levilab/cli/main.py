@@ -4,6 +4,8 @@ import codecs
 import os
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from typing import Annotated, Any, NamedTuple, NoReturn
 
@@ -30,7 +32,7 @@ class Commands(typer.core.TyperGroup):
         elif args in (["version"], ["-v"], ["-V"]):
             args = ["--version"]
         speak_from(args)
-        with importing():
+        with importing(), _explaining():
             return super().make_context(info_name, args, parent, **extra)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
@@ -48,16 +50,8 @@ class Commands(typer.core.TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Carry out what was called."""
         try:
-            return super().invoke(ctx)
-        except _WRONG_WORDS as error:
-            if isinstance(error, typer.BadParameter):
-                from levilab.settings import own_words  # with pydantic
-
-                errors: Any = getattr(error.__context__, "errors", list)() or [{}]
-                error.message = explain_bad_value(error.message, errors[0].get("input"), own_words(errors[0]))
-            if error.ctx and isinstance(said := _as_text(error.format_message(), error.message), Text):
-                error.ctx.fail(in_language(said))
-            raise
+            with _explaining():
+                return super().invoke(ctx)
         except KeyboardInterrupt:  # what can be lost is said by the command itself
             message("levilab: interrupted")
             raise typer.Exit(exit_codes.INTERRUPTED) from None
@@ -83,7 +77,33 @@ _TEMPLATES = (
     "No such option: {name:s}",
     "Invalid value for {name:s}: {value:s} is not one of {choices:s}.",
     "Invalid value for {name:s}: {what}",
+    "Option {name:s} requires an argument.",
+    "Missing argument {name:s}.",
+    "Got unexpected extra argument(s) ({name:s})",
 )
+
+
+@contextmanager
+def _explaining() -> Iterator[None]:
+    """Say what is wrong with the words on the command line, and typer's words about it, in the person's language."""
+    try:
+        yield
+    except _WRONG_WORDS as error:
+        from typer import rich_utils
+
+        if isinstance(error, typer.BadParameter):
+            from levilab.settings import own_words  # with pydantic
+
+            errors: Any = getattr(error.__context__, "errors", list)() or [{}]
+            error.message = explain_bad_value(error.message, errors[0].get("input"), own_words(errors[0]))
+        rich_utils.RICH_HELP = in_language("Try [blue]'{command_path} {help_option}'[/] for help.")
+        rich_utils.ERRORS_PANEL_TITLE = in_language("Error")
+        if error.ctx:
+            usage = error.ctx.get_usage().replace("Usage", in_language("Usage"), 1)
+            error.ctx.get_usage = lambda: usage
+        if isinstance(said := _as_text(error.format_message(), error.message), Text):
+            raise _WRONG_WORDS(in_language(said), error.ctx) from None
+        raise
 
 
 def _as_text(message: str, what: str = "") -> str:

@@ -255,7 +255,8 @@ class Pages:
         asked = request.query_params.get("language")
         known = [code for code in (asked, request.cookies.get(_COOKIE)) if code in languages()]
         code = known[0] if known else self.hall.language
-        answer = HTMLResponse(page_in(self.files[name].read_text("utf-8"), code), headers=self.doors.headers())
+        page, result = (self.files[one].read_text("utf-8") for one in (name, "result.html"))
+        answer = HTMLResponse(page_in(page.replace("<!--result-->", result), code), headers=self.doors.headers())
         if code == asked:
             answer.set_cookie(_COOKIE, code, _KEPT_S, samesite="strict", httponly=True)
         return answer

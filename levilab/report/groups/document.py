@@ -29,8 +29,7 @@ from levilab.present.document.blocks import (
 )
 from levilab.present.numbers import column, enumeration, how_many, plain, with_sign, without_unit
 from levilab.present.tables import Row, table
-from levilab.report.document import banner_of, count_inputs
-from levilab.report.groups.beside import (
+from levilab.report.beside import (
     FAR,
     GOOD,
     LOOK,
@@ -44,6 +43,7 @@ from levilab.report.groups.beside import (
     statistics_of_agreement,
     verdict,
 )
+from levilab.report.document import banner_of, count_inputs
 from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, write_content, writing_report
 from levilab.report.reproduction import Heading, language_option

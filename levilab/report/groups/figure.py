@@ -11,7 +11,7 @@ from levilab.present.drawing import SMALL, headline, in_mathtext, panel, synthet
 from levilab.present.looks import BLUE, GREEN, VERMILION
 from levilab.present.style import STYLE, WIDE, label_of_run
 from levilab.present.units import unit
-from levilab.report.groups.beside import Class, Compared, Group, finding
+from levilab.report.beside import Class, Compared, Group, finding
 from levilab.texts.text import in_language
 
 #: Left edge of the panels, their right edge, from panel to panel, above them, below them, and a group's row [inch].

@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from levilab.present.units import name_with_unit
-from levilab.report.groups.beside import REPEAT, Class
+from levilab.report.beside import REPEAT, Class
 from levilab.texts.text import in_language
 
 Cell = str | float | int | None

@@ -25,7 +25,7 @@ from levilab.present.document.blocks import (
 from levilab.present.numbers import column, how_many
 from levilab.present.progress import Display
 from levilab.present.tables import table
-from levilab.report.groups.beside import Class, class_of
+from levilab.report.beside import Class, class_of
 from levilab.report.groups.document import truth_text
 from levilab.report.page import FORMATS
 from levilab.report.worksheets.sheets import SHEETS, TOPS, Sheet
@@ -123,7 +123,7 @@ def key(sheet: Sheet, language: Language, seeds: Mapping[str, int], found: Class
         banner=Banner("SYNTHETIC.", f"{words['numbers']} {words['synthetic']}"),
         blocks=(
             Section(words["answers"], tuple(answers)),
-            Section(words["numbers"], tuple(_numbers(sheet, language, seeds, found))),
+            Section(words["numbers"], (Paragraph(words["whose"]), *_numbers(sheet, language, seeds, found))),
         ),
         language=language.code,
     )

@@ -276,17 +276,17 @@ def test_what_other_programs_call_a_command_or_an_option_is_told_ours(typed, say
         ("analyze spindwn", "Den Befehl 'spindwn' gibt es nicht. Meintest du 'spindown', 'spin'?"),
         ("fit my.csv", "Den Befehl 'fit' gibt es nicht: Nimm levilab analyze my.csv"),
         ("my.csv", "my.csv ist eine Datei oder ein Ordner und kein Befehl: Nimm levilab analyze my.csv"),
-        ("runs --nonsense", "Die Option --nonsense gibt es nicht"),
+        ("runs --nonsense", "Die Option --nonsense gibt es nicht"), ("runs", "runs: diesen Ordner gibt es nicht"),
+        ("--nonsense", "Aufruf: levilab [OPTIONS] COMMAND [ARGS]... Hilfe: 'levilab -h' ╭─ Fehler"),
+        ("report --title", "Die Option '--title' braucht einen Wert."),
         ("analyze spin my.csv --method matchd", "Falscher Wert für '--method': 'matchd' ist keins von 'auto'"),
-        ("simulate", "SCENE: fehlt: eine von undriven"),
-        ("worksheet", "EXPERIMENT: einige von spin"),
+        ("simulate", "SCENE: fehlt: eine von undriven"), ("worksheet", "EXPERIMENT: einige von spin"),
         ("report", "hier gibt es keinen Ordner runs, und kein anderer Pfad ist angegeben"),
-        ("runs", "runs: diesen Ordner gibt es nicht"),
         ("analyze spindown my.csv", "rpm …), es gibt 'Foo', 'Bar': --columns \"t=NAME,f=NAME\" angeben"),
         ("analyze spindown half.csv", "es gibt 't [s]', 'x': --columns f=NAME angeben"),
         ("open my.csv --no-browser", "my.csv: wird erst gelesen, wenn die Frage mit --columns beantwortet ist"),
     ],
-)
+)  # fmt: skip
 def test_the_commonest_mistakes_are_answered_in_german(typed, says, tmp_path, monkeypatch):
     monkeypatch.setenv("LEVILAB_LANGUAGE", "de")
     for name, titles in (("my.csv", "Foo,Bar"), ("half.csv", "t [s],x")):

@@ -132,9 +132,9 @@ def change_what_if(page):
     assert page.locator("#quantities input").count() == len(WHAT_IF)
     page.evaluate(f"{slider}.value = 0.22, {slider}.dispatchEvent(new Event('input'))")
     until(page, "levilab.data.bench.what_if.washers_g === 0.22")
-    page.evaluate("document.getElementById('usual').click()")
-    until(page, f"levilab.data.bench.what_if.washers_g === 0.2 && {slider}.value === '0.2'")
     ask_which_washers(page)
+    page.click("#usual")
+    until(page, f"levilab.data.bench.what_if.washers_g === 0.2 && {slider}.value === '0.2'")
     page.get_by_role("tab", name="Measure").press("ArrowLeft")  # the last one
     page.get_by_role("button", name="Hold it for three minutes").click()
     until(page, "document.getElementById('guide').hidden && !levilab.data.bench.drive.output")  # each begins without it
@@ -161,8 +161,6 @@ def ask_which_washers(page):
     best = 1e3 * sum(advise(owner, 20.0).best.washers_kg)
     until(page, f"Math.abs(levilab.data.bench.what_if.washers_g - {best}) < 1e-6")
     page.hover("#field-value")  # the lowest of the readings: nothing lies over it
-    page.click("#usual")
-    until(page, "levilab.data.bench.what_if.washers_g === 0.2")
 
 
 #: Another top is drawn while the motion stands still and its poses, a tenth of a millimetre apart, have begun anew.

@@ -16,9 +16,10 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.crosscheck.truth import Truth
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.report.groups.beside import DIFFER, GOOD, REPEAT, _quantity, _width, class_of, finding, verdict
+from levilab.report.beside import DIFFER, GOOD, REPEAT, _quantity, _width, class_of, finding, verdict
 from levilab.report.groups.document import write_class
 from levilab.report.groups.figure import class_figure
+from levilab.report.page import render
 from levilab.runs.find import RECORD
 from levilab.world.spin_world import SpinScene, random_scene
 from support.acquisitions import RAISED_QUICKLY, Silent
@@ -165,7 +166,8 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
     assert {group.source.name: one.word for group, one in zip(of.groups, of.marks, strict=True)} == {
         HOSTILE: GOOD, "Group 2": REPEAT, "Group 10": GOOD,
     }  # fmt: skip
-    assert verdict(of).startswith("2 of 3 results are good. To repeat: Group 2.")
+    assert verdict(of).startswith(whose := "2 of 3 results are good. To repeat: Group 2.")
+    assert whose in Page(render([(of.analysis, of.found)])).text  # of levilab report, too
     assert of.quantities[0].used == tuple(group.source.name != "Group 2" for group in of.groups)
     assert of.quantities[0].mean.value == pytest.approx(2.4e-4, rel=0.03)  # the halved spins have 3.3e-4
     assert [line.get_marker() for axes in class_figure(of).axes for line in axes.lines].count(">") == 1

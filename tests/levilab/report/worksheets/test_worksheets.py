@@ -9,7 +9,7 @@ import pytest
 
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.report.groups.beside import class_of
+from levilab.report.beside import class_of
 from levilab.report.worksheets.document import key as key_of
 from levilab.report.worksheets.document import measure, read_language, write_worksheets
 from levilab.report.worksheets.sheets import SHEETS, TOPS

@@ -314,7 +314,7 @@ def count_readings(group: Group) -> int:
     return int(group.statistics.get("n") or len(group.source.readings))
 
 
-def _count_marks(of: Class) -> str:
+def count_marks(of: Class) -> str:
     """Return how many groups have a good result, and which others have not."""
     named: dict[str, list[str]] = {GOOD: [], LOOK: [], REPEAT: []}
     for group, one in zip(of.groups, of.marks, strict=True):
@@ -353,7 +353,7 @@ def verdict(of: Class) -> str:
         Text("{mean} is the mean of {groups}{truth}.", _mean(one), _count(of, one), _beside_truth(one))
         for one in of.quantities
     ]
-    return Sentences(_count_marks(of), *_scenes(of), *texts)
+    return Sentences(count_marks(of), *_scenes(of), *texts)
 
 
 def _beside_truth(of: Compared) -> str:
