@@ -7,6 +7,7 @@ from levilab.errors import UsageError
 from levilab.formats.typed import read_mass, read_masses, read_temperature
 from levilab.pipelines.tune.advice import advise
 from levilab.pipelines.tune.owner import Owner, washers_text
+from levilab.texts.text import in_language
 
 #: Trials that are taken at most.
 _MOST_TRIALS = 100
@@ -16,25 +17,24 @@ def advice_on(wanted: Mapping[str, Any]) -> dict[str, Any]:
     """Return the next step, as data.
 
     Args:
-        wanted: top, washers and temperature, and trials, a list: each as it is typed.
+        wanted: top, washers and temperature, and trials, a list: each as it is typed; and the language.
 
     Raises:
         UsageError: one of them is no mass, temperature or trial.
     """
     trials = wanted.get("trials")
     try:
-        owner = Owner(read_mass(str(wanted.get("top", ""))))
-        owner = owner.with_washers(read_masses(str(wanted.get("washers", ""))))
+        owner = Owner(read_mass(str(wanted.get("top", "")))).with_washers(read_masses(str(wanted.get("washers", ""))))
         for text in trials[:_MOST_TRIALS] if isinstance(trials, list) else ():
             owner = owner.with_trial(str(text))
         found = advise(owner, read_temperature(str(wanted.get("temperature", ""))))
     except ValueError as error:
         raise UsageError("washers", str(error)) from error
+    texts, code = (found.text, found.why, found.window, *found.warnings), wanted.get("language")
+    said = [in_language(text, code) for text in texts]
     return {
-        "text": found.text,
-        "why": found.why,
-        "window": found.window,
-        "notes": [str(note) for note in found.warnings],
+        "text": said[0],
+        "why": " ".join(said[1:]),
         "washers": washers_text(found.best.washers_kg),
         "washers_g": round(1e3 * sum(found.best.washers_kg), 6),
     }

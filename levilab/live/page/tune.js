@@ -19,9 +19,9 @@ export function openTune(token) {
     }
     advice = {...found, trials: trials.length};
     write("tune-text", found.text);
-    write("tune-why", [found.why, found.window, ...found.notes].join(" "));
+    write("tune-why", found.why);
     put(by("tune-did"), {hidden: false});
-    by("tune-trials").replaceChildren(...trials.map((text) => make("li", text)));
+    by("tune-trials").replaceChildren(...trials.map((text) => make("li", text.replace(/[a-z]+$/, (name) => document.querySelector(`#tune-did [value=${name}]`).textContent))));
   }
 
   by("tune-ask").addEventListener("click", advise);
