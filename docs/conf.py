@@ -21,6 +21,7 @@ extensions = [
     "building.docstrings",
     "building.mathml",
     "building.outside_pages",
+    "building.wrapping",
 ]
 exclude_patterns = ["building"]
 

@@ -7,6 +7,7 @@ from building.commands import MADE, PAGES, checks, columns, fit, observables, ov
 from building.docstrings import as_markup
 from building.outside_pages import lead_to_site
 from building.requests import loaded_from_elsewhere
+from building.wrapping import keep_options_whole
 from levilab.cli.main import app
 from levilab.pipelines.catalogue import ANALYSES
 from support.paths import DOCS
@@ -51,14 +52,8 @@ def test_links_that_leave_the_pages_lead_to_the_site(page, written, led):
 
 
 def test_an_indented_block_of_a_docstring_is_code_and_doctests_stay():
-    assert as_markup(["As:", "", "    run()", "As:", "", "    >>> 1"]) == [
-        "As::",
-        "",
-        "    run()",
-        "As:",
-        "",
-        "    >>> 1",
-    ]
+    lines = ["", "    run()", "As:", "", "    >>> 1"]
+    assert as_markup(["As:", *lines]) == ["As::", *lines]
     assert as_markup(["of `Error`s"]) == ["of `Error`\\ s"]
 
 
@@ -74,9 +69,10 @@ def test_what_a_page_loads_from_elsewhere_is_found(tmp_path, name, text, found):
 
 
 def test_a_command_that_is_wider_than_the_page_goes_on_below(page):
-    page.set_content(f"<pre>$ levilab sweep {'--sweep start.spin_hz=18:90:145 ' * 9}</pre>")
+    page.set_content(keep_options_whole(f"<pre>$ levilab sweep {'--no-open start.spin_hz=18:90:145 ' * 9}</pre>"))
     page.add_style_tag(path=DOCS / "building/style/site.css")
     assert page.evaluate("document.documentElement.scrollWidth - innerWidth") == 0
+    assert page.evaluate("[...document.querySelectorAll('span')].map((one) => one.getClientRects().length)") == [1] * 9
 
 
 def test_the_search_ranks_pages_of_users_before_those_of_developers(page):
