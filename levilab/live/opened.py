@@ -18,7 +18,7 @@ from levilab.formats.understanding import understand
 from levilab.pipelines.correction import ENDING, read_correction, read_file_options, write_correction
 from levilab.pipelines.look import Look, look_as_kept, look_at
 from levilab.pipelines.options import read_options
-from levilab.texts.text import Text
+from levilab.texts.text import Text, text_of
 
 #: The largest file that is taken in [bytes]: an hour of sound, two million rows of an oscilloscope.
 MOST_BYTES = 400 << 20
@@ -166,7 +166,7 @@ class Opened:
         try:
             used, look = {**read_correction(one.path), **one.options}, look_as_kept(one.path, one.options)
         except LevilabError as error:
-            used, look, problem = one.options, look_at(one.path, one.options), {"problem": str(error)}
+            used, look, problem = one.options, look_at(one.path, one.options), {"problem": text_of(error)}
         size = _size_of_film(one.path)
         if size and one.rim_mm is not None:
             look, problem = Look(one.path, size, ()), {}

@@ -33,7 +33,7 @@ from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
 from levilab.live.opened import Opened
 from levilab.live.tuning import advice_on
 from levilab.live.watch import Watch
-from levilab.live.words import page_in
+from levilab.live.words import data_in, page_in
 from levilab.pipelines.look import QUANTITIES, name_of
 from levilab.pipelines.result import beside
 from levilab.runs.find import RECORD
@@ -341,7 +341,7 @@ class Pages:
         answer, status = await _carry_out(self.hall, request.headers.get("x-levilab-token"), body, language)
         if error := answer.get("error"):
             answer["error"] = unquote_names(in_language(error, language))
-        return self._json(answer, status)
+        return self._json(data_in(language, answer), status)
 
     async def frames(self, socket: WebSocket) -> None:
         """Send a frame for each question, FRAMES_PER_S at most, until the page goes.

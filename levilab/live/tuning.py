@@ -7,7 +7,7 @@ from levilab.errors import UsageError
 from levilab.formats.typed import read_mass, read_masses, read_temperature
 from levilab.pipelines.tune.advice import advise
 from levilab.pipelines.tune.owner import Owner, washers_text
-from levilab.texts.text import in_language
+from levilab.texts.text import Sentences
 
 #: Trials that are taken at most.
 _MOST_TRIALS = 100
@@ -17,7 +17,7 @@ def advice_on(wanted: Mapping[str, Any]) -> dict[str, Any]:
     """Return the next step, as data.
 
     Args:
-        wanted: top, washers and temperature, and trials, a list: each as it is typed; and the language.
+        wanted: top, washers and temperature, and trials, a list: each as it is typed.
 
     Raises:
         UsageError: one of them is no mass, temperature or trial.
@@ -30,11 +30,9 @@ def advice_on(wanted: Mapping[str, Any]) -> dict[str, Any]:
         found = advise(owner, read_temperature(str(wanted.get("temperature", ""))))
     except ValueError as error:
         raise UsageError("washers", str(error)) from error
-    texts, code = (found.text, found.why, found.window, *found.warnings), wanted.get("language")
-    said = [in_language(text, code) for text in texts]
     return {
-        "text": said[0],
-        "why": " ".join(said[1:]),
+        "text": found.text,
+        "why": Sentences(found.why, found.window, *found.warnings),
         "washers": washers_text(found.best.washers_kg),
         "washers_g": round(1e3 * sum(found.best.washers_kg), 6),
     }

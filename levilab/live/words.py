@@ -5,8 +5,9 @@ import re
 from collections.abc import Callable
 from functools import cache
 from html import escape, unescape
+from typing import Any
 
-from levilab.texts.text import in_language, language_of, languages
+from levilab.texts.text import Text, in_language, language_of, languages
 
 #: What a person sees or hears of HTML: text between elements, and these attributes.
 _SAID = re.compile(r'(>\s*)([^<>\s{][^<>]*?)(?=\s*<)|(\b(?:title|aria-label|placeholder|data-drop)=")([^"]+)(?=")')
@@ -20,6 +21,15 @@ def change_texts(html: str, change: Callable[[str], str]) -> str:
         return before + escape(change(unescape(text)))
 
     return _SAID.sub(replace, html)
+
+
+def data_in(code: str, data: Any) -> Any:
+    """Return plain data with each text of them in a language."""
+    if isinstance(data, dict):
+        return {key: data_in(code, one) for key, one in data.items()}
+    if isinstance(data, list | tuple):
+        return [data_in(code, one) for one in data]
+    return in_language(data, code) if isinstance(data, Text) else data
 
 
 @cache

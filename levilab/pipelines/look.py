@@ -24,6 +24,7 @@ from levilab.pipelines.limit import readings as limit
 from levilab.pipelines.precession import readings as precession
 from levilab.pipelines.spin import magnetometer
 from levilab.pipelines.spindown import readings as spindown
+from levilab.texts.text import Text, text_of
 
 #: Quantities that a column may hold, as text, and the units to choose from.
 QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType({
@@ -122,11 +123,11 @@ def look_at(path: Path, options: Mapping[str, Any], *, plots: bool = True) -> Lo
         return _look_at_table(path, columns, plots=plots)
     except LevilabError as error:
         look = _look_at_table(path, columns, plots=plots)
-        return look if not look.problem else Look(path, "", look.runs, str(error))
+        return look if not look.problem else Look(path, "", look.runs, text_of(error))
     try:
         return _look_at_record(path, record, options.get("channel"))
     except LevilabError as error:
-        return Look(path, record.format, (), str(error))
+        return Look(path, record.format, (), text_of(error))
 
 
 def look_as_kept(path: Path, options: Mapping[str, Any], *, plots: bool = True) -> Look:
@@ -153,7 +154,7 @@ def _look_at_table(path: Path, columns: Mapping[str, str] | None, *, plots: bool
     seen = [(wanted, understand(path, columns=columns, quantities=wanted[0], needed=wanted[1])) for wanted in _TABLES]
     wanted, found = next(((wanted, one) for wanted, one in seen if not one.problem), (_SPIN_DOWN, seen[2][1]))
     if found.problem:
-        return Look(path, "a table", _with_known_columns(path, found.runs, columns), found.problem)
+        return Look(path, Text("a table"), _with_known_columns(path, found.runs, columns), found.problem)
     if not plots:
         return Look(path, _count_tables(found.runs), found.runs)
     drawn = {k: plot for k, run in enumerate(found.runs) if (plot := _plot_of_table(run, columns, wanted))}
@@ -161,7 +162,7 @@ def _look_at_table(path: Path, columns: Mapping[str, str] | None, *, plots: bool
 
 
 def _count_tables(runs: Sequence[UnderstoodRun]) -> str:
-    return "a table" if len(runs) == 1 else f"{len(runs)} tables"
+    return Text("a table") if len(runs) == 1 else Text("{n} tables", n=len(runs))
 
 
 def _with_known_columns(
@@ -204,7 +205,8 @@ def _look_at_record(path: Path, record: Waveform | PulseTimes, channel: str | No
         turns = np.diff(record.times[: _POINTS + 1])
         plot = Plot(tuple(record.times[1 : len(turns) + 1].tolist()), tuple((1 / turns).tolist()),
                     ("time", "s"), ("1 / time between pulses", "Hz"))  # fmt: skip
-        return Look(path, f"{len(record.times)} times of pulses ({record.format})", (run,), plots={0: plot})
+        holds = Text("{n} times of pulses ({format:s})", n=len(record.times), format=record.format)
+        return Look(path, holds, (run,), plots={0: plot})
     chosen = record.signal(channel)
     columns: list[UnderstoodColumn] = []
     plots: dict[int, Plot] = {}
@@ -218,6 +220,7 @@ def _look_at_record(path: Path, record: Waveform | PulseTimes, channel: str | No
             axes = (("time", "s"), (signal.name, signal.unit))
             plots[0] = Plot(tuple(times.tolist()), tuple(first.tolist()), *axes)
     run = UnderstoodRun(path, "", 0, tuple(columns), warnings=record.warnings)
-    holds = f"{record.format}: {digits(record.duration, 3)} s, {digits(record.rate, 6)} samples a second"
+    rate, said = digits(record.rate, 6), "{format:s}: {seconds:n} s, {rate:n} samples a second"
+    holds = Text(said, format=record.format, seconds=digits(record.duration, 3), rate=rate)
     names = tuple(signal.name for signal in record.signals)
     return Look(path, holds, (run,), channels=names, rate=record.rate, plots=plots)

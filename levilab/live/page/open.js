@@ -147,7 +147,7 @@ function runOf(run, number) {
 
 function rowOf(column, run) {
   const row = make("tr", "", column.quantity ? "used" : ""), title = column.title || phrase("column {number}", {number: column.index + 1});
-  const cells = [Object.assign(make("th", title), {scope: "row"}), make("td"), make("td"), make("td", column.values.join("  "), "values")];
+  const cells = [Object.assign(make("th", title), {scope: "row"}), make("td"), make("td"), make("td", column.values.map((text) => /\.\d{9,}$/.test(text) ? String(Number(Number(text).toPrecision(9))) : text).join("  "), "values")];
   if (look.channels.length || !quantities[column.quantity || "time_s"]) {
     cells[1].textContent = column.quantity ? phrase("{quantity}, is analyzed", {quantity: column.quantity}) : phrase("not used");
     cells[2].textContent = column.unit;
@@ -239,6 +239,6 @@ function draw(number) {
     x: Float64Array.from(plot.x), low: values, high: values, u: null, fit: null, single: true, xAxis: [...plot.x_axis, 1], yAxis: [...plot.y_axis, 1],
   }, -1);
 }
-addEventListener("resize", () => look?.runs.forEach((_, k) => draw(k)));
+new ResizeObserver(() => look?.runs.forEach((_, k) => draw(k))).observe(by("runs"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => look?.runs.forEach((_, k) => draw(k)));
 begin();

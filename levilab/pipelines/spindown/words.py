@@ -413,7 +413,7 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyT
             if of.values[1]
             else "{n:.0f} readings are too few to compare {laws} by AICc: record more readings",
             n=of.values[0],
-            laws=of.name,
+            laws=law_names(filter(None, of.name.split(", "))),
         ),
         "correlated": lambda of: Text(
             "neighbouring residuals resemble each other: their correlation is {r:.2f} ± {u:.2f}, so {n:.0f} readings "

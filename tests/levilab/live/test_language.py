@@ -9,6 +9,7 @@ import pytest
 
 from levilab.live.desk import Desk
 from levilab.live.tuning import advice_on
+from levilab.live.words import data_in
 from levilab.telemetry.messages import Drive, Record, State
 from levilab.texts import text
 from levilab.texts.text import Text
@@ -127,8 +128,8 @@ def test_a_page_in_german_stays_german_and_nothing_is_cut(viewport, hall, watche
 
 
 def test_the_server_answers_in_the_language_of_the_page_that_asks(hall):
-    asked = {"top": "24.1", "washers": "0.4", "temperature": "20", "language": "de"}
-    assert advice_on(asked)["text"].startswith("Nimm keine Scheiben: Der Kreisel wiegt dann 24,1 g und schwebt mit")
+    said = data_in("de", advice_on({"top": "24.1", "washers": "0.4", "temperature": "20"}))["text"]
+    assert said.startswith("Nimm keine Scheiben: Der Kreisel wiegt dann 24,1 g und schwebt mit")
     head = {"Content-Type": "application/json"}
     said = [request(address(hall), f"/do?language={code}", b"{}", headers=head)[1] for code in ("en", "de", "zz")]
     english, german, other = (json.loads(one)["error"] for one in said)
