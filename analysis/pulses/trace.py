@@ -1,11 +1,9 @@
 """Spin frequency from a trace of the detector's signal."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,9 +20,7 @@ from analysis.pulses.regression import Fit, Grid, fit_turns, median, student
 from analysis.pulses.result import Finding, Method, SpinFrequency
 from analysis.pulses.search import Events, find_events, shorten
 from analysis.pulses.times import FEWEST, Train, check_times, findings_of_fit, fit_train
-
-if TYPE_CHECKING:
-    from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate
 
 Choice = Literal["auto", "edges", "matched", "likelihood"]
 

@@ -1,9 +1,5 @@
 """Traps: half and double the frequency, and the mains."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from analysis.arrays import Array
@@ -11,10 +7,7 @@ from analysis.pulses.clean import MAINS
 from analysis.pulses.matched import COARSE, Match
 from analysis.pulses.regression import student
 from analysis.pulses.result import Finding
-
-if TYPE_CHECKING:
-    from analysis.uncertainty import Estimate
-
+from analysis.uncertainty import Estimate
 
 #: Every second pulse differs where the means of both halves are this number of standard errors apart (with few pulses
 #: the quantile of Student's t of the same probability) ...

@@ -4,19 +4,14 @@ Times that jitter tell them from each other, since only the right one keeps its 
 a spin falls, a fold of it rises.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.rotation.line import LineFit, fit_line
-
-if TYPE_CHECKING:
-    from analysis.arrays import Array
-    from analysis.rotation.record import Record
+from analysis.rotation.record import Record
 
 #: A free spin falls.  One record in a hundred rises, since a drive speeds the top up.
 RISING = 0.01

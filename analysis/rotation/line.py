@@ -4,17 +4,12 @@ Amplitudes are eliminated in closed form; frequency and slope are those of great
 greatest of a search).  Noise is white, of its own variance in each axis.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.rotation.record import PRIOR, Record
-
-if TYPE_CHECKING:
-    from analysis.arrays import Array
 
 #: A drag in proportion to the n-th power of the spin changes its slope by n slope²/frequency a second.  n is evenly
 #: distributed from 1 to 2: its standard deviation is 1/√12.

@@ -1,26 +1,19 @@
 """Estimate the spin from a record of 1 to 3 components of the magnetic field."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from analysis.arrays import Array
 from analysis.rotation.errors import NoLine
 from analysis.rotation.folds import Evidence, Weighed, evidence_of, images_between, weigh
 from analysis.rotation.line import LineFit, fit_line
 from analysis.rotation.record import MAINS_HZ, Line, Record, read_samples
 from analysis.rotation.result import FieldSpin, Fold, Kind
 from analysis.rotation.search import HIGHEST, LOWEST, other_lines, search
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from numpy.typing import ArrayLike
-
-    from analysis.arrays import Array
 
 #: A line that is named may lie this part of the given frequency beside it.
 NEAR = 0.1

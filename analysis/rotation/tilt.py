@@ -1,14 +1,9 @@
 """The transverse part of a top's moment, from the amplitude that it has at a distance."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
 
+from analysis.rotation.result import FieldSpin
 from analysis.uncertainty import Estimate
-
-if TYPE_CHECKING:
-    from analysis.rotation.result import FieldSpin
 
 #: μ₀/4π [T m/A].
 _MU_0_OVER_4_PI = 1e-7

@@ -1,27 +1,21 @@
 """A long record of a magnetometer in windows: frequency against time, with the line followed as it slows."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from analysis.arrays import Array
 from analysis.errors import AnalysisError
 from analysis.rotation.errors import NoLine
 from analysis.rotation.folds import Evidence, evidence_of, images_between, weigh
 from analysis.rotation.line import UNDER_DRAG, LineFit, fit_line
 from analysis.rotation.record import FEWEST, Line, Record, deviation, read_samples
+from analysis.rotation.result import FieldSpin, Kind
 from analysis.rotation.search import other_lines, refine
 from analysis.rotation.spin import LEAST_GAIN, limits_near, result_of, strongest
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike
-
-    from analysis.arrays import Array
-    from analysis.rotation.result import FieldSpin, Kind
 
 #: Length of a window [s], unless given.  A free top at 30 Hz loses 1 Hz meanwhile, evenly to 1 %.
 WINDOW_S = 10.0

@@ -9,26 +9,20 @@ base's field predicts Ω_g: B′/2B at the height at which α₀ is as seen.  It
 Source: Berry, Proc. R. Soc. A 452, 1207 (1996).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.arrays import Array
 from analysis.errors import ShapesDiffer, TooFewReadings
 from analysis.sway.joint import Corrections, Joint, fit_together
+from analysis.sway.known import Known
 from analysis.sway.lines import Swings
 from analysis.sway.orbit import NoSwing, slow_swings, small_swings
 from analysis.sway.vertical import vertical_swing
 from analysis.uncertainty import Estimate, partly_believed, propagate
-
-if TYPE_CHECKING:
-    from analysis.sway.known import Known
-
 
 #: The shift at finite amplitude is known to this part of it: it is computed without a vertical swing of its own.
 SHIFT_U = 0.035

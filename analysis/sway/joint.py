@@ -5,24 +5,17 @@ carries the weight.  The slow swings have the angular momentum ρ I₃ω₃: ρ 
 a split.  The precession has I₃ω₃.  The error of a correction is a parameter, or part of u of the split.
 """
 
-from __future__ import annotations
-
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.arrays import Array
 from analysis.stability import SymmetricTop, modes
+from analysis.sway.known import Known
+from analysis.sway.lines import Swings
 from analysis.uncertainty import Estimate, partly_believed
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from analysis.sway.known import Known
-    from analysis.sway.lines import Swings
-
 
 #: Rounds in which a slow root is computed from itself; each gains a digit.
 _ROUNDS = 12

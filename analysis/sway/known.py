@@ -1,24 +1,18 @@
 """What is known of a top and of the base above which it sways."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.arrays import Array
 from analysis.field.errors import ImpossibleRing
 from analysis.field.magnet import Disc, axial_field, stiffnesses
+from analysis.field.ring import Ring
 from analysis.stability import AxialField, SymmetricTop, windows
+from analysis.sway.lines import Swings
 from analysis.sway.orbit import NoSwing, small_swings
-
-if TYPE_CHECKING:
-    from analysis.field.ring import Ring
-    from analysis.sway.lines import Swings
-
 
 #: Tops float between these heights above the upper face, in outer radii.
 _FLOATING = (0.05, 4.0)

@@ -8,20 +8,14 @@ is no right one, make of each line an image of the other sign: s + ε s*, with o
 shows: lines of which none is the other's image have no mean of s².
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.arrays import Array
-from analysis.sway.lines import PRECESSION_HZ, SLOW_HZ
+from analysis.sway.lines import PRECESSION_HZ, SLOW_HZ, Swings
 from analysis.sway.vertical import GRADIENT_PER_M, Places
-
-if TYPE_CHECKING:
-    from analysis.sway.lines import Swings
 
 _MU0_4PI = 1e-7  # [T m/A]
 #: Samples at either end that the filter's edge spoils.

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from analysis.arrays import Array
 from levilab.simulator.kernels.motion import ARM, TIME, N
@@ -177,6 +178,4 @@ def turn_rate(motion: Trajectory) -> float:
 
 def matrices(turns: Array) -> Array:
     """Return quaternions, shape (n, 4), as matrices, shape (n, 3, 3)."""
-    from scipy.spatial.transform import Rotation  # takes a moment to load
-
     return np.asarray(Rotation.from_quat(turns).as_matrix())

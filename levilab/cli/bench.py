@@ -1,5 +1,6 @@
 """The commands of the bench.  Heavy imports happen where they are needed."""
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -47,8 +48,6 @@ def bench_init(
         refuse_to_overwrite(out)
     found = search(library, addresses or [], message)
     if as_json:
-        from dataclasses import asdict
-
         print_json({"found": [asdict(one) for one in found], "file": str(out)}, indent=None)
     else:
         _print_found(found)
@@ -104,8 +103,6 @@ def bench_check(
         if not as_json:
             _print_checked(one)
     if as_json:
-        from dataclasses import asdict
-
         print_json({"instruments": [asdict(one) for one in checked]}, indent=None)
     if any(one.trouble for one in checked):
         raise typer.Exit(exit_codes.INSTRUMENT)

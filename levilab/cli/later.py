@@ -1,7 +1,9 @@
 """Commands that are made when they are called: a start need not read the options of those that it does not call."""
 
 import re
+from difflib import get_close_matches
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -102,9 +104,6 @@ class NamedLast(typer.core.TyperGroup):
 
     def _is_misspelt(self, word: str) -> bool:
         """Return whether a word is similar to the name of a command, and no path."""
-        from difflib import get_close_matches  # not for every help
-        from pathlib import Path
-
         return bool(get_close_matches(word, self.commands)) and not Path(word).exists()
 
 
@@ -127,8 +126,6 @@ def _with_present_name(word: str) -> str:
 
 def _explain_unknown(error: Any, name: str, command: Any) -> None:
     """Add to the refusal of an unknown option what may have been meant: a similar option, or a key of --set."""
-    from difflib import get_close_matches
-
     word = error.option_name.lstrip("-")
     known = [one.lstrip("-") for one in error.possibilities or ()]
     own = {one.name for one in command.params}

@@ -19,6 +19,7 @@ from levilab.cli.options import speak_from
 from levilab.cli.output import message, silence
 from levilab.cli.quantities import APPLICATION, command_of, in_options
 from levilab.errors import as_typed
+from levilab.present.characters import SPELLED_OUT
 from levilab.texts.text import Sentences, Text, in_language
 
 
@@ -380,8 +381,6 @@ def _prepare_output() -> None:
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: PTH123, SIM115 - until the end
         reconfigure = getattr(getattr(sys, name), "reconfigure", None)
         if reconfigure and codecs.lookup(getattr(sys, name).encoding or "utf-8").name != "utf-8":
-            from levilab.present.characters import SPELLED_OUT
-
             reconfigure(errors=SPELLED_OUT)
         elif reconfigure:  # what UTF-8 has no place for, as in the name of a file
             reconfigure(errors="replace")

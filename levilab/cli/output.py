@@ -12,6 +12,7 @@ import typer
 from levilab.cli import exit_codes
 from levilab.cli.quantities import with_options
 from levilab.present.characters import printable
+from levilab.texts.text import Text, in_language
 
 
 def print_json(document: Any, *, indent: int | None = 2, sort_keys: bool = False) -> None:
@@ -23,8 +24,6 @@ def print_json(document: Any, *, indent: int | None = 2, sort_keys: bool = False
 
 def result(text: str) -> None:
     """Print a line on standard output; names in it, which others chose, do not steer the terminal."""
-    from levilab.texts.text import in_language  # not for a help
-
     typer.echo(printable(in_language(text)))
 
 
@@ -35,8 +34,6 @@ def message(text: str) -> None:
     """
     line = text
     with contextlib.suppress(OSError):  # no file can be opened any more, not even that of a module
-        from levilab.texts.text import in_language  # not for a help
-
         line = printable(with_options(in_language(text)))
     try:
         typer.echo(line, err=True)
@@ -52,8 +49,6 @@ def silence(stream: TextIO) -> None:
 
 def place_of_report(report: Path) -> str:
     """Return where a report will be, as a line; a folder that it makes may be a typing error."""
-    from levilab.texts.text import Text  # not for a help
-
     there = "the report is in {file:s}" if report.parent.exists() else "the report is in {file:s}, in a new folder"
     return Text(there, file=report)
 
@@ -64,8 +59,6 @@ def interruptible(what_is_left: str | Callable[[], str]) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        from levilab.texts.text import Text  # not for a help
-
         left = what_is_left if isinstance(what_is_left, str) else what_is_left()
         message(Text("levilab: interrupted, {left}", left=left))
         raise typer.Exit(exit_codes.INTERRUPTED) from None

@@ -9,6 +9,7 @@ import typer
 
 from levilab.cli.later import Later
 from levilab.errors import UsageError
+from levilab.texts.text import in_language, text_of
 
 #: A quantity in a message, and its value, as in "take `rate` = 500 or less".
 _QUANTITY = re.compile(r"`([a-z]\w*)`( = False\b| = True\b| = )?")
@@ -56,8 +57,6 @@ def _option(name: str) -> tuple[str, str] | None:
 
 def in_options(error: Exception) -> str:
     """Return the text of an error with options in the place of quantities: "duration = -1: …" is "--duration -1: …"."""
-    from levilab.texts.text import in_language, text_of  # not for a help
-
     if not isinstance(error, UsageError):
         return with_options(in_language(text_of(error)))
     head = (_option(error.name) or (error.name, ""))[0]

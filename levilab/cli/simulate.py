@@ -1,7 +1,7 @@
 """The commands of the simulator: simulate, stability, benchmark.  Heavy imports happen where they are needed."""
 
 import contextlib
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -90,8 +90,6 @@ def simulate(
     with interruptible("the effects are not known"):
         effects = _switch_effects(chosen, duration) if explain else ()
     if as_json:
-        from dataclasses import asdict
-
         document = as_document(summary) | {"run": str(done.folder) if done.folder else None}
         document |= {"animation": str(film.path)} if film else {}
         document |= {"effects": [finite(asdict(effect)) for effect in effects]} if explain else {}

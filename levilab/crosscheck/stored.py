@@ -1,9 +1,9 @@
 """crosscheck.json: written by `levilab crosscheck`, beside a result by `--like`, and read by a report."""
 
-from __future__ import annotations
-
+from collections.abc import Sequence
 from dataclasses import asdict
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -11,14 +11,9 @@ from levilab.crosscheck.study import Spread, Study
 from levilab.errors import DataError
 from levilab.files import as_json as to_json
 from levilab.files import finite, parse_json, replace_atomically, writing
+from levilab.pipelines.result import Place
 from levilab.settings import in_one_line
 from levilab.software import software_versions
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-    from pathlib import Path
-
-    from levilab.pipelines.result import Place
 
 NAME = "crosscheck.json"
 SCHEMA = "levilab-crosscheck/1"

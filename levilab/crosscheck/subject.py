@@ -1,17 +1,11 @@
 """What a cross-check is made of: subjects, their trials, and the pulls of these."""
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from pathlib import Path
 
+from analysis.uncertainty import Estimate
 from levilab.errors import LevilabError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable
-    from pathlib import Path
-
-    from analysis.uncertainty import Estimate
 
 
 class TrialFailed(LevilabError):

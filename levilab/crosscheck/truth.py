@@ -1,18 +1,13 @@
 """The truth of a run of the virtual bench: what its seed drew, in the names of the analyses' results."""
 
-from __future__ import annotations
-
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from levilab.runs.events import RunEvent
+from levilab.runs.run import Run
 from levilab.simulator.laws import LAWS
 from levilab.world.spin_world import SpinScene, random_scene
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-
-    from levilab.runs.run import Run
 
 
 @dataclass(frozen=True)

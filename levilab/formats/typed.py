@@ -1,23 +1,18 @@
 """Numbers as a person types them, with or without a unit: 24.98 g, 10s, 30 Hz, 2min, 21 °C."""
 
-from __future__ import annotations
-
 import math
 import re
+from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from pydantic import ValidationInfo
 from pydantic_core import PydanticCustomError
 
 from levilab.formats.ranges import problem_of
 from levilab.formats.titles import UNITS, factor_of, plain_unit
 from levilab.settings import hint_about
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
-
-    from pydantic import ValidationInfo
 
 
 def check_range(value: Any, info: ValidationInfo) -> Any:

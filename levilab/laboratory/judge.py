@@ -1,29 +1,24 @@
 """What one process of a laboratory has shown and left behind, and what must hold of it."""
 
-from __future__ import annotations
-
 import html
 import math
 import re
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from levilab.acquisition.session import Row, Session
 from levilab.errors import LevilabError
+from levilab.laboratory.bench import LaboratoryBench
 from levilab.laboratory.events import out_s
+from levilab.laboratory.plan import Plan
 from levilab.runs.run import Run
 from levilab.simulator.laws import LAWS
 from levilab.world.spin_world import SpinWorld, World
-
-if TYPE_CHECKING:
-    from collections.abc import Collection, Iterator, Sequence
-    from pathlib import Path
-
-    from levilab.acquisition.session import Row, Session
-    from levilab.laboratory.bench import LaboratoryBench
-    from levilab.laboratory.plan import Plan
 
 #: An analysed value further from the truth than this [u] needs a warning; a single reading may be a little further,
 #: since there are a thousand times as many of them.

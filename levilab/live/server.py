@@ -4,21 +4,21 @@ One task reads what is new 22 times a second while a page is open.  A page asks 
 is something that it does not have: a slow page gets fewer frames, and nothing queues.
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import json
 import math
 import os
 import time
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import unquote
 
 from starlette.applications import Starlette
+from starlette.requests import Request
 from starlette.responses import FileResponse, HTMLResponse, JSONResponse, PlainTextResponse, Response
 from starlette.routing import BaseRoute, Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -31,6 +31,8 @@ from levilab.live.choice import Choice, choices, newest, running_run
 from levilab.live.desk import Desk, parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
 from levilab.live.opened import Opened
+from levilab.live.practice.commands import PracticeEvent
+from levilab.live.running import Running
 from levilab.live.tuning import advice_on
 from levilab.live.watch import Watch
 from levilab.live.words import data_in, page_in
@@ -38,14 +40,6 @@ from levilab.pipelines.look import QUANTITIES, name_of
 from levilab.pipelines.result import beside
 from levilab.runs.find import RECORD
 from levilab.texts.text import ENGLISH, in_language, languages, text_of
-
-if TYPE_CHECKING:
-    from collections.abc import AsyncIterator, Callable, Iterator
-
-    from starlette.requests import Request
-
-    from levilab.live.practice.commands import PracticeEvent
-    from levilab.live.running import Running
 
 #: Frames a second at most, so that 20 come to the page; and the longest wait of a page without news [s].
 FRAMES_PER_S, PATIENCE_S = 22, 1.0

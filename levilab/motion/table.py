@@ -1,11 +1,10 @@
 """A simulated motion → text on a terminal."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
+from rich.console import Console
 from rich.markup import escape
 
 from analysis.numbers import with_minus
@@ -16,11 +15,6 @@ from levilab.present.numbers import with_decimals
 from levilab.present.tables import Table, table
 from levilab.present.terminal import draw, terminal
 from levilab.texts.text import Sentences, Text, in_language
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
-    from rich.console import Console
 
 
 def print_motion(summary: Summary, console: Console | None = None) -> None:

@@ -13,7 +13,7 @@ from PIL import Image
 from levilab.notebook.fit import axes_of
 from levilab.present.drawing import headline, panel, run_look, synthetic_mark
 from levilab.present.looks import BLACK
-from levilab.present.style import STYLE, WIDE, for_notebooks
+from levilab.present.style import STYLE, WIDE, as_png, for_notebooks
 from levilab.present.units import split
 
 if TYPE_CHECKING:
@@ -136,8 +136,6 @@ def _factor(column: str) -> float:
 
 def small_png(figure: Figure) -> bytes:
     """Return a figure as a picture of few colours, for a notebook that keeps it in its file."""
-    from levilab.present.style import as_png
-
     buffer = io.BytesIO()
     picture = Image.open(io.BytesIO(as_png(figure, dpi=_DPI))).convert("RGB")
     picture.quantize(_COLOURS).save(buffer, format="png", optimize=True)

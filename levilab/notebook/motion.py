@@ -22,6 +22,7 @@ from levilab.notebook.labels import dataset_of_contents
 from levilab.notebook.names import Exportable, bare, meant
 from levilab.notebook.quantity import Named
 from levilab.present.html import facts_as_html
+from levilab.present.terminal import as_text
 from levilab.report.export.contents import Contents, table_of
 from levilab.simulator.trajectory import Trajectory
 
@@ -138,8 +139,6 @@ class SimulatedMotion(Exportable, Trajectory):
 
     def summary(self) -> str:
         """Return the text that `levilab simulate` prints: end, heights, spin, the lines of the axis, the errors."""
-        from levilab.present.terminal import as_text  # with rich
-
         return as_text(partial(print_motion, self._found))
 
     def to_dataframe(self) -> pd.DataFrame:

@@ -1,20 +1,16 @@
 """Names that people guess: those of other libraries, the right one in the place of a wrong one, short tracebacks."""
 
-from __future__ import annotations
-
 import sys
+from collections.abc import Callable, Iterable, Mapping
 from difflib import get_close_matches
 from functools import wraps
 from operator import attrgetter
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
 import levilab
 from levilab.errors import LevilabError, UsageError
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable, Mapping
-    from os import PathLike
-    from pathlib import Path
 
 F = TypeVar("F", bound="Callable[..., Any]")
 #: Flag of a function's code: it takes any names.

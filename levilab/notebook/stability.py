@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from levilab.notebook.names import Helpful, bare
 from levilab.present.html import facts_as_html, paragraphs
+from levilab.present.terminal import as_text
 from levilab.simulator.equilibrium import Stability, stability_of
 from levilab.stability.table import as_document, headline, print_stability, remarks
 
@@ -94,8 +95,6 @@ class FloatingTop(Helpful):
 
     def summary(self) -> str:
         """Return the text that `levilab stability` prints."""
-        from levilab.present.terminal import as_text  # with rich
-
         return as_text(lambda console: print_stability(self.found, console))
 
 

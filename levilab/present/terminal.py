@@ -1,11 +1,10 @@
 """The terminal: how wide it is, which characters it has, and what tables look like on it."""
 
-from __future__ import annotations
-
 import io
 import shutil
 import sys
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 from rich import box
 from rich.cells import cell_len
@@ -14,16 +13,11 @@ from rich.markup import escape
 from rich.measure import Measurement, measure_renderables
 from rich.padding import Padding
 from rich.table import Table as RichTable
+from rich.text import Text
 
 from levilab.present.characters import for_encoding, printable
 from levilab.present.document.blocks import in_language_of_reader
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
-
-    from rich.text import Text
-
-    from levilab.present.tables import Table
+from levilab.present.tables import Table
 
 #: SIMPLE_HEAD in plain ASCII; rich itself would draw a frame.
 _ASCII_HEAD = box.Box("    \n    \n -- \n    \n    \n -- \n    \n    \n", ascii=True)

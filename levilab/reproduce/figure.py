@@ -12,6 +12,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from scipy.special import ndtri
 
 from analysis.arrays import Array
 from analysis.limits import Statistics
@@ -360,8 +361,6 @@ def spindown_figure(runs: Sequence[tuple[Array, SpinDown]]) -> Figure:
 @mpl.rc_context(STYLE)
 def statistics_figure(values: Array, found: Statistics, edge: float) -> Figure:
     """Draw the ten limits, and their normal quantiles."""
-    from scipy.special import ndtri
-
     mean, u, scatter = (known(value) for value in (found.mean.value, found.mean.u, known(found.scatter).value))
     figure, panels = _figure(2.9, (0.085, 0.16, 0.5, 0.75), (0.67, 0.16, 0.315, 0.75))
     left, right = panels

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy.optimize import brentq
 
 from analysis.arrays import Array
 from analysis.stability import SymmetricTop, sleeping_limit, spin_windows
@@ -76,8 +77,6 @@ def base_like(simon: Simon) -> tuple[float, float, float]:
     Raises:
         ValueError: no ring has them.
     """
-    from scipy.optimize import brentq
-
     b, slope, second = simon.flux
     unit = field_of(1.0, RATIO, 1.0, "exact")
     wanted = b * second / slope**2

@@ -1,10 +1,10 @@
 """Where a top floats → text on a terminal, and one JSON document."""
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Sequence
+from typing import Any
 
+from rich.console import Console
 from rich.markup import escape
 
 from levilab.files import finite
@@ -12,15 +12,9 @@ from levilab.present.numbers import with_decimals
 from levilab.present.tables import Table, table
 from levilab.present.terminal import draw, terminal
 from levilab.simulator.equilibrium import Stability, advice
+from levilab.simulator.scene import Scene
 from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
 from levilab.texts.text import Text, in_language
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
-
-    from rich.console import Console
-
-    from levilab.simulator.scene import Scene
 
 
 def _range(which: int) -> dict[str, float]:

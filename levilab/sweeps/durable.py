@@ -3,17 +3,12 @@
 Zarr's own gives a file its name before its bytes are on the disk: a loss of power may leave marks that cannot be read.
 """
 
-from __future__ import annotations
-
 import asyncio
-from typing import TYPE_CHECKING
 
+from zarr.core.buffer import Buffer
 from zarr.storage import LocalStore
 
 from levilab.files import make_folder, replacing
-
-if TYPE_CHECKING:
-    from zarr.core.buffer import Buffer
 
 
 class DurableStore(LocalStore):

@@ -1,22 +1,17 @@
 """The results of many independent tasks, as they come."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import queue
 from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future, wait
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
 from levilab.errors import WorkersLost
 from levilab.workers.packing import Outcome, call_here, call_packer, unpack
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Generator, Iterable, Iterator
-
-    from levilab.workers.ways import Workers
+from levilab.workers.ways import Workers
 
 T = TypeVar("T")
 R = TypeVar("R")

@@ -1,27 +1,20 @@
 """The virtual bench as a PyVISA library: it translates PyVISA's calls into those of a session."""
 
-from __future__ import annotations
-
 import itertools
 import math
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar, cast
 
 from pyvisa import constants, rname
 from pyvisa.constants import EventAttribute, ResourceAttribute, StatusCode
 from pyvisa.highlevel import ResourceInfo, VisaLibraryBase
+from pyvisa.typing import VISARMSession, VISASession
 from pyvisa.util import LibraryPath
 
+from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.serial_line import SerialLine
 from instruments.virtual.bench.session import LinkLost, Session
 from instruments.virtual.core.line import LineSettings
-
-if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
-
-    from pyvisa.typing import VISARMSession, VISASession
-
-    from instruments.virtual.bench.bench import VirtualBench
-
 
 T = TypeVar("T")
 Link = Session | SerialLine

@@ -6,16 +6,11 @@ without an effect on the samples; the trigger looks at a signal at 20 kHz, for i
 if the record is short, and then finds the crossing to a small part of a sample.
 """
 
-from __future__ import annotations
-
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from instruments.virtual.oscilloscope.record import Edge, Record
+from instruments.virtual.oscilloscope.record import Edge, Record
 
 #: With sweep AUTO a record is taken without a trigger after this time [s] (assumed; no source at hand).
 AUTO_AFTER = 0.05

@@ -12,12 +12,10 @@ Headers as the scopes write them (each found in public files):
 Plain tables with titles, as PicoScope, Analog Discovery, Red Pitaya, DSView and Saleae write them, have no part here.
 """
 
-from __future__ import annotations
-
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 from levilab.formats.columns import NoSuchColumn, TableError, quote_names, shorten
 from levilab.formats.dialect import Dialect, filled_count, find_dialect
@@ -32,12 +30,8 @@ from levilab.formats.titles import (
     unit_factor,
     without_runs_of_blanks,
 )
+from levilab.formats.waveforms.rows import Head
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
-
-    from levilab.formats.waveforms.rows import Head
 
 #: What is read.
 WANTED = "samples beside their times, a scope's CSV, WAV, .npy, or a column of pulse times is expected"

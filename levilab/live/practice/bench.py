@@ -1,22 +1,17 @@
 """The bench for practice, as the process that shows it holds it."""
 
-from __future__ import annotations
-
 import contextlib
 import multiprocessing
 from dataclasses import replace
+from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from levilab.errors import LevilabError
 from levilab.live.practice.commands import Command, PracticeEvent, RecordRun
 from levilab.live.practice.process import PracticeOptions, work
 from levilab.telemetry.address import Address
 from levilab.workers.pool import Apart
-
-if TYPE_CHECKING:
-    from multiprocessing.connection import Connection
-
 
 #: How long the process is waited for at the end [s].  A run under way ends with its reading; then the process is asked
 #: by a signal, and at last killed.  Without a run nothing can be lost, since the outputs are virtual: where it does not

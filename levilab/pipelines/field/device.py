@@ -1,8 +1,6 @@
 """From what calliper, data sheet and scales say, in the run and in a file, to what an analysis takes."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from pydantic import ValidationError
@@ -14,13 +12,10 @@ from analysis.top import Cylinder, top_of
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.formats.device import BaseTable, Device, TopTable
+from levilab.pipelines.field.readings import FieldReadings
+from levilab.pipelines.options import FieldOptions
+from levilab.pipelines.sources import Source
 from levilab.settings import in_one_line
-
-if TYPE_CHECKING:
-    from levilab.pipelines.field.readings import FieldReadings
-    from levilab.pipelines.options import FieldOptions
-    from levilab.pipelines.sources import Source
-
 
 Table = TypeVar("Table", BaseTable, TopTable)
 

@@ -1,16 +1,16 @@
 """Limits → tables, and their part of a report."""
 
-from __future__ import annotations
-
 import math
+from collections.abc import Iterator, Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from analysis.locked import Cause
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
+from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
+from levilab.pipelines.limit.readings import LimitReadings
 from levilab.pipelines.part import (
     VALUE_U,
     FigureText,
@@ -21,19 +21,12 @@ from levilab.pipelines.part import (
     size_of_u,
     title_of,
 )
+from levilab.pipelines.sources import Source
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
 from levilab.present.numbers import how_many, off, reading, share, short_name, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
 from levilab.stability.thesis import ISLANDS_HZ, MEASURED_HZ, MEASURED_U_HZ
 from levilab.texts.text import Sentences, Text
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
-    from levilab.pipelines.limit.readings import LimitReadings
-    from levilab.pipelines.sources import Source
-
 
 HEADS = ("limits", "tops", "mean [Hz]", "scatter [Hz]", "trend [Hz/top]", "outliers")
 

@@ -1,8 +1,7 @@
 """What is known of top and base: of a scene, of a device's file and a Hall scan, or of the thesis."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,15 +17,11 @@ from levilab.formats.device import Device
 from levilab.pipelines.field.device import inertias, parts_of
 from levilab.pipelines.field.document import FIELD
 from levilab.pipelines.options import FieldOptions, SwayOptions
+from levilab.pipelines.sources import Source
+from levilab.pipelines.sway.readings import SwayReadings
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import scene_of
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.sway.readings import SwayReadings
 
 #: The thesis's base and top, taken where nothing is known, with a warning; of both sizes by a calliper.
 _RING, _SIZE_U_M = Ring(1.40e-3, 0.0, 0.0, 0.030, 0.055), 1e-4

@@ -1,23 +1,16 @@
 """Slow swings → their figure."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from levilab.pipelines.sway.analysis import SwayAnalysis
 from levilab.present.drawing import SMALL, headline, panel, run_look, synthetic_mark
 from levilab.present.looks import LOOKS
 from levilab.present.numbers import with_uncertainty
 from levilab.present.style import STYLE, WIDE, label_of_run
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from levilab.pipelines.sway.analysis import SwayAnalysis
 
 #: Left edge and width of the panels [inch], and where what explains them begins, in parts of the width.
 _LEFT, _WIDTH, _BESIDE = 0.7, 4.05, 1.03

@@ -1,26 +1,19 @@
 """Films → their figure: the first picture with the rim, the mark, the base and the path of the centre over it."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 import matplotlib as mpl
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle as Ring
 
 from levilab.formats.film import pictures
+from levilab.pipelines.sources import Source
+from levilab.pipelines.video.analysis import FilmReadings, Video, VideoAnalysis
 from levilab.present.drawing import headline, panel
 from levilab.present.looks import GREEN, SKY, VERMILION, YELLOW
 from levilab.present.numbers import short_name, with_uncertainty
 from levilab.present.style import STYLE, WIDE
 from levilab.texts.text import Text
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-    from levilab.pipelines.sources import Source
-    from levilab.pipelines.video.analysis import FilmReadings, Video, VideoAnalysis
 
 #: Width of a still and room above and below it [inch], and of the most films that are drawn.
 _WIDTH, _ROOM, _MOST = 5.0, 0.5, 4
