@@ -8,6 +8,8 @@ import shutil
 
 import pytest
 
+from levilab.acquisition.table import Configuration, settings_of
+from levilab.bench.config import read_bench
 from support.commands import command
 from support.less_work import with_less_work
 from support.paths import ROOT
@@ -160,9 +162,6 @@ def test_links_between_the_pages_lead_somewhere():
 
 
 def test_the_bench_of_the_page_is_a_valid_one(tmp_path):
-    from levilab.acquisition.table import Configuration, settings_of
-    from levilab.bench.config import read_bench
-
     (text,) = (text for page, text in blocks("toml") if page == "bench.md")
     path = tmp_path / "bench.toml"
     path.write_text(text, encoding="utf-8")

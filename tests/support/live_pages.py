@@ -9,9 +9,12 @@ import threading
 import time
 from urllib.parse import urlsplit
 
+import uvicorn
+
 from levilab.live.doors import Doors, doors_for_guests
 from levilab.live.serve import configuration
 from levilab.live.server import Hall
+from levilab.runs.run import lock_of
 
 #: A page is waited for so long; one that works is not waited for [s].
 PATIENCE_S = 90.0
@@ -21,8 +24,6 @@ CHANNELS = (("time_s", "s"), ("spin_frequency_hz", "Hz"), ("spin_frequency_u_hz"
 @contextlib.contextmanager
 def serving(root, shown="", desk=None):
     """A server of the runs in a folder, at two free ports, one for guests, in a thread of its own."""
-    import uvicorn
-
     with socket.create_server(("127.0.0.1", 0)) as listening, socket.create_server(("127.0.0.1", 0)) as shared:
         guests = doors_for_guests("127.0.0.1", shared.getsockname()[1])
         hall = Hall(root, shown, Doors(listening.getsockname()[1]), desk, guests)
@@ -121,8 +122,6 @@ class GrowingRun:
     @contextlib.contextmanager
     def running(self):
         """Hold the lock of a process that writes."""
-        from levilab.runs.run import lock_of
-
         with lock_of(self.folder):
             self.say(status="running")
             yield

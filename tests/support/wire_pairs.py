@@ -153,11 +153,10 @@ QUEUE = {"an empty error queue": _errors(_report_none), "an error in the queue":
 def _operations(driver, of_its_kind):
     """Those of every driver, those of its kind, and asking for each of its settings."""
     has_queue = driver.HAS_ERROR_QUEUE and driver.raise_errors is ScpiInstrument.raise_errors
-    operations = ANY | (QUEUE if has_queue else {}) | of_its_kind
     found = {f"setting {row.name}": _setting(row.name) for row in driver.declared_settings() if not row.on_demand}
     for row in driver.CHANNEL.declared_settings() if hasattr(driver, "CHANNEL") else ():
         found[f"setting channel1_{row.name}"] = _channel_setting(row.name)
-    return operations | found
+    return ANY | (QUEUE if has_queue else {}) | of_its_kind | found
 
 
 #: The questions by which the counters of both makers give a series.

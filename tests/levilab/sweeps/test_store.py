@@ -5,6 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
+import zarr
 
 from levilab.errors import DataError
 from levilab.files import CannotWrite
@@ -43,8 +44,6 @@ def test_a_store_that_is_opened_again_has_the_plan_and_the_values(tmp_path):
 
 
 def test_plain_zarr_reads_arrays_coordinates_and_units(tmp_path):
-    import zarr
-
     run(Store.create(tmp_path / "map.zarr", plan()))
     group = zarr.open_group(tmp_path / "map.zarr", mode="r")
     assert group.metadata.zarr_format == 3
@@ -58,8 +57,6 @@ def test_plain_zarr_reads_arrays_coordinates_and_units(tmp_path):
 
 
 def test_a_store_of_an_earlier_version_is_read(tmp_path):
-    import zarr
-
     made = Store.create(tmp_path / "map.zarr", plan())
     run(made)
     group = zarr.open_group(tmp_path / "map.zarr", mode="r+")
