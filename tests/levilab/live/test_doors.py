@@ -5,6 +5,8 @@ import socket
 import urllib.request
 
 import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
 
 from levilab.live.desk import Desk
 from levilab.live.doors import Doors
@@ -133,9 +135,6 @@ def test_what_is_no_command_is_refused_in_words(hall, wanted):
 
 @pytest.mark.parametrize(("question", "code"), [(b"{}", 1003), (5000 * "x", 1009)])
 def test_a_question_that_is_no_text_or_too_long_closes_the_socket(hall, question, code, caplog):
-    from websockets.exceptions import ConnectionClosed
-    from websockets.sync.client import connect
-
     with connect(f"ws://127.0.0.1:{hall.doors.port}/frames?run=one") as socket:
         socket.send(question)
         with pytest.raises(ConnectionClosed) as closed:
