@@ -197,13 +197,10 @@ def table(spins):
     return "t,f\n" + "".join(f"{10 * k},{spin}\n" for k, spin in enumerate(spins))
 
 
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("", "empty"), ("a,b\n1,2\n2,3\n3,4\n", "--columns"), ("\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "CSV"),
-        (table([40, 39]), "3 readings"), (table([40] * 8), "fall"), (table(range(30, 38)), "fall"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "says"), [
+    ("", "empty"), ("a,b\n1,2\n2,3\n3,4\n", "--columns"), ("\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "CSV"),
+    (table([40, 39]), "3 readings"), (table([40] * 8), "fall"), (table(range(30, 38)), "fall"),
+])  # fmt: skip
 def test_bad_data_get_one_clear_line_and_status_1(levilab, tmp_path, text, says):
     path = tmp_path / "my.csv"
     path.write_bytes(text.encode("latin-1"))
@@ -254,39 +251,33 @@ def test_a_result_that_cannot_be_written_is_shown(levilab, tmp_path):
     assert "--no-save" in done.stderr.splitlines()[-1]
 
 
-@pytest.mark.parametrize(
-    ("typed", "says"),
-    [
-        ("spindown my.csv", "No such command 'spindown': take levilab analyze spindown my.csv"),
-        ("fit my.csv", "No such command 'fit': take levilab analyze my.csv"),
-        ("trace --mock", "take levilab acquire trace --mock"),
-        ("analyze my.csv --unit rpm", '--columns "t=1,f=2 [rpm]"'), ("open my.csv --sheet 2", "my.xlsx/Sheet2"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("typed", "says"), [
+    ("spindown my.csv", "No such command 'spindown': take levilab analyze spindown my.csv"),
+    ("fit my.csv", "No such command 'fit': take levilab analyze my.csv"),
+    ("trace --mock", "take levilab acquire trace --mock"),
+    ("analyze my.csv --unit rpm", '--columns "t=1,f=2 [rpm]"'), ("open my.csv --sheet 2", "my.xlsx/Sheet2"),
+])  # fmt: skip
 def test_what_other_programs_call_a_command_or_an_option_is_told_ours(typed, says, tmp_path):
     done = command(*typed.split(), cwd=tmp_path)
     assert done.status == 2
     assert says in " ".join(line.strip("│ ") for line in done.err.splitlines())
 
 
-@pytest.mark.parametrize(
-    ("typed", "says"),
-    [
-        ("anlyze", "Den Befehl 'anlyze' gibt es nicht. Meintest du 'analyze'?"),
-        ("analyze spindwn", "Den Befehl 'spindwn' gibt es nicht. Meintest du 'spindown', 'spin'?"),
-        ("fit my.csv", "Den Befehl 'fit' gibt es nicht: Nimm levilab analyze my.csv"),
-        ("my.csv", "my.csv ist eine Datei oder ein Ordner und kein Befehl: Nimm levilab analyze my.csv"),
-        ("runs --nonsense", "Die Option --nonsense gibt es nicht"), ("runs", "runs: diesen Ordner gibt es nicht"),
-        ("--nonsense", "Aufruf: levilab [OPTIONS] COMMAND [ARGS]... Hilfe: 'levilab -h' ╭─ Fehler"),
-        ("report --title", "Die Option '--title' braucht einen Wert."),
-        ("analyze spin my.csv --method matchd", "Falscher Wert für '--method': 'matchd' ist keins von 'auto'"),
-        ("simulate", "SCENE: fehlt: eine von undriven"), ("worksheet", "EXPERIMENT: einige von spin"),
-        ("report", "hier gibt es keinen Ordner runs, und kein anderer Pfad ist angegeben"),
-        ("analyze spindown my.csv", "rpm …), es gibt 'Foo', 'Bar': --columns \"t=NAME,f=NAME\" angeben"),
-        ("analyze spindown half.csv", "es gibt 't [s]', 'x': --columns f=NAME angeben"),
-        ("open my.csv --no-browser", "my.csv: wird erst gelesen, wenn die Frage mit --columns beantwortet ist"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("typed", "says"), [
+    ("anlyze", "Den Befehl 'anlyze' gibt es nicht. Meintest du 'analyze'?"),
+    ("analyze spindwn", "Den Befehl 'spindwn' gibt es nicht. Meintest du 'spindown', 'spin'?"),
+    ("fit my.csv", "Den Befehl 'fit' gibt es nicht: Nimm levilab analyze my.csv"),
+    ("my.csv", "my.csv ist eine Datei oder ein Ordner und kein Befehl: Nimm levilab analyze my.csv"),
+    ("runs --nonsense", "Die Option --nonsense gibt es nicht"), ("runs", "runs: diesen Ordner gibt es nicht"),
+    ("--nonsense", "Aufruf: levilab [OPTIONS] COMMAND [ARGS]... Hilfe: 'levilab -h' ╭─ Fehler"),
+    ("report --title", "Die Option '--title' braucht einen Wert."),
+    ("analyze spin my.csv --method matchd", "Falscher Wert für '--method': 'matchd' ist keins von 'auto'"),
+    ("simulate", "SCENE: fehlt: eine von undriven"), ("worksheet", "EXPERIMENT: einige von spin"),
+    ("report", "hier gibt es keinen Ordner runs, und kein anderer Pfad ist angegeben"),
+    ("analyze spindown my.csv", "rpm …), es gibt 'Foo', 'Bar': --columns \"t=NAME,f=NAME\" angeben"),
+    ("analyze spindown half.csv", "es gibt 't [s]', 'x': --columns f=NAME angeben"),
+    ("open my.csv --no-browser", "my.csv: wird erst gelesen, wenn die Frage mit --columns beantwortet ist"),
+])  # fmt: skip
 def test_the_commonest_mistakes_are_answered_in_german(typed, says, tmp_path, monkeypatch):
     monkeypatch.setenv("LEVILAB_LANGUAGE", "de")
     for name, titles in (("my.csv", "Foo,Bar"), ("half.csv", "t [s],x")):
@@ -432,17 +423,14 @@ def test_experiments_and_values_are_understood_as_people_write_them(levilab):
     assert levilab("help", "runs").stdout == levilab("runs", "--help").stdout
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("acquire --mock", "as levilab acquire spin --mock: spin, trace"),
-        ("acquire spin --duration 60", "levilab acquire spin --settings lists"),
-        ("acquire spin --mok", "(Possible options: --mock)"),
-        ("here", "here is a file or a folder, and no command: take levilab analyze here"),
-        ("export", "PATH: is missing: name a run, a data file or a sweep, as in levilab export runs/NAME"),
-        ("simulate undriven --spin 30", "--set changes the scene: --set start.spin_hz=…"),
-    ],
-)
+@pytest.mark.parametrize(("words", "said"), [
+    ("acquire --mock", "as levilab acquire spin --mock: spin, trace"),
+    ("acquire spin --duration 60", "levilab acquire spin --settings lists"),
+    ("acquire spin --mok", "(Possible options: --mock)"),
+    ("here", "here is a file or a folder, and no command: take levilab analyze here"),
+    ("export", "PATH: is missing: name a run, a data file or a sweep, as in levilab export runs/NAME"),
+    ("simulate undriven --spin 30", "--set changes the scene: --set start.spin_hz=…"),
+])  # fmt: skip
 def test_what_is_not_understood_is_answered_with_what_was_meant(levilab, tmp_path, words, said):
     (tmp_path / "here").mkdir()
     refused = " ".join(levilab(*words.split(), check=2).stderr.replace("│", " ").split())

@@ -86,15 +86,12 @@ def test_a_sheet_without_numbers_asks_nothing():
     assert "is a sheet without numbers" in sheets[1].problem
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        ((), "FILE: name a data file"),
-        (("my.csv", "--columns", "t=1,f=9"), "has no column '9'"),
-        ((str(OMEGA), "--keep"), "--keep: goes with --columns"),
-        (("my.csv", "--rate", "-1"), "--rate"),
-    ],
-)
+@pytest.mark.parametrize(("words", "says"), [
+    ((), "FILE: name a data file"),
+    (("my.csv", "--columns", "t=1,f=9"), "has no column '9'"),
+    ((str(OMEGA), "--keep"), "--keep: goes with --columns"),
+    (("my.csv", "--rate", "-1"), "--rate"),
+])  # fmt: skip
 def test_a_mistake_is_said_in_one_line(doubtful, words, says):
     ended = command("open", *words, cwd=doubtful.parent)
     assert ended.status in {1, 2}

@@ -16,19 +16,16 @@ from support.live_pages import PATIENCE_S, GrowingRun, address, request, serving
 HERE = b"127.0.0.1:8765"
 
 
-@pytest.mark.parametrize(
-    ("host", "origin", "socket", "inside"),
-    [
-        (HERE, None, False, True),
-        (b"localhost:8765", b"http://localhost:8765", True, True),
-        (HERE, b"http://127.0.0.1:8765", True, True),
-        (b"127.0.0.1", None, False, False),
-        (b"evil.example:8765", b"http://evil.example:8765", True, False),
-        (HERE, b"http://evil.example", True, False),
-        (HERE, b"http://127.0.0.1:9999", True, False),
-        (HERE, b"null", True, False),
-    ],
-)
+@pytest.mark.parametrize(("host", "origin", "socket", "inside"), [
+    (HERE, None, False, True),
+    (b"localhost:8765", b"http://localhost:8765", True, True),
+    (HERE, b"http://127.0.0.1:8765", True, True),
+    (b"127.0.0.1", None, False, False),
+    (b"evil.example:8765", b"http://evil.example:8765", True, False),
+    (HERE, b"http://evil.example", True, False),
+    (HERE, b"http://127.0.0.1:9999", True, False),
+    (HERE, b"null", True, False),
+])  # fmt: skip
 def test_only_pages_of_this_server_come_in(host, origin, socket, inside):
     headers = [(b"Host", host), *([(b"Origin", origin)] if origin else [])]
     assert Doors(8765).lets_in(headers, is_socket=socket) is inside

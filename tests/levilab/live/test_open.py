@@ -74,14 +74,11 @@ def test_a_file_is_dropped_corrected_kept_and_analyzed(hall, watched):
     assert found["settings"]["columns"] == {"t": "1", "f": "2 [rad/s]"}
 
 
-@pytest.mark.parametrize(
-    ("name", "file", "same"),
-    [
-        ("a phone's spin-down", "phone.csv", "student-files/phyphox-semicolon-point.csv"),
-        ("a spreadsheet", "spreadsheet.xlsx", "student-files/excel.xlsx"),
-        ("a sound", "sound.wav", "scope-files/recording.wav"),
-    ],
-)
+@pytest.mark.parametrize(("name", "file", "same"), [
+    ("a phone's spin-down", "phone.csv", "student-files/phyphox-semicolon-point.csv"),
+    ("a spreadsheet", "spreadsheet.xlsx", "student-files/excel.xlsx"),
+    ("a sound", "sound.wav", "scope-files/recording.wav"),
+])  # fmt: skip
 def test_who_has_no_file_tries_one(hall, watched, name, file, same):
     page = watched()
     page.goto(f"{address(hall)}open#{hall.doors.token}")
