@@ -262,7 +262,8 @@ def _doubt(swings: Swings) -> float:
     """Return the relative standard uncertainty of a split from the vertical swing, of its own and by the slow ones."""
     away = _away(swings)
     beside = float(np.sum(swings.beside**2)) / swings.size
-    exchange = RESONANCE_U * swings.size**2 / max(away, NEAREST_HZ) ** 4
+    size = swings.size * math.exp(8 * swings.size_u**2)  # the root mean square of A⁴ goes into u
+    exchange = RESONANCE_U * size**2 / max(away, NEAREST_HZ) ** 4
     return min(exchange + RISE_U * beside**2 * away**4, 1.0)
 
 

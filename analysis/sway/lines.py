@@ -55,6 +55,8 @@ _SLOPES = (0.0, 0.03, 0.06, 0.1, 0.15)
 _SPANS_HZ = 20.0
 #: Peaks of the spectrum that are tried for either swing, and steps of Gauss and Newton at most.
 _TRIED, _STEPS = 3, 25
+#: A sensor's image, over its line, that is left where the whole record has shown it: prior.
+_IMAGE = 0.05
 #: Rounding: the noise is no smaller a part of the places, and frequencies differ by no smaller a part of their effect.
 _FINEST = 1e-8
 #: The number of likeliest swings of a window that are kept, and how far their −2 log L may be above the least.
@@ -192,10 +194,13 @@ def swings_in_window(t: Array, s: Places, heights: Array | None = None, *, risin
     starts = [np.array([backward, forward[0]]) for backward in {*seen, seen[0] - apart, seen[0] + apart}]
     starts += [np.array([backward, one]) for backward in seen[:2] for one in forward[1:]]
     rows = BESIDE + CUBIC + ALONE if rising else BESIDE + CUBIC
+    still = _still(t, s, rising=rising)
 
     def fit(slow: Array, rise: float | None = None, line: _Precession | None = None) -> _Fit:
         start, slopes = (slow, [0, 0]) if line is None else ([*slow, line.frequency], [0, 0, line.slope])
-        return _fit(t, s, np.array(start), np.array(slopes), _expected(t, heights, slow), rows=rows, rise=rise)
+        return _fit(
+            t, s, np.array(start), np.array(slopes), _expected(t, heights, slow), still=still, rows=rows, rise=rise
+        )
 
     fits = [fit(start) for start in starts]
     best = _likeliest(fits)[0]
@@ -214,6 +219,16 @@ def swings_in_window(t: Array, s: Places, heights: Array | None = None, *, risin
         for one in likeliest
     )
     return replace(first, backwards=0.0 if mirror is None else mirror.amplitude, rivals=tuple(rivals))
+
+
+def _still(t: Array, s: Places, *, rising: bool) -> Places:
+    """Return columns of what is no line, shape (n, 2 or 3): an offset, a drift, and what is left of a sensor's image.
+
+    A record s + ε s* has an image of each line, all with one ε: it is not taken for a line of the motion then.
+    """
+    late, size = t - t.mean(), float(np.linalg.norm(s)) / math.sqrt(t.size)
+    image = [_IMAGE / size * s.conj()] if rising and size else []
+    return np.stack([np.ones_like(s), late / late[-1], *image], axis=1)
 
 
 def _worth(rest: Places) -> float:
@@ -304,7 +319,7 @@ class _Fit(NamedTuple):
     swings: Swings
     rest: Places
     waves: Places
-    still: Array
+    still: Places
     expected: Vertical
     rows: Beside
 
@@ -315,18 +330,26 @@ class _Fit(NamedTuple):
 
 
 def _fit(
-    t: Array, s: Places, start: Array, slopes_start: Array, known: Vertical, *, rows: Beside, rise: float | None = None
+    t: Array,
+    s: Places,
+    start: Array,
+    slopes_start: Array,
+    known: Vertical,
+    *,
+    still: Places,
+    rows: Beside,
+    rise: float | None = None,
 ) -> _Fit:
     """Return the swings of greatest likelihood near a start [Hz] with slopes [Hz/s], shape (2 or 3,).
 
-    known: of the vertical swing without the places; rows: of the lines beside the slow ones; rise: where the vertical
-    swing is looked for first, there unless given [Hz].
+    known: of the vertical swing without the places; still: see `_still`; rows: of the lines beside the slow ones;
+    rise: where the vertical swing is looked for first, there unless given [Hz].
     """
     late, half, count = t - t.mean(), float(t[-1] - t[0]) / 2, start.size
     frequency, slope = start.copy(), slopes_start.copy()
     rise = known.value if rise is None else rise
-    more = known.value - vertical_swing(start[0], start[1])
-    still = np.stack([np.ones_like(late), late / half], axis=1)
+    # the field's part of what is known goes with the slow swings, that of the heights does not
+    of_field, follows = vertical_swing(start[0], start[1]), (known.u / VERTICAL_U_HZ) ** 2
     prior = np.zeros((count + 1, 2 * count + 1))  # what is known of the slopes and the vertical swing, over its u
     prior[:count, count:-1] = np.diag(1 / _SLOPES_U[:count])
     prior[-1, -1] = 1 / known.u
@@ -345,7 +368,7 @@ def _fit(
         left = np.linalg.norm(rest) / math.sqrt(2 * (t.size - linear.shape[1] - count))
         noise = math.hypot(float(left), _FINEST * size)
         moving = waves * amplitudes[:count]
-        moved = lines * amplitudes[count:-2] @ np.array(rows)
+        moved = lines * amplitudes[count : count + len(rows)] @ np.array(rows)
         moving[:, :2] += moved[:, :2]
         slopes = np.concatenate(
             [quarter * moving, quarter * late[:, None] / 2 * moving, quarter * moved[:, 2:]], axis=1
@@ -353,7 +376,8 @@ def _fit(
         slopes -= linear @ np.linalg.solve(normal, linear.conj().T @ slopes)
         information = (slopes.conj().T @ slopes).real / noise**2
         gradient = (slopes.conj().T @ rest).real / noise**2
-        expected = vertical_swing(frequency[0], frequency[1]) + more  # its own slopes would move the swings by 1e-6 Hz
+        # its own slopes would move the swings by 1e-6 Hz
+        expected = known.value + follows * (vertical_swing(frequency[0], frequency[1]) - of_field)
         off = np.append(slope / _SLOPES_U[:count], (rise - expected) * prior[-1, -1])
         information += prior.T @ prior
         gradient -= prior.T @ off

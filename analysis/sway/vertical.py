@@ -102,7 +102,7 @@ Beside = tuple[tuple[int, int, int], ...]
 #: The lines beside the slow swings, and those of the vertical swing alone.  The last two are as near to the swings as
 #: the first two, for which they answer where the beat meets the vertical swing.
 BESIDE: Beside = ((0, 1, -1), (1, 0, 1), (0, 1, 1), (1, 0, -1), (-1, 2, -1), (2, -1, 1))
-ALONE: Beside = ((0, 0, 1), (0, 0, -1))
+ALONE: Beside = ((0, 0, 1), (0, 0, -1), (-1, 1, 0), (1, -1, 0))
 #: Lines of the third order: up to 10 µm where both swings have 1 mm.
 CUBIC: Beside = ((-1, 2, 0), (2, -1, 0), (0, 1, -2), (1, 0, 2))
 

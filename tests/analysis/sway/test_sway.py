@@ -118,6 +118,28 @@ def test_heights_that_are_all_alike_say_nothing(fresh):
     assert alike.vertical == pytest.approx(without.vertical, rel=0.05)  # the grid of its prior is cut at 4 u
 
 
+@pytest.mark.parametrize("beyond", [0.0, 1e-3])
+def test_a_forward_swing_at_the_vertical_swing_of_the_heights_is_found_beside_it(fresh, beyond):
+    times, rise = np.arange(1000) / 50, 0.95
+    heights = 3e-4 * np.cos(2 * np.pi * rise * times + 0.4)
+    places = swing(times, (-0.74, rise + beyond), (2e-4, 3e-4)) + 0.1 * heights  # of a sensor that leans
+    places += 5e-5 * (fresh.normal(size=1000) + 1j * fresh.normal(size=1000))
+    (found,) = swings_of(times, places, heights + 5e-5 * fresh.normal(size=1000), rising=True)
+    assert (np.abs(found.frequency[:2] - [-0.74, rise + beyond]) < 4 * found.u[:2]).all()
+
+
+def test_the_image_of_a_line_hides_no_swing(fresh):
+    """A sensor whose image is 5 % larger than the whole record shows, at a line of the vertical swing."""
+    times, slow, rise = np.arange(1000) / 50, (-0.4216, 0.6701), 1.355
+    heights = 3e-4 * np.cos(2 * np.pi * rise * times) + 1e-4 * np.cos(2 * np.pi * (slow[1] - slow[0]) * times)
+    places = swing(times, slow, (2e-4, 1e-3), 6.4) + 7e-5 * np.exp(2j * np.pi * (slow[1] - rise) * times)
+    places += 5e-5 * (fresh.normal(size=1000) + 1j * fresh.normal(size=1000))
+    places += 0.05 * np.exp(1j) * places.conj()
+    (found,) = swings_of(times, places, heights + 5e-5 * fresh.normal(size=1000), rising=True)
+    off = [np.abs((one.frequency[:2] - slow) / one.u[:2]).max() for one in (found, *found.rivals)]
+    assert min(off) < 4
+
+
 def test_a_mirrored_view_is_known_by_the_precession(fresh):
     times = np.arange(2400) / 120
     places = swing(times, (-0.59, 0.77)) + 1e-4 * (fresh.normal(size=2400) + 1j * fresh.normal(size=2400))
@@ -278,6 +300,16 @@ def test_the_shift_by_the_size_of_the_swings_is_in_u_by_its_part():
     part = np.hypot(0.035, 0.05 * 2**2)  # of both swings' squares in mm²
     assert found.parts["amplitude"] == pytest.approx(part * shift, rel=0.1)  # Ω_g is the split but for some percent
     assert found.parts["lines"] == pytest.approx(found.u_shares[0])  # it is not in the part of the lines, too
+
+
+def test_a_size_that_is_uncertain_counts_by_its_fourth_power_where_beat_and_vertical_swing_meet(fresh):
+    one = replace(lines((-0.59, 0.77)), amplitude=np.full(2, 5e-4), vertical=Vertical(1.46, 1e-3))
+    exact, uncertain = (
+        geometric_magnetism([replace(one, size_u=u)], np.array([30.0]), known(0.02526)).parts["amplitude"]
+        for u in (0.0, 0.2)
+    )
+    sizes = np.exp(0.2 * fresh.normal(size=100_000))
+    assert uncertain / exact == pytest.approx(np.sqrt(np.mean(sizes**8)), rel=0.1)  # the shift's own u is a tenth of it
 
 
 @pytest.mark.slow
