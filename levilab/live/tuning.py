@@ -7,7 +7,7 @@ from levilab.errors import UsageError
 from levilab.formats.typed import read_mass, read_masses, read_temperature
 from levilab.pipelines.tune.advice import advise
 from levilab.pipelines.tune.owner import Owner, washers_text
-from levilab.texts.text import Sentences
+from levilab.texts.text import Sentences, text_of
 
 #: Trials that are taken at most.
 _MOST_TRIALS = 100
@@ -29,7 +29,7 @@ def advice_on(wanted: Mapping[str, Any]) -> dict[str, Any]:
             owner = owner.with_trial(str(text))
         found = advise(owner, read_temperature(str(wanted.get("temperature", ""))))
     except ValueError as error:
-        raise UsageError("washers", str(error)) from error
+        raise UsageError("washers", text_of(error)) from error
     return {
         "text": found.text,
         "why": Sentences(found.why, found.window, *found.warnings),

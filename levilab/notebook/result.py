@@ -129,7 +129,7 @@ class AnalysisResult(Exportable):
 
     @cached_property
     def _identity(self) -> tuple[str, ...]:
-        """What two results share that are equal: digests of the inputs, and what was found of them how."""
+        """The analysis, digests of its inputs, its settings and numbers: equal results have the same."""
         found = [self.document[name] for name in ("settings", "values", "models")]
         return self.kind, *(source.sha256 for source in self.found.sources), as_json(found)
 

@@ -130,7 +130,9 @@ def test_a_page_in_german_stays_german_and_nothing_is_cut(viewport, hall, watche
 def test_the_server_answers_in_the_language_of_the_page_that_asks(hall):
     said = data_in("de", advice_on({"top": "24.1", "washers": "0.4", "temperature": "20"}))["text"]
     assert said.startswith("Nimm keine Scheiben: Der Kreisel wiegt dann 24,1 g und schwebt mit")
-    head = {"Content-Type": "application/json"}
+    head, asked = {"Content-Type": "application/json"}, b'{"do": "say which washers", "top": "x"}'
+    wrong = request(address(hall), "/do?language=de", asked, headers=head | {"X-Levilab-Token": hall.doors.token})[1]
+    assert json.loads(wrong)["error"].endswith("erwartet wird eine Masse, etwa 24.98 g")
     said = [request(address(hall), f"/do?language={code}", b"{}", headers=head)[1] for code in ("en", "de", "zz")]
     english, german, other = (json.loads(one)["error"] for one in said)
     assert english == other == "this page may only look: open the address that the terminal shows"
