@@ -30,7 +30,7 @@ from levilab.present.document.blocks import (
     with_marks,
 )
 from levilab.present.numbers import enumeration, how_many, list_in_words
-from levilab.report.beside import class_of, count_marks
+from levilab.report.beside import GOOD, class_of, count_marks
 from levilab.report.inputs import About, Input, describe, in_common
 from levilab.report.reproduction import Asked, paths_in_commands, reproduction
 from levilab.texts.note import is_doubt
@@ -104,12 +104,12 @@ def blocks_of_part(
         for doubtful in (True, False)
     )
     doubts = [Warnings(grave)] if grave else []
-    is_class = len({source.group for source in found.sources if source.group}) > 1
-    whose = Sentences(count_marks(class_of(analysis, found)), "levilab class says why.") if is_class else ""
-    numbers = tuple(block for block in part.result if isinstance(block, Tabular))[:1]
-    values = part.values or numbers if asked.short else part.result
+    of = class_of(analysis, found) if len({source.group for source in found.sources if source.group}) > 1 else None
+    why = ["levilab class says why."] if of and any(one.word != GOOD for one in of.marks) else []
+    whose = [Paragraph(Sentences(count_marks(of), *why))] if of else []
+    core = part.values or tuple(one for one in part.result if isinstance(one, Tabular))[:1]
     blocks = [
-        section("Result", "result", *doubts, Verdict(_verdict(found)), *[Paragraph(whose)] * is_class, *values),
+        section("Result", "result", *doubts, Verdict(_verdict(found)), *whose, *(core if asked.short else part.result)),
         section("Figure", "figure", picture_of(analysis, found, part, short=asked.short)),
     ]
     if asked.short:

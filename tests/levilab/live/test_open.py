@@ -219,14 +219,13 @@ def test_a_file_that_is_too_large_leaves_nothing(hall, monkeypatch):
     assert [path.name for path in hall.opened.folder.glob(".incoming*")] == []
 
 
-@pytest.mark.parametrize(
-    "wanted",
-    [{"do": "look at a file", "file": "none"}, {"do": "keep"}, {"do": "analyze a file", "file": ["x"]},
-     {"do": "look at a file", "file": "KEY", "options": {"device": "/etc/passwd"}},
-     {"do": "look at a file", "file": "KEY", "options": {"columns": {"colour": "1"}}},
-     {"do": "look at a file", "file": "KEY", "options": {"rate": "1; rm"}},
-     {"do": "keep", "file": "KEY"}],
-)  # fmt: skip
+@pytest.mark.parametrize("wanted", [
+    {"do": "look at a file", "file": "none"}, {"do": "keep"}, {"do": "analyze a file", "file": ["x"]},
+    {"do": "look at a file", "file": "KEY", "options": {"device": "/etc/passwd"}},
+    {"do": "look at a file", "file": "KEY", "options": {"columns": {"colour": "1"}}},
+    {"do": "look at a file", "file": "KEY", "options": {"rate": "1; rm"}},
+    {"do": "keep", "file": "KEY"},
+])  # fmt: skip
 def test_what_is_no_command_for_a_file_is_refused_in_words(hall, tmp_path, wanted):
     key = hall.opened.add(tmp_path / "my.csv")
     given = {name: key if value == "KEY" else value for name, value in wanted.items()}

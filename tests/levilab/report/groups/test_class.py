@@ -52,6 +52,7 @@ def of_three(tmp_path_factory):
 def test_each_group_is_beside_the_truth_of_its_seed(of_three):
     of = compared(of_three)
     assert [group.source.name for group in of.groups] == [HOSTILE, "Group 2", "Group 10"]
+    assert "3 of 3 results are good. What it means" in Page(render([(of.analysis, of.found)])).text
     (c32,) = of.quantities
     assert c32.truths == tuple(random_scene(seed).constants[0] for seed in (3, 2, 1))
     assert all(abs(one) < 3 for one in c32.from_truth)  # each is so in 99.7 % of all seeds
@@ -167,7 +168,7 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
         HOSTILE: GOOD, "Group 2": REPEAT, "Group 10": GOOD,
     }  # fmt: skip
     assert verdict(of).startswith(whose := "2 of 3 results are good. To repeat: Group 2.")
-    assert whose in Page(render([(of.analysis, of.found)])).text  # of levilab report, too
+    assert f"{whose} levilab class says why." in Page(render([(of.analysis, of.found)])).text
     assert of.quantities[0].used == tuple(group.source.name != "Group 2" for group in of.groups)
     assert of.quantities[0].mean.value == pytest.approx(2.4e-4, rel=0.03)  # the halved spins have 3.3e-4
     assert [line.get_marker() for axes in class_figure(of).axes for line in axes.lines].count(">") == 1
