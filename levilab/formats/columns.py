@@ -463,8 +463,11 @@ def _written_unit(name: str, meant: str) -> str | None:
 
 
 def _angular(path: Path, label: str) -> str:
-    what = f"{shorten(str(path), 200)}: column '{shorten(label)}' is an angular frequency, read in rad/s"
-    return of_file("angular", f"{what}; if it counts turns, say so with its column, as f=NAME [Hz]")
+    said = (
+        "{path:s}: column '{label:s}' is an angular frequency, read in rad/s; "
+        "if it counts turns, say so with its column, as f=NAME [Hz]"
+    )
+    return of_file("angular", Text(said, shorten(str(path), 200), shorten(label)))
 
 
 def _unknown_unit(path: Path, label: str, title: Title) -> str:

@@ -359,9 +359,8 @@ def _by_values(
     if "Hz" not in possible_spins(median(numbers) if numbers else 0.0):
         return None, ""
     label = layout.header[index]
-    note = of_file(
-        "no unit", f"{shorten(str(path), 200)}: column '{shorten(label)}' has no unit and is taken as the spin in Hz"
-    )
+    said = "{path:s}: column '{label:s}' has no unit and is taken as the spin in Hz"
+    note = of_file("no unit", Said(said, shorten(str(path), 200), shorten(label)))
     return Column(_SPIN, index, label, 1.0, unit="Hz"), note
 
 
@@ -703,8 +702,5 @@ def _titles(
         what = f'{layout.width} columns and no header; add one, or say `columns` = "t=1,f=2"'
         raise NoSuchColumn(path, what, line=layout.first_line)
     taken = dict(zip(TITLES_WITHOUT_HEADER, filled, strict=False))
-    return (
-        numbers,
-        taken,
-        [of_file("no header", f"{shorten(str(path), 200)}: no header; the columns are taken as {', '.join(taken)}")],
-    )
+    said = "{path:s}: no header; the columns are taken as {names:s}"
+    return numbers, taken, [of_file("no header", Said(said, shorten(str(path), 200), ", ".join(taken)))]

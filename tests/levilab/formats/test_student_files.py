@@ -21,6 +21,7 @@ from levilab.formats.waveforms.record import read_record
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.sources import data_files
 from levilab.pipelines.suits import save
+from levilab.texts.text import in_language
 from support.paths import ROOT
 
 FILES = ROOT / "sample_data" / "student-files"
@@ -174,10 +175,9 @@ def test_a_column_in_which_some_rows_have_no_u_behind_the_number_says_so(count, 
     assert [warning.partition(": ")[2] for warning in table.warnings] == [said]
 
 
-@pytest.mark.parametrize(
-    ("cell", "do"),
-    [("38.5 Hz ± 30 ms", "one unit in all"), ("38.5 ± 1 %?", "the title u"), ("10²", "number"), ("4x1000", "number")],
-)
+@pytest.mark.parametrize(("cell", "do"), [
+    ("38.5 Hz ± 30 ms", "one unit in all"), ("38.5 ± 1 %?", "the title u"), ("10²", "number"), ("4x1000", "number"),
+])  # fmt: skip
 def test_a_number_behind_a_mark_that_cannot_be_used_is_quoted_as_it_stands(cell, do, tmp_path):
     path = tmp_path / "my.csv"
     path.write_text("t,f\n" + rows("{t},{f} ± 0.03").replace("38.5 ± 0.03", cell), encoding="utf-8")
@@ -327,6 +327,7 @@ def test_a_column_without_name_and_unit_is_asked_about(tmp_path):
     table = read_table(file, quantities=SPIN)
     assert table.column("spin_frequency_hz")[0] == 38
     assert "'Wert' has no unit and is taken as the spin in Hz" in table.warnings[0]
+    assert in_language(table.warnings[0], "de").endswith("'Wert' hat keine Einheit und gilt als Drehfrequenz in Hz")
     with pytest.raises(NoSuchColumn):  # of a folder nothing is guessed
         read_table(file, quantities=SPIN, needed=SPIN[:2], guess=False)
 
@@ -515,10 +516,9 @@ def test_times_in_two_columns_are_asked_about(text, says, tmp_path):
         read_table(path, quantities=SPIN)
 
 
-@pytest.mark.parametrize(
-    ("titles", "seconds", "columns"),
-    [("t [min];u_t [s];f", 1, {}), ("t [min];T [s];n", 0.026, {}), ("t [min];t [s];f", 20, {"t": "1"})],
-)
+@pytest.mark.parametrize(("titles", "seconds", "columns"), [
+    ("t [min];u_t [s];f", 1, {}), ("t [min];T [s];n", 0.026, {}), ("t [min];t [s];f", 20, {"t": "1"}),
+])  # fmt: skip
 def test_minutes_beside_other_seconds_are_the_times(titles, seconds, columns, tmp_path):
     path = tmp_path / "u.csv"
     rows = "".join(f"{k};{seconds};{38 - k}\n" for k in range(3))
