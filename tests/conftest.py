@@ -36,8 +36,7 @@ SLOW = """
     levilab/acquisition/test_losses.py
     levilab/benchmark  levilab/cli/test_main.py  levilab/cli/test_sweep.py  levilab/crosscheck
     levilab/formats/waveforms/test_memory.py  levilab/live  levilab/motion  levilab/notebook
-    levilab/pipelines/spindown  levilab/pipelines/test_result.py
-    levilab/report/test_page.py
+    levilab/pipelines/spindown  levilab/pipelines/test_result.py  levilab/report/test_page.py
     levilab/runs/test_hostile.py  levilab/runs/test_kill.py
     levilab/simulator  ../levilab/simulator  levilab/stability  levilab/sweeps
     levilab/world/test_base.py  levilab/world/test_motion_world.py  levilab/world/test_serve.py
@@ -48,8 +47,9 @@ SLOW = """
 #: Rooms of processes, sockets and types, whose slow tests a version of Python may change: `make all-pythons` leaves out
 #: all other slow ones, and .github/workflows/tests.yml carries out every test on each version.
 VERSIONED = """
-    levilab/cli  levilab/live/test_doors.py  levilab/live/test_hostile.py  levilab/live/test_serve.py
-    levilab/notebook  levilab/runs  levilab/sweeps  levilab/workers
+    instruments/links  instruments/virtual/servers  levilab/cli  levilab/live/practice/test_process.py  levilab/notebook
+    levilab/live/test_doors.py  levilab/live/test_hostile.py  levilab/live/test_serve.py  levilab/runs  levilab/sweeps
+    levilab/workers  levilab/world/test_serve.py
 """
 #: Files with tests of ten seconds and more: they go first of all, so that at the end no worker waits for another's.
 LONGEST = """
