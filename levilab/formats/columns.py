@@ -472,8 +472,6 @@ def _angular(path: Path, label: str) -> str:
 
 def _unknown_unit(path: Path, label: str, title: Title) -> str:
     kind = dimension(title.column or "")
-    return of_file(
-        "unknown unit",
-        f"{shorten(str(path), 200)}: column '{shorten(label)}' is not used: '{shorten(title.unit or '')}' is no unit "
-        f"of {kind} known here ({', '.join(list(UNITS[kind])[:8])} …)",
-    )
+    said = "{path:s}: column '{label:s}' is not used: '{unit:s}' is no unit of {kind} known here ({known:s} …)"
+    values = shorten(str(path), 200), shorten(label), shorten(title.unit or ""), kind, ", ".join(list(UNITS[kind])[:8])
+    return of_file("unknown unit", Text(said, *values))

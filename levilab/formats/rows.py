@@ -223,7 +223,7 @@ def _read_lines(
     notes += _notes_on_refused(refused, len(lines), skip=skip_doubtful, may_skip=not drop_unended)
     notes += [_left_out(error.line or 0, line, "is no reading") for error, line in remarks[:_MOST_NAMED]]
     if len(remarks) > _MOST_NAMED:
-        notes.append(Note("words", f"{len(remarks)} rows without a number are left out, these and others"))
+        notes.append(Note("words", Said("{n} rows without a number are left out, these and others", len(remarks))))
     return Rows(numbers, np.array(lines, np.int64), (*notes, *_doubts_about(time)))
 
 
@@ -249,8 +249,9 @@ def _notes_on_refused(
         do = "; `skip_doubtful` leaves such rows out" if may_skip and len(doubtful) < read else ""
         raise TableError(error.path, f"{error.message}{also}{do}", line=error.line)
     if doubtful:
-        rows = f"{how_many(len(numbers), 'doubtful row')} {'is' if len(numbers) == 1 else 'are'} left out, as asked"
-        yield Note("doubtful", f"{rows}: line{'s' * (len(numbers) > 1)} {places}")
+        many = "{n} doubtful rows are left out, as asked: lines {places:s}"
+        one = "{n} doubtful row is left out, as asked: line {places:s}"
+        yield Note("doubtful", Said(one if len(numbers) == 1 else many, len(numbers), places))
 
 
 def _lines(text: Text, layout: Layout, notes: list[str] | None = None) -> Iterator[tuple[int, str]]:
@@ -269,7 +270,8 @@ def _remark_behind(layout: Layout, number: int, line: str) -> Iterator[str]:
     """Yield a note on the words that a person wrote behind the last column."""
     remark = "" if layout.aligned else " ".join(filter(None, layout.dialect.split(line)[layout.width :]))
     if remark:
-        yield Note("remark", f"line {number}: '{shorten(remark)}' behind the last column is left out")
+        said = "line {number}: '{remark:s}' behind the last column is left out"
+        yield Note("remark", Said(said, number, shorten(remark)))
 
 
 def _with_order_of_dates(text: Text, layout: Layout, chosen: Sequence[Column], notes: list[str]) -> Layout:
@@ -430,4 +432,4 @@ def _number_with_unit(path: Path, layout: Layout, column: Column, line: int, cel
 
 
 def _left_out(line: int, text: str, why: str) -> str:
-    return Note(why, f"line {line}: '{shorten(' '.join(text.split()))}' {why} and is left out")
+    return Note(why, Said("line {line}: '{text:s}' {why} and is left out", line, shorten(" ".join(text.split())), why))

@@ -238,7 +238,7 @@ def _table(
     gaps: names of columns that may have some, at no cost of a row.
     """
     name = shorten(str(path), 200)
-    notes = [*warnings, *(reword(note, f"{name}: {note}", names_input=True) for note in rows.notes)]
+    notes = [*warnings, *(reword(note, Said("{path:s}: {what}", name, note), names_input=True) for note in rows.notes)]
     numbers = dict(zip(chosen, rows.values, strict=False))
     notes += [of_file("±", f"{_seen(name, column)} is not used") for column in _drop_unused(numbers, wanted)]
     # The comparison is false for NaN, too.
@@ -279,6 +279,13 @@ def _in_si(kept: "Mapping[Column, NDArray[np.float64]]") -> "dict[str, NDArray[n
     return columns
 
 
+#: Rows that are left out, several and one.
+_MISSED = (
+    "{path:s}: {n} of {rows} rows are left out as missed (empty, -, n/a, nan, inf{zero} or 9.91E37): lines {places:s}"
+)
+_MISSED_ONE = (
+    "{path:s}: {n} of {rows} rows is left out as missed (empty, -, n/a, nan, inf{zero} or 9.91E37): line {places:s}"
+)
 #: u of a difference of two counts, each cut to whole turns: two rectangular distributions, GUM 4.3.7 [turns].
 _U_OF_TURNS = 6**-0.5
 _WHOLE_TURNS = Said("0.41 turns, of two counts cut to whole turns")
@@ -343,8 +350,4 @@ def _missed_warning(name: str, lines: "NDArray[np.int64]", rows: int, *, periods
     """Return the warning about rows left out, with what counts as missed, a period of 0 with `periods`."""
     zero = ", a period of 0" * periods
     places = ", ".join(str(line) for line in lines[:5]) + (", …" if lines.size > 5 else "")
-    return of_file(
-        "missed",
-        f"{name}: {lines.size} of {rows} rows {'is' if lines.size == 1 else 'are'} left out as missed "
-        f"(empty, -, n/a, nan, inf{zero} or 9.91E37): line{'s' * (lines.size > 1)} {places}",
-    )
+    return of_file("missed", Said(_MISSED_ONE if lines.size == 1 else _MISSED, name, lines.size, rows, zero, places))

@@ -510,7 +510,7 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
     quantities, needed = request.quantities, request.needed
     header, wanted, warnings = _titles(path, layout, request.columns, guess=request.guess)
     if text.lies:
-        warnings.append(of_file("lies", f"{shorten(str(path), 200)}: {LIES}"))
+        warnings.append(of_file("lies", Said("{path:s}: {what}", shorten(str(path), 200), LIES)))
     meant = part.titles
     if not {"t", "time_s"} & {*wanted}:
         _must_be_one_time(path, layout, meant)

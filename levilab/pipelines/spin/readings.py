@@ -26,6 +26,7 @@ from levilab.texts.text import Text
 
 #: Channels whose frequency is no spin, as experiments call them, with what it is.
 NO_SPIN = {"laser": "how often the stem cuts the laser: its precession", "drive": "that of the drive"}
+_UNDESCRIBED = "{path:s} has no line in {index:s}, as a process that was killed leaves it: it is left out"
 _CHOSEN = "has records of {names:s}; {chosen:s} is analyzed, the option `channel` chooses another"
 
 
@@ -135,10 +136,8 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
                 names=(*names,),
             )
         )
-    warnings: list[str] = [
-        Note("undescribed", f"{path} has no line in {INDEX}, as a process that was killed leaves it: it is left out")
-        for path in undescribed_codes(run.folder)
-    ]
+    left_out = undescribed_codes(run.folder)
+    warnings: list[str] = [Note("undescribed", Text(_UNDESCRIBED, path, INDEX)) for path in left_out]
     warnings += [text for waveform in found for text in waveform.warnings]
     if chosen.casefold() in NO_SPIN:
         what = NO_SPIN[chosen.casefold()]

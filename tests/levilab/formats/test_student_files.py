@@ -83,43 +83,44 @@ def rows(form):
     return "".join(form.format(t=t, f=f) + "\n" for t, f in zip(INSTANTS, SPINS, strict=True))
 
 
-@pytest.mark.parametrize(
-    ("text", "u"),
-    [
-        ("t,f\n" + rows("{t},{f} ± 0.03"), 0.03),
-        ("t (s);n (U/min)\n" + rows("{t} ± 0.5;{f} ± 0.03").replace(".", ","), 0.03 / 60),
-        (rows("{t} s   {f} +/- 0.03 Hz"), 0.03),
-        ("t,f\n" + rows("{t:.0f},{f:.2f}(3)"), 0.03),
-        ("t,f\n" + rows("{t},({f} ± 0.03) Hz"), 0.03),
-        ("t,f\n" + rows("{t},{f} Hz ± 0.03 Hz"), 0.03),
-        (rows("{t} s ± 0.5 s   {f} Hz ± 0.03 Hz"), 0.03),
-        ("t,f\n" + rows("{t},{f} ± 0.1 %"), [0.001 * f for f in SPINS]),
-        (rows("{t} s   {f} Hz ± 0.1 %"), [0.001 * f for f in SPINS]),
-        ("t;f\n" + rows("{t} s;{f} Hz ± 30 mHz"), 0.03),
-        ("Zeit [s]|Frequenz [Hz]|z [mm]\ns|Hz|cm\n" + rows("{t}|{f}|2"), None),
-        ("t   f\n[s]   [Hz]\n" + rows("{t}   {f}"), None),
-        (rows("{t} s   {f} Hz"), None),
-        ("Zeit Frequenz\n" + rows("{t} s {f} Hz"), None),
-        ("sec,Hz\n" + rows("{t},{f}"), None),
-        ("s;1/s\n" + rows("{t};{f}"), None),
-        ("t (s)," + ",".join(map(str, INSTANTS)) + "\nf (Hz)," + ",".join(map(str, SPINS)) + "\n", None),
-        ("Zeit;s;" + ";".join(map(str, INSTANTS)) + "\nFrequenz;Hz;" + ";".join(map(str, SPINS)) + "\n", None),
-        ("\t".join(map(str, INSTANTS)) + "\n" + "\t".join(map(str, SPINS)) + "\n", None),
-        ("\0\x01boot rst:0x1\nt,f\n" + rows("{t},{f}"), None),
-        (
-            "#;t [s];f [Hz]\n"
-            + "".join(f"{k};{t};{f}\n" for k, (t, f) in enumerate(zip(INSTANTS, SPINS, strict=True))),
-            None,
-        ),
-        ('"t" "f"\n' + "".join(f'"{k}" {t} {f}\n' for k, (t, f) in enumerate(zip(INSTANTS, SPINS, strict=True))), None),
-        ('"t\n[s]";"f\n[Hz]";"Fehler\n[mHz]"\n' + rows("{t};{f};30"), 0.03),
-        ("Zeit t [s]   Frequenz f [Hz]   ± [Hz]\n" + rows("{t}   {f}   0.03"), 0.03),
-        ("t [s];Δn (U/min);n (U/min)\n" + rows("{t};0,03;{f}").replace(".", ","), 0.03 / 60),
-        ("Zeit;Frequenz\nlinks;rechts\nms;Hz\n" + rows("{t}e3;{f} ×10^0") + "Mittel;k.A.\n", None),
-        ("".join(f"0:00:{t:02.0f} -> {f} Hz\n" for t, f in zip(INSTANTS, SPINS, strict=True)), None),
-        ("Y unit;Hz\nt;f [Hz] links;Comment\n" + rows("{t:.0f}s;{f}"), None),
-    ],
-)
+def in_german(notes):
+    return " ".join(in_language(one, "de") for one in notes)
+
+
+@pytest.mark.parametrize(("text", "u"), [
+    ("t,f\n" + rows("{t},{f} ± 0.03"), 0.03),
+    ("t (s);n (U/min)\n" + rows("{t} ± 0.5;{f} ± 0.03").replace(".", ","), 0.03 / 60),
+    (rows("{t} s   {f} +/- 0.03 Hz"), 0.03),
+    ("t,f\n" + rows("{t:.0f},{f:.2f}(3)"), 0.03),
+    ("t,f\n" + rows("{t},({f} ± 0.03) Hz"), 0.03),
+    ("t,f\n" + rows("{t},{f} Hz ± 0.03 Hz"), 0.03),
+    (rows("{t} s ± 0.5 s   {f} Hz ± 0.03 Hz"), 0.03),
+    ("t,f\n" + rows("{t},{f} ± 0.1 %"), [0.001 * f for f in SPINS]),
+    (rows("{t} s   {f} Hz ± 0.1 %"), [0.001 * f for f in SPINS]),
+    ("t;f\n" + rows("{t} s;{f} Hz ± 30 mHz"), 0.03),
+    ("Zeit [s]|Frequenz [Hz]|z [mm]\ns|Hz|cm\n" + rows("{t}|{f}|2"), None),
+    ("t   f\n[s]   [Hz]\n" + rows("{t}   {f}"), None),
+    (rows("{t} s   {f} Hz"), None),
+    ("Zeit Frequenz\n" + rows("{t} s {f} Hz"), None),
+    ("sec,Hz\n" + rows("{t},{f}"), None),
+    ("s;1/s\n" + rows("{t};{f}"), None),
+    ("t (s)," + ",".join(map(str, INSTANTS)) + "\nf (Hz)," + ",".join(map(str, SPINS)) + "\n", None),
+    ("Zeit;s;" + ";".join(map(str, INSTANTS)) + "\nFrequenz;Hz;" + ";".join(map(str, SPINS)) + "\n", None),
+    ("\t".join(map(str, INSTANTS)) + "\n" + "\t".join(map(str, SPINS)) + "\n", None),
+    ("\0\x01boot rst:0x1\nt,f\n" + rows("{t},{f}"), None),
+    (
+        "#;t [s];f [Hz]\n"
+        + "".join(f"{k};{t};{f}\n" for k, (t, f) in enumerate(zip(INSTANTS, SPINS, strict=True))),
+        None,
+    ),
+    ('"t" "f"\n' + "".join(f'"{k}" {t} {f}\n' for k, (t, f) in enumerate(zip(INSTANTS, SPINS, strict=True))), None),
+    ('"t\n[s]";"f\n[Hz]";"Fehler\n[mHz]"\n' + rows("{t};{f};30"), 0.03),
+    ("Zeit t [s]   Frequenz f [Hz]   ± [Hz]\n" + rows("{t}   {f}   0.03"), 0.03),
+    ("t [s];Δn (U/min);n (U/min)\n" + rows("{t};0,03;{f}").replace(".", ","), 0.03 / 60),
+    ("Zeit;Frequenz\nlinks;rechts\nms;Hz\n" + rows("{t}e3;{f} ×10^0") + "Mittel;k.A.\n", None),
+    ("".join(f"0:00:{t:02.0f} -> {f} Hz\n" for t, f in zip(INSTANTS, SPINS, strict=True)), None),
+    ("Y unit;Hz\nt;f [Hz] links;Comment\n" + rows("{t:.0f}s;{f}"), None),
+])  # fmt: skip
 def test_readings_are_read_however_they_are_written(text, u, tmp_path):
     path = tmp_path / "my.txt"
     path.write_text(text, encoding="utf-8")
@@ -193,6 +194,7 @@ def test_rows_that_a_person_doubts_are_left_out_on_request_and_named(tmp_path):
     table = read_table(path, skip_doubtful=True)
     assert table.column("time_s").tolist() == [0, 10, 40, 50]
     assert "2 doubtful rows are left out, as asked: lines 4, 5" in " ".join(table.warnings)
+    assert "2 zweifelhafte Zeilen sind wie verlangt ausgelassen: Zeilen 4, 5" in in_german(table.warnings)
     path.write_text("t,f\n" + "".join(f"{t},40\n{t},40?\n" for t in range(1002)), encoding="utf-8")
     assert len(read_table(path, skip_doubtful=True)) == 1002  # beyond the lines after which an error ends the reading
 
@@ -203,6 +205,7 @@ def test_a_line_with_bytes_that_are_no_text_is_left_out_with_its_number(tmp_path
     table = read_table(path)
     assert table.column("time_s").tolist() == [0, 10, 30, 40, 50]
     assert "line 4: '20.0,3�7.1' has bytes that are no text and is left out" in " ".join(table.warnings)
+    assert "Zeile 4: '20.0,3�7.1' hat Bytes, die kein Text sind, und ist ausgelassen" in in_german(table.warnings)
 
 
 @pytest.mark.parametrize(("unit", "sensor"), [("m/s^2", "accelerometer"), ("rad/s", "gyroscope")])
@@ -327,7 +330,7 @@ def test_a_column_without_name_and_unit_is_asked_about(tmp_path):
     table = read_table(file, quantities=SPIN)
     assert table.column("spin_frequency_hz")[0] == 38
     assert "'Wert' has no unit and is taken as the spin in Hz" in table.warnings[0]
-    assert in_language(table.warnings[0], "de").endswith("'Wert' hat keine Einheit und gilt als Drehfrequenz in Hz")
+    assert "'Wert' hat keine Einheit und gilt als Drehfrequenz in Hz" in in_german(table.warnings)
     with pytest.raises(NoSuchColumn):  # of a folder nothing is guessed
         read_table(file, quantities=SPIN, needed=SPIN[:2], guess=False)
 
