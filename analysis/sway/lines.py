@@ -140,7 +140,7 @@ def swings_of(
         places: x + iy, shape (n,) [m], seen so that the spin is positive.
         heights: shape (n,) [m]; None where they are not known.
         window: [s].
-        rising: whether the vertical swing is seen in the places itself, too, as by a magnetometer that leans.
+        rising: whether the places show the heights, and an image of each line, too, as a magnetometer does that leans.
 
     Raises:
         TooFewReadings, ShapesDiffer, NotFinite, TimesNotIncreasing: see `analysis.errors`.

@@ -3,9 +3,9 @@
 A top of moment m at x + iy, which leans by θ(x + iy), makes B_x + iB_y = K (3/d + θ)(x + iy) at a distance d above it,
 and B_z = 3K/d x and 3K/d y at (d, 0) and (0, d) at its height, with K = μ₀m/4πd³.  A lean of slow swings and of the
 precession has one law, θ = 2(α² + α_v²/2)/g.  A sensor that is ρ off its place changes that by terms of (ρ/d)²; one
-that leans, or is off, shows the vertical swing, too, as two lines.  Two unlike gains, or an angle between the axes that
-is no right one, make of each line an image of the other sign: s + ε s*, with one ε for all lines, which the record
-shows: lines of which none is the other's image have no mean of s².
+that leans, or is off, shows the heights, too: two lines of the vertical swing and two of the beat.  Two unlike gains,
+or an angle between the axes that is no right one, make of each line an image of the other sign: s + ε s*, with one ε
+for all lines, which the record shows: lines of which none is the other's image have no mean of s².
 """
 
 import math

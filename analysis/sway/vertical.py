@@ -99,8 +99,8 @@ def of_places(
 
 #: Of each line: how often the backward, the forward and the vertical swing are in its frequency.
 Beside = tuple[tuple[int, int, int], ...]
-#: The lines beside the slow swings, and those of the vertical swing alone.  The last two are as near to the swings as
-#: the first two, for which they answer where the beat meets the vertical swing.
+#: The lines beside the slow swings, of which the last two are as near to these as the first two, for which they answer
+#: where the beat meets the vertical swing; and those of the heights alone: the vertical swing and the beat.
 BESIDE: Beside = ((0, 1, -1), (1, 0, 1), (0, 1, 1), (1, 0, -1), (-1, 2, -1), (2, -1, 1))
 ALONE: Beside = ((0, 0, 1), (0, 0, -1), (-1, 1, 0), (1, -1, 0))
 #: Lines of the third order: up to 10 µm where both swings have 1 mm.

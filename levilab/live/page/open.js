@@ -147,7 +147,7 @@ function runOf(run, number) {
 
 function rowOf(column, run) {
   const row = make("tr", "", column.quantity ? "used" : ""), title = column.title || phrase("column {number}", {number: column.index + 1});
-  const cells = [Object.assign(make("th", title), {scope: "row"}), make("td"), make("td"), make("td", column.values.map((text) => /\.\d{9,}$/.test(text) ? String(Number(Number(text).toPrecision(Math.max(9, text.indexOf(".") + 4)))) : text).join("  "), "values")];
+  const cells = [Object.assign(make("th", title), {scope: "row"}), make("td"), make("td"), make("td", column.values.join("  "), "values")];
   if (look.channels.length || !quantities[column.quantity || "time_s"]) {
     cells[1].textContent = column.quantity ? phrase("{quantity}, is analyzed", {quantity: column.quantity}) : phrase("not used");
     cells[2].textContent = column.unit;

@@ -161,13 +161,13 @@ def test_a_choice_in_the_table_changes_how_it_is_read(hall, watched):
 
 
 def test_nothing_that_a_file_contains_becomes_markup(hall, watched):
-    page, hostile = watched(), '<img src=x onerror="window.hacked=1">'
-    file = hall.root.parent / "hostile.csv"
+    page, hostile, file = watched(), '<img src=x onerror="window.hacked=1">', hall.root.parent / "hostile.csv"
     rows = (f"{1.7e9 + t + 0.123:.9f};{f:.14f};{hostile}\n" for t, f in zip(TIME, SPIN, strict=True))
     file.write_text(f"t;f [Hz];{hostile}\n{''.join(rows)}")
     page.goto(f"{address(hall)}open?file={hall.opened.add(file)}#{hall.doors.token}")
     until(page, "window.levilab?.look")
-    assert all(text in page.inner_text("#runs") for text in (hostile, "1700000010.123"))  # no digit of a ms is lost
+    as_in_the_file = (hostile, f"{1.7e9 + TIME[1] + 0.123:.9f}", f"{SPIN[1]:.14f}")
+    assert all(text in page.inner_text("#runs") for text in as_in_the_file)
     assert page.evaluate("[window.hacked, document.images.length]") == [None, 0]
 
 
