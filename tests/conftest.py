@@ -100,8 +100,8 @@ def pytest_collection_finish():
     gc.enable()
 
 
-# What is green stays green: the same examples each time, however busy the machine. `make explore` looks for others.
-settings.register_profile("repeat", derandomize=True, deadline=None)
+# What is green stays green: the same few examples each time, however busy the machine. `make explore` looks for others.
+settings.register_profile("repeat", max_examples=40, derandomize=True, deadline=None)
 settings.register_profile("explore", max_examples=1000, deadline=None)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "repeat"))
 

@@ -16,7 +16,7 @@ from support.wire_pairs import FRAMED, KINDS, SEVEN_BITS, STREAMS, WAYS, WITHIN,
 
 EXPLORING = settings.get_current_profile_name() == "explore"
 #: Faults for each driver in the suite: on a way within the process, whose waits take no time, and on a proxied one.
-FEW_FAULTS = {way: 20 if way in WITHIN else 5 for way in WAYS}
+FEW_FAULTS = {way: 6 if way in WITHIN else 3 for way in WAYS}
 
 #: Way, model, and what became of a fault → how often.  `pytest -s` prints it.
 tally = collections.Counter()

@@ -26,7 +26,7 @@ T, F, U = "time_s", "spin_frequency_hz", "spin_frequency_u_hz"
 PLAIN = {T: [0, 0.5, 1], F: [61.5, 61.25, 61]}
 SECONDS = PLAIN | {T: [0, 1, 2]}
 WITH_U = PLAIN | {U: [0.25, 0.5, 0.125]}
-SLOW = settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+SLOW = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 @pytest.fixture
@@ -590,14 +590,14 @@ def test_any_bytes_are_read_or_refused(tmp_path, data):
     reads_or_refuses(tmp_path / "fuzz.csv")
 
 
-@settings(SLOW, max_examples=600)
+@SLOW
 @given(st.sampled_from(["", "t,f\n", "t;f;u\n", f"{T},{F}\n0,61\n1,61\n2,61\n", "t\tf\n0\t1\n1\t1\n2\t1\n"]), bodies)
 def test_any_text_is_read_or_refused(tmp_path, head, body):
     (tmp_path / "fuzz.csv").write_bytes((head + body).encode())
     reads_or_refuses(tmp_path / "fuzz.csv")
 
 
-@settings(SLOW, max_examples=400)
+@SLOW
 @given(st.lists(st.text(alphabet='0123456789.,;eE+-_ "xna\t\r\0#', max_size=12), min_size=1, max_size=6))
 @example(["True"])
 @example(["false"])

@@ -10,7 +10,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from levilab.acquisition.loop import acquire
@@ -333,7 +333,6 @@ KEYS = sorted({*RECORD, "simulation", "instruments", "channels", "time_zero_utc"
 
 
 @given(st.dictionaries(st.sampled_from(KEYS), TREES, max_size=2), st.lists(TREES, max_size=3))
-@settings(max_examples=30)
 def test_whatever_a_record_says_the_list_of_runs_goes_on(changes, events):
     with tempfile.TemporaryDirectory() as place:
         folder = run_with(Path(place) / "run", **{key: json.dumps(value) for key, value in changes.items()})

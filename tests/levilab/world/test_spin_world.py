@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from instruments.clock import VirtualClock
@@ -124,7 +124,6 @@ CHANGES = st.lists(
 )
 
 
-@settings(deadline=None, max_examples=60)
 @given(changes=CHANGES, drag=st.sampled_from([("disc", (2.34e-4,)), ("stokes", (3.2e-3,)), ("mixed", (1e-3, 1e-5))]))
 def test_angle_and_spin_are_continuous_whatever_the_drive_does(changes, drag):
     top = world(replace(QUIET, drag=drag[0], constants=drag[1]))

@@ -4,7 +4,7 @@ Source: Agilent/Keysight 33500 Series Operating and Service Guide, unless a test
 """
 
 import numpy as np
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from instruments.clock import VirtualClock
@@ -26,7 +26,6 @@ SIN SQU PULS RAMP DC NOIS PRBS ARB USER MIN MAX DEF INF ON OFF DBM VRMS VPP BUS 
 WORDS = (*_WORDS.split(), "1 MHZ,20,-3", "2 DBM", "-300 DBM")
 
 
-@settings(deadline=None, max_examples=60)
 @given(commands=st.lists(st.tuples(st.sampled_from(HEADERS), st.sampled_from(WORDS)), max_size=30))
 def test_whatever_is_set_the_settings_fit_each_other(commands):
     for kind in (Virtual33500B, Virtual33220A):

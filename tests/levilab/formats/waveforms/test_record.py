@@ -19,7 +19,7 @@ from levilab.formats.waveforms.header import NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 
-FEW = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+FEW = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 #: Of the sample files, which sample_data/make.py writes from one signal.
 STEP, COUNT, START = 2.5e-4, 2000, -0.25
 
@@ -400,7 +400,7 @@ def test_any_bytes_are_read_or_refused_in_one_line(write, content, magic):
     read_or_refused(write(magic + content, "a.dat" if magic else "a.bin"), 1000.0)
 
 
-@settings(FEW, max_examples=40)
+@FEW
 @given(
     name=st.sampled_from([name for name in SCOPE_FILES if not name.startswith("two")]),
     edits=st.lists(st.tuples(st.integers(0, 400), st.sampled_from(list(b'0.,;-e \n"#x\0'))), min_size=1, max_size=4),
