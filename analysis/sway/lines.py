@@ -354,28 +354,27 @@ def _fit(
     prior[:count, count:-1] = np.diag(1 / _SLOPES_U[:count])
     prior[-1, -1] = 1 / known.u
     most = np.concatenate([np.full(count, 0.3 / half), np.full(count, 0.3 / half**2), [0.1 / half]])
-    quarter, size = 2j * np.pi * late[:, None], float(np.linalg.norm(s)) / math.sqrt(t.size)
+    turn, size = 2j * np.pi * late, float(np.linalg.norm(s)) / math.sqrt(t.size)
     noise = size
     for _ in range(_STEPS):
-        waves = np.exp(quarter * (frequency + late[:, None] * slope / 2))
-        up = np.exp(quarter[:, 0] * rise)
-        lines = beside(waves, up, rows)
-        linear = np.concatenate([waves, lines, still], axis=1)
+        waves = np.exp(turn * (frequency[:, None] + late / 2 * slope[:, None]))
+        up = np.exp(turn * rise)
+        lines = beside(waves.T, up, rows).T
+        linear = np.concatenate([waves, lines, still.T])
+        mirror = linear.conj()
         # an amplitude is about as large as the places: lines that are as one do not cancel each other
-        normal = linear.conj().T @ linear + 2 * (noise / size) ** 2 * np.eye(linear.shape[1])
-        amplitudes = np.linalg.solve(normal, linear.conj().T @ s)
-        rest = s - linear @ amplitudes
-        left = np.linalg.norm(rest) / math.sqrt(2 * (t.size - linear.shape[1] - count))
+        normal = mirror @ linear.T + 2 * (noise / size) ** 2 * np.eye(len(linear))
+        amplitudes = np.linalg.solve(normal, mirror @ s)
+        rest = s - amplitudes @ linear
+        left = np.linalg.norm(rest) / math.sqrt(2 * (t.size - len(linear) - count))
         noise = math.hypot(float(left), _FINEST * size)
-        moving = waves * amplitudes[:count]
-        moved = lines * amplitudes[count : count + len(rows)] @ np.array(rows)
-        moving[:, :2] += moved[:, :2]
-        slopes = np.concatenate(
-            [quarter * moving, quarter * late[:, None] / 2 * moving, quarter * moved[:, 2:]], axis=1
-        )
-        slopes -= linear @ np.linalg.solve(normal, linear.conj().T @ slopes)
-        information = (slopes.conj().T @ slopes).real / noise**2
-        gradient = (slopes.conj().T @ rest).real / noise**2
+        moving = waves * amplitudes[:count, None]
+        moved = (np.array(rows).T * amplitudes[count : count + len(rows)]) @ lines
+        moving[:2] += moved[:2]
+        slopes = np.concatenate([moving, late / 2 * moving, moved[2:]]) * turn
+        slopes -= np.linalg.solve(normal, mirror @ slopes.T).T @ linear
+        real = slopes.view(np.float64)  # both coordinates
+        information, gradient = real @ real.T / noise**2, real @ rest.view(np.float64) / noise**2
         # its own slopes would move the swings by 1e-6 Hz
         expected = known.value + follows * (vertical_swing(frequency[0], frequency[1]) - of_field)
         off = np.append(slope / _SLOPES_U[:count], (rise - expected) * prior[-1, -1])
@@ -398,4 +397,4 @@ def _fit(
         noise=noise,
         misfit=2 * t.size * math.log(noise**2) + float(off @ off) + 2 * float(np.linalg.norm(amplitudes / size)) ** 2,
     )
-    return _Fit(found, rest, waves, still, known, rows)
+    return _Fit(found, rest, waves.T, still, known, rows)

@@ -109,7 +109,8 @@ CUBIC: Beside = ((-1, 2, 0), (2, -1, 0), (0, 1, -2), (1, 0, 2))
 
 def beside(waves: Places, up: Places, rows: Beside) -> Places:
     """Return the waves of lines, a column each, by those of swings and of the vertical swing, shape (n,)."""
-    return np.stack([waves[:, 0] ** i * waves[:, 1] ** j * up**k for i, j, k in rows], axis=1)
+    powers = [{1: one, 2: one * one, -1: 1 / one, -2: 1 / (one * one)} for one in (*waves[:, :2].T, up)]
+    return np.array([math.prod(of[k] for of, k in zip(powers, row, strict=True) if k) for row in rows]).T
 
 
 def _misfit(rest: NDArray[np.number], lines: NDArray[np.number], others: NDArray[np.number]) -> float:

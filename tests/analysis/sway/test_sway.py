@@ -42,9 +42,9 @@ def swing(times, slow, amplitudes=(4e-4, 6e-4), precession=6.0):
 @pytest.mark.slow
 @pytest.mark.parametrize("correlation", [0.0, 0.8])
 def test_errors_of_frequencies_are_as_large_as_u_says(fresh, correlation):
-    times = np.arange(1000) / 50
+    times, trials = np.arange(500) / 25, 12
     pulls = []
-    for _ in range(24):
+    for _ in range(trials):
         slow = (fresh.uniform(-0.68, -0.4), fresh.uniform(0.55, 0.9))
         noise = 6e-5 * (fresh.normal(size=times.size) + 1j * fresh.normal(size=times.size))
         noise = lfilter([1 - correlation], [1, -correlation], noise)  # of the same power where the swings are
@@ -52,8 +52,8 @@ def test_errors_of_frequencies_are_as_large_as_u_says(fresh, correlation):
         found = min((first, *first.rivals), key=lambda one: np.abs(one.frequency[:2] - slow).max())
         pulls.append((found.frequency - [*slow, 6.0]) / found.u)
     pulls = np.array(pulls)[:, : 2 if correlation else 3]  # at 6 Hz there is less of that noise
-    assert np.abs(pulls.mean(axis=0)).max() < 4 / np.sqrt(24)  # 4 standard errors of 24
-    assert np.abs(pulls.std(axis=0) - 1).max() < 4 / np.sqrt(48)
+    assert abs(pulls.mean()) < 4 / np.sqrt(pulls.size)  # 4 standard errors
+    assert abs(pulls.std() - 1) < 4 / np.sqrt(2 * pulls.size)
 
 
 def test_times_may_be_uneven(fresh):
@@ -81,8 +81,8 @@ def test_the_vertical_swing_is_that_of_the_lines_beside(fresh):
 @pytest.mark.parametrize("strength", [0.0, 4e-4, 4e-3])
 @pytest.mark.parametrize("seen", ["heights", "places"])
 def test_the_vertical_swing_has_its_uncertainty(fresh, seen, strength):
-    """Lines that are not there, at the limit of the noise, and clear: 100 trials each."""
-    late, expected, noise, trials = (np.arange(120) - 59.5) / 6, Vertical(1.198, 0.03), 1e-3, 100
+    """Lines that are not there, at the limit of the noise, and clear: 50 trials each."""
+    late, expected, noise, trials = (np.arange(120) - 59.5) / 6, Vertical(1.198, 0.03), 1e-3, 50
     waves = np.exp(2j * np.pi * np.outer(late, (-0.5945, 0.7400)))
     pulls, u = [], []
     for _ in range(trials):
@@ -200,7 +200,7 @@ def known(mass):
 @pytest.mark.slow
 def test_tops_in_full_motion_have_the_split_that_is_predicted(fresh):
     pulls, u, together = [], [], []
-    for mass in (0.02502, 0.02508, 0.02526, 0.02530, 0.02534):
+    for mass in (0.02502, 0.02526, 0.02534):
         start = {"top.mass_kg": mass, "start.place": "equilibrium", "start.spin_hz": 40.0}
         height = simulate(preset("undriven").changed(start), 0.01, rate=None).position[0, 2]
         start |= {"start.place": "given", "start.position_m": [fresh.uniform(3e-4, 8e-4), 0.0, height]}
@@ -261,6 +261,13 @@ def test_a_swing_and_a_line_of_the_vertical_swing_are_distinguished_by_the_spin(
     assert found.gradient.value == pytest.approx(abs(slope / (2 * b)), rel=1e-3)
 
 
+def test_a_line_that_is_as_likely_is_in_u():
+    window = replace(lines((-0.5945, 0.74)), rivals=(lines((-0.5925, 0.74)),))
+    (chosen,) = choose_lines([window], np.array([30.0]), known(0.02526))
+    part = geometric_magnetism([chosen], np.array([30.0]), known(0.02526)).parts["mistake"]
+    assert part == pytest.approx(2e-3 * np.sqrt(0.5), rel=0.1)  # either with a probability of a half
+
+
 def test_the_roots_of_the_quartic_give_back_its_gradient():
     b, slope = field(HEIGHT)[:2, 0]
     spins = np.array([25.0, 30.0, 40.0])
@@ -316,7 +323,7 @@ def test_a_size_that_is_uncertain_counts_by_its_fourth_power_where_beat_and_vert
 @pytest.mark.parametrize("duration", [4.0, 8.0])
 def test_of_short_tracks_the_mistake_of_a_line_is_in_u(fresh, duration):
     pulls, small = [], []
-    for trial in range(20):
+    for trial in range(8):
         spin = float(fresh.uniform(26, 38))
         start = {"start.spin_hz": spin, "start.position_m": [fresh.uniform(3e-4, 2e-3), 0.0, 0.0729]}
         start |= {"start.velocity_m_s": fresh.uniform(-4e-3, 4e-3, 3).tolist()}
@@ -331,5 +338,5 @@ def test_of_short_tracks_the_mistake_of_a_line_is_in_u(fresh, duration):
         pulls.append((found.measured.value - 0.1765) / found.measured.u)  # where it floats at rest
         small.append(found.measured.u < 0.1 * 0.1765)
     assert np.abs(pulls).max() < 3
-    assert np.std(pulls) < 1.5  # 1, and 3 of its standard errors
-    assert sum(small) > 5  # u is no larger than it has to be
+    assert np.std(pulls) < 1.75  # 1, and 3 of its standard errors
+    assert sum(small) > 2  # u is no larger than it has to be

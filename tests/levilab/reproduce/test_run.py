@@ -89,7 +89,10 @@ def test_a_name_of_another_format_is_refused_before_anything_is_computed(tmp_pat
 
 
 @pytest.mark.slow
-def test_no_chapter_has_anything_unexpected_and_the_page_has_all_counts():
+def test_no_chapter_has_anything_unexpected_and_the_page_has_all_counts(monkeypatch):
+    """In steps that are two to five times as wide as the command's, which are in what a chapter allows for."""
+    for name, step in {"limits.STEP_HZ": 0.02, "limits.UPPER_STEP_HZ": 0.1, "simon.STEP_RAD_S": 3.0}.items():
+        monkeypatch.setattr(f"levilab.reproduce.{name}", step)
     found = run.reproduce(run.choose(None))
     assert found.unexpected == ()
     page = (ROOT / "docs/reproduce.md").read_text(encoding="utf-8").splitlines()

@@ -43,6 +43,14 @@ def rows_of(path):
     return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()[1:]))
 
 
+@pytest.fixture(scope="module")
+def window(tmp_path_factory):
+    """The rows of the first window alone, and what is found of them."""
+    path = tmp_path_factory.mktemp("window") / "track.csv"
+    path.write_text("\n".join(TRACK.read_text(encoding="utf-8").splitlines()[:1202]), encoding="utf-8")
+    return rows_of(path), analyze(path, device=DEVICE).runs[0]
+
+
 def write(path, titles, rows):
     path.write_text("\n".join([",".join(titles), *(",".join(row) for row in rows)]) + "\n", encoding="utf-8")
     return path
@@ -60,11 +68,11 @@ def test_the_sample_has_the_geometric_magnetism_of_its_top(found):
     assert [one.frequency.size for one in found.runs[0].swings[:3]] == [3, 3, 3]
 
 
-def test_a_view_from_below_gives_the_same_with_a_note(found, tmp_path):
-    rows = [(r["t [s]"], str(-float(r["x [mm]"]) / 10), str(float(r["y [mm]"]) / 10), r["spin [Hz]"])
-            for r in rows_of(TRACK)]  # fmt: skip
-    below = analyze(write(tmp_path / "below.csv", ("Zeit [s]", "x (cm)", "y (cm)", "f [Hz]"), rows), device=DEVICE)
-    assert below.runs[0].geometry.measured.value == pytest.approx(found.runs[0].geometry.measured.value, rel=1e-6)
+def test_a_view_from_below_gives_the_same_with_a_note(window, tmp_path):
+    rows, above = window
+    mirrored = [(r["t [s]"], str(-float(r["x [mm]"]) / 10), str(float(r["y [mm]"]) / 10), r["spin [Hz]"]) for r in rows]
+    below = analyze(write(tmp_path / "below.csv", ("Zeit [s]", "x (cm)", "y (cm)", "f [Hz]"), mirrored), device=DEVICE)
+    assert below.runs[0].geometry.measured.value == pytest.approx(above.geometry.measured.value, rel=1e-6)
     assert "backwards" in " ".join(below.all_warnings)
 
 
@@ -105,8 +113,8 @@ def test_unlike_axes_of_a_magnetometer_are_noticed_and_taken_away(tmp_path):
     assert "23 % off" in note  # (1.6 − 1)/(1.6 + 1)
 
 
-def test_two_probes_beside_the_top_show_the_split_but_not_the_sense(found, tmp_path):
-    rows = rows_of(TRACK)
+def test_two_probes_beside_the_top_show_the_split_but_not_the_sense(window, tmp_path):
+    rows, film = window
     titles = ("t [s]", "Bx [µT]", "By [µT]", "f [Hz]")
     # 3K/d = 2.14 µT/mm at 10 cm; the second probe is 5 mm nearer; its sense is the other one
     field = [(r["t [s]"], f"{2.14 * float(r['x [mm]']):.4f}", f"{-2.63 * float(r['y [mm]']):.4f}", r["spin [Hz]"])
@@ -114,7 +122,7 @@ def test_two_probes_beside_the_top_show_the_split_but_not_the_sense(found, tmp_p
     (ran,) = (probes := analyze(write(tmp_path / "probes.csv", titles, field), device=DEVICE, sensor_m=0.1)).runs
     assert abs(ran.geometry.measured.value - TRUE_HZ) < 3 * ran.geometry.measured.u
     assert "sense of the spin" in " ".join(probes.all_warnings)
-    assert ran.swings[0].amplitude[:2] == pytest.approx(found.runs[0].swings[0].amplitude[:2], rel=0.15)
+    assert ran.swings[0].amplitude[:2] == pytest.approx(film.swings[0].amplitude[:2], rel=0.15)
 
 
 def test_all_lines_together_agree_with_the_split(found):
@@ -158,13 +166,13 @@ def test_without_a_precession_the_view_is_doubted(tmp_path):
     assert "no precession is seen" in " ".join(analyze(path, device=DEVICE, spin_hz=38.56).all_warnings)
 
 
-def test_the_spin_of_a_film_stands_beside_its_track(found, tmp_path):
-    rows = rows_of(TRACK)
+def test_the_spin_of_a_film_stands_beside_its_track(window, tmp_path):
+    rows, film = window
     metres = [(r["t [s]"], *(f"{float(r[axis]) / 1e3:.6f}" for axis in ("x [mm]", "y [mm]"))) for r in rows]
     write(tmp_path / "a.spin.csv", ("time_s", "spin_frequency_hz"), [(r["t [s]"], r["spin [Hz]"]) for r in rows[::60]])
     track = write(tmp_path / "a.tracks.csv", ("time_s", "x_m", "y_m"), metres)
     measured = analyze(track, device=DEVICE).runs[0].geometry.measured
-    assert measured.value == pytest.approx(found.runs[0].geometry.measured.value, rel=1e-4)
+    assert measured.value == pytest.approx(film.geometry.measured.value, rel=1e-4)
 
 
 def test_a_film_from_beside_gives_the_heights_and_its_spin_the_time(found, tmp_path):
