@@ -235,7 +235,7 @@ def lay_out(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> L
         header_line = header_line or (above[-1].number if above else 0)
     else:
         header, header_line = above[place].fields, above[place].number
-        below = [*above[place + 1 :], *(line for line in content_lines(lines, dialect) if line.number == first_line)]
+        below = [*above[place + 1 :], *content_lines(lines[first_line - 1 : first_line], dialect, first_line)]
         units = next(filter(None, map(_units, below)), ()) or _units_above(above[:place])
         header, runs = _spread(_with_all_titles(header, lines[header_line - 1], dialect, rows, width), below)
         first_line = (below[0] if runs or (units and _units(below[0])) else above[place]).number + 1
