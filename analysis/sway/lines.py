@@ -358,8 +358,7 @@ def _fit(
     noise = size
     for _ in range(_STEPS):
         waves = np.exp(turn * (frequency[:, None] + late / 2 * slope[:, None]))
-        up = np.exp(turn * rise)
-        lines = beside(waves.T, up, rows).T
+        lines = beside(waves.T, np.exp(turn * rise), rows).T
         linear = np.concatenate([waves, lines, still.T])
         mirror = linear.conj()
         # an amplitude is about as large as the places: lines that are as one do not cancel each other
@@ -378,8 +377,7 @@ def _fit(
         # its own slopes would move the swings by 1e-6 Hz
         expected = known.value + follows * (vertical_swing(frequency[0], frequency[1]) - of_field)
         off = np.append(slope / _SLOPES_U[:count], (rise - expected) * prior[-1, -1])
-        information += prior.T @ prior
-        gradient -= prior.T @ off
+        information, gradient = information + prior.T @ prior, gradient - prior.T @ off
         scale = np.sqrt(np.diagonal(information))
         unlike = information / np.outer(scale, scale) + _FINEST * np.eye(scale.size)
         covariance = np.linalg.inv(unlike) / np.outer(scale, scale)

@@ -167,7 +167,7 @@ class Owner:
 @pytest.mark.slow
 def test_owners_who_follow_the_proposals_float_and_learn_the_truth():
     days, pulls, slopes = list[list[int]](), list[float](), list[float]()
-    for seed in range(16):
+    for seed in range(10):
         owner = Owner(seed)
         trials, numbers = owner.days([19.0, 23.0])
         days.append(numbers)
@@ -175,9 +175,9 @@ def test_owners_who_follow_the_proposals_float_and_learn_the_truth():
         pulls.append((values["mass_to_set"].value - owner.middle_at(21.0)) / values["mass_to_set"].u)
         slopes.append((values["relative_change"].value - owner.per_k) / values["relative_change"].u)
     second = np.array(days)[:, 1]
-    assert np.mean(second <= 2) > 0.63  # of 120 owners 0.88; 3 standard errors of 16 less
+    assert np.mean(second <= 2) > 0.57  # of 120 owners 0.88; 3 standard errors of 10 less
     for one in (pulls, slopes):
-        # 3 standard errors of a mean and of a standard deviation of 16; coefficients are drawn 0.4 u off the prior's
-        assert abs(np.mean(one) + 0.4 * (one is slopes)) < 0.75
-        assert 0.4 < np.std(one) < 1.53
+        # 3 standard errors of a mean and of a standard deviation of 10; coefficients are drawn 0.4 u off the prior's
+        assert abs(np.mean(one) + 0.4 * (one is slopes)) < 0.95
+        assert 0.33 < np.std(one) < 1.67
     assert np.mean(np.abs(pulls) < 2) > 0.85

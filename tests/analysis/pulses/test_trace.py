@@ -59,9 +59,9 @@ def test_the_bound_is_the_one_of_physics_and_of_fisher_information():
     ("method", "snr", "ratio"), [("auto", 5, 1.1), ("auto", 40, 1.1), ("likelihood", 0, 1.1), ("edges", 10, 1.25)]
 )
 def test_the_error_stays_near_the_bound(method, snr, ratio):
-    errors, _, stated = estimates(Case(snr=snr), 24, [7, snr], method)
-    # three standard errors of a root mean square from 24 trials are 43 %; docs/pulses.md has 400 trials
-    assert np.sqrt(np.mean(errors**2)) < ratio * 1.43 * bound(snr)
+    errors, _, stated = estimates(Case(snr=snr), 12, [7, snr], method)
+    # three standard errors of a root mean square from 12 trials are 61 %; docs/pulses.md has 400 trials
+    assert np.sqrt(np.mean(errors**2)) < ratio * 1.61 * bound(snr)
     assert np.abs(errors).max() < 10 * bound(snr)
     assert np.mean(stated) == pytest.approx(bound(snr), rel=0.12)  # the fast method learns no pulse shape
 
@@ -70,11 +70,11 @@ def test_hard_traces_are_stood_and_their_uncertainties_hold():
     pulls = []
     for i, (name, case) in enumerate(HARD.items()):
         if not case.bounces:
-            errors, u, _ = estimates(case, 4, [8, i])
+            errors, u, _ = estimates(case, 2, [8, i])
             assert np.abs(errors / u).max() < 10, name
             pulls += list(errors / u)
-    assert np.mean(np.abs(pulls) < 1) == pytest.approx(0.683, abs=0.15)  # 3 standard errors from 92
-    assert np.std(pulls) == pytest.approx(1, abs=0.25)
+    assert np.mean(np.abs(pulls) < 1) == pytest.approx(0.683, abs=0.21)  # 3 standard errors from 46
+    assert np.std(pulls) == pytest.approx(1, abs=0.31)  # likewise
 
 
 def test_what_disturbs_is_named():
@@ -177,7 +177,7 @@ def test_pulses_of_three_samples_that_show_their_flanks_have_no_u_of_whole_sampl
     """A sample is the mean light of its interval, and shows where in it a flank lies: u was 28 times the scatter."""
     random, errors, rate = np.random.default_rng(20261128), [], 1000
     time = np.arange(2 * rate) / rate
-    for _ in range(200):
+    for _ in range(80):
         spin = random.uniform(29, 31)
         away = ((spin * time + random.uniform()) % 1 - 0.5) * rate / spin  # [samples]
         samples = np.clip(2.0 - np.abs(away), 0, 1) + 0.01 * random.standard_normal(time.size)
@@ -185,7 +185,7 @@ def test_pulses_of_three_samples_that_show_their_flanks_have_no_u_of_whole_sampl
         errors.append((found.value - spin, found.u))
     error, u = np.array(errors).T
     assert np.median(u) < 3 * 1.4826 * np.median(np.abs(error))  # 2.0; at turns of nearly whole samples 28 are right
-    assert np.std(error / u) < 1.15  # three standard errors
+    assert np.std(error / u) < 1.24  # three standard errors
 
 
 @pytest.mark.parametrize("method", ["auto", "edges"])
@@ -237,13 +237,12 @@ def test_slow_records_have_a_frequency(rate):
     assert ("coarse" in names(found)) == (rate < 12 * 7.3)
 
 
-@pytest.mark.parametrize("lost", [-0.01, -0.002, 0.002, 0.005, 0.01])
 @pytest.mark.parametrize("sigma", [0.02, 0.3])
-def test_a_lost_or_repeated_buffer_is_found_and_costs_no_truth(lost, sigma):
+def test_a_lost_or_repeated_buffer_is_found_and_costs_no_truth(sigma):
     """Records of 10 s of a sound card; a fit without the jump is off by 4 to 60 mHz."""
     rate, pulls, places = 8000.0, [], []
     time, random = np.arange(round(10.1 * rate)) / rate, np.random.default_rng(1)
-    for _ in range(10):
+    for lost in 4 * [-0.01, -0.002, 0.002, 0.005, 0.01]:
         spin, at = random.uniform(25, 34), random.uniform(0.8, 9.2)
         samples = light(spin * time - 0.05 * time**2 + random.uniform()) + random.normal(0, sigma, time.size)
         cut, many = round(at * rate), round(abs(lost) * rate)
@@ -254,8 +253,8 @@ def test_a_lost_or_repeated_buffer_is_found_and_costs_no_truth(lost, sigma):
         assert abs(found.jump.lost - lost) < 5 * found.jump.u
         places.append(found.jump.at - at)
     assert np.abs(places).max() < 0.05  # a turn and a half
-    assert np.mean(pulls) == pytest.approx(0, abs=0.95)  # 3 standard errors
-    assert np.std(pulls) < 1.6
+    assert np.mean(pulls) == pytest.approx(0, abs=0.67)  # 3 standard errors
+    assert np.std(pulls) < 1.47  # likewise
 
 
 def test_traces_without_pulses_are_refused():
@@ -281,7 +280,7 @@ def test_the_scatter_of_a_wobbling_tops_pulses_is_in_the_uncertainty(scatter, me
     """Records of 0.6 s: the mean pulse of 15 to 18 turns fits each of them where it happens to be."""
     rate, pulls = 10_000.0, []
     time = np.arange(6000) / rate - 0.3
-    for seed in range(60, 160 if method == "auto" else 100):
+    for seed in range(60, 100):
         random = np.random.default_rng(seed)
         spin, phase = random.uniform(23, 30), random.uniform(0, 1)
         turns = phase + spin * time - 0.08 * time**2 / 2

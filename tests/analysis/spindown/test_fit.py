@@ -63,14 +63,14 @@ def test_readings_without_noise_give_their_constants_back(law, u):
 
 
 def test_the_uncertainty_of_the_curve_is_its_scatter_over_repetitions():
-    fits = [fit_spin_down(T, readings(seed=seed), SIGMA, laws=["power"]).fit("power") for seed in range(100)]
+    fits = [fit_spin_down(T, readings(seed=seed), SIGMA, laws=["power"]).fit("power") for seed in range(50)]
     at = T[[0, 10, -1]]
     scatter = np.std([fit.spin_frequency(at) for fit in fits], axis=0)
     stated = np.mean([fit.u_spin_frequency(at) for fit in fits], axis=0)
     # a correlation that 20 readings cannot rule out is in u, the more the more readings a value is a mean of;
-    # 0.21: three standard errors of a standard deviation from 100
-    assert (scatter < 1.21 * stated).all()
-    assert (scatter > 0.75 * 0.79 * stated).all()
+    # 0.3: three standard errors of a standard deviation from 50
+    assert (scatter < 1.3 * stated).all()
+    assert (scatter > 0.75 * 0.7 * stated).all()
 
 
 def test_the_curve_has_no_uncertainty_where_its_parameters_have_none():
@@ -79,7 +79,7 @@ def test_the_curve_has_no_uncertainty_where_its_parameters_have_none():
     assert fit.u_spin_frequency(T[:3]) is None
 
 
-def noises(sets=4):
+def noises(sets=2):
     """Noise vectors of 20 readings, shape (40·sets, 20).
 
     Each set is an orthogonal basis and its opposite, with lengths from the middle of each 20th of their distribution.
@@ -109,10 +109,10 @@ def test_constants_are_unbiased_and_their_uncertainties_true(law, fitted):
     found, u = np.array([values(fit) for fit in fits]), np.array([uncertainties(fit) for fit in fits])
     # c of the power law is skew, by half of u(ln c) = 0.08; of the others nothing but rounding
     assert np.abs((found.mean(axis=0) - truth) / found.std(axis=0)).max() < 0.1
-    # u allows for a correlation that 20 readings cannot rule out: 1.15 to 1.25 times as large as without.  0.1 is two
-    # standard errors of 80 pairs
-    assert (np.abs(found - truth) < u).mean(axis=0) == pytest.approx(0.77, abs=0.1)
-    assert found.std(axis=0) / np.median(u, axis=0) == pytest.approx(0.87, abs=0.1)
+    # u allows for a correlation that 20 readings cannot rule out: 1.15 to 1.25 times as large as without.  0.14 is two
+    # standard errors of 40 pairs
+    assert (np.abs(found - truth) < u).mean(axis=0) == pytest.approx(0.77, abs=0.14)
+    assert found.std(axis=0) / np.median(u, axis=0) == pytest.approx(0.87, abs=0.14)
 
 
 @pytest.mark.parametrize("law", ["disc", "power"])  # of two and of three parameters
@@ -120,8 +120,8 @@ def test_without_stated_uncertainties_the_intervals_cover_as_students_t(law, fit
     truth = np.array([40.0, *CONSTANTS[law]])
     fits = [run.fits[0] for run in fitted(law, None)]
     covered = np.array([np.abs(values(fit) - truth) < uncertainties(fit) for fit in fits]).mean(axis=0)
-    # more than Student's 0.67, since independent noise is not known to be that; 0.1: two standard errors of 80 pairs
-    assert covered == pytest.approx(0.82, abs=0.1)
+    # more than Student's 0.67, since independent noise is not known to be that; 0.14: two standard errors of 40 pairs
+    assert covered == pytest.approx(0.82, abs=0.14)
 
 
 def likelihood(fit, u):
@@ -164,13 +164,13 @@ def test_u_grows_with_the_noise_without_a_step(rho):
     """Walked through all sizes of noise, from half the stated u to four times of it."""
     rng = np.random.default_rng(3)
     noise = np.linalg.cholesky(rho ** np.abs(np.subtract.outer(range(20), range(20)))) @ rng.normal(size=20)
-    sizes = np.geomspace(0.5, 4.0, 120)
+    sizes = np.geomspace(0.5, 4.0, 60)
     u = np.array([
         fit_spin_down(T, readings(sigma=0) + SIGMA * size * noise, SIGMA, laws=["disc"]).fits[0].parameters["c32"].u
         for size in sizes
     ])  # fmt: skip
-    # the scatter grows by 1.75 % from one size to the next, u by no more and never by a step
-    assert np.abs(np.diff(np.log(u))).max() < 0.02
+    # the scatter grows by 3.6 % from one size to the next, u by no more and never by a step
+    assert np.abs(np.diff(np.log(u))).max() < 0.04
     assert u[-1] > 2 * u[0]
 
 
@@ -385,7 +385,7 @@ def test_many_thousand_readings_are_as_easy_as_twenty():
     assert abs(c32.value - 2.34e-4) < 4 * c32.u < 4e-8
 
 
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=30)
 @example(law="power", n=12, start=1.0, loss=3.0, noise=0.0625, seed=146, known=False)  # a top that stops
 @given(
     law=st.sampled_from(sorted(LAWS)),
@@ -462,8 +462,8 @@ def test_a_law_is_never_excluded_for_the_number_of_its_constants():
 
 def test_every_law_converges_and_stands_in_exactly_one_list():
     sizes = tuple(zip((3, 4, 5, 6, 8, 20, 60), itertools.cycle(LAWS)))
-    for (n, law), sigma, known in itertools.product(sizes, (1e-4, SIGMA, 0.1), (0, 1)):
-        time = np.linspace(0, 190, n)
+    for k, ((n, law), sigma) in enumerate(itertools.product(sizes, (1e-4, SIGMA, 0.1))):
+        time, known = np.linspace(0, 190, n), k % 2
         run = spin_down_fit.fit_spin_down(time, readings(law, sigma, time=time), sigma if known else None)
         verdict = run.verdict
         assert n == 3 or not any("not converged" in kinds(fit) for fit in run.fits)
@@ -481,18 +481,11 @@ def test_an_uncertainty_stated_far_too_small_or_too_large_is_reported_and_change
     assert "overstated" in kinds(large)
 
 
-@pytest.mark.parametrize(("n", "largest"), [(4, 55), (5, 19), (6, 11.5), (7, 8.7)])
+@pytest.mark.parametrize(("n", "largest"), [(4, 39), (5, 14.8), (6, 9.6), (7, 7.5)])
 def test_u_of_few_readings_with_a_tilt_is_no_smaller_than_their_noise(n, largest):
-    # largest: of 30 pulls by Student's t with n − 2 degrees of freedom, exceeded with a probability of 1 %
+    # largest: of 15 pulls by Student's t with n − 2 degrees of freedom, exceeded with a probability of 1 %
     rng, time = np.random.default_rng(1), 10.0 * np.arange(n)
-    for _ in range(30):
+    for _ in range(15):
         noisy = spin("disc", time, 40.0, 2.34e-4) + rng.normal(0, SIGMA, n)
         start = spin_down_fit.fit_spin_down(time, noisy, laws=["disc"]).fit("disc").parameters["start_frequency"]
         assert abs(start.value - 40.0) < largest * start.u
-
-
-def test_rough_readings_cannot_tell():
-    verdict = fit_spin_down(T, readings(sigma=3.0), 3.0).verdict
-    assert verdict.excluded == ()
-    assert {"stokes", "newton", "disc"} <= {*verdict.indistinguishable, *verdict.weak}
-    assert not verdict.decided

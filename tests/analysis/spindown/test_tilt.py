@@ -136,7 +136,7 @@ def test_a_reading_near_the_fall_is_no_outlier():
 def test_u_and_constant_go_over_from_a_tilt_that_shows_to_one_that_noise_hides():
     rng = np.random.default_rng(3)
     noise = rng.normal(0, 1, T.size)
-    sizes = np.geomspace(0.001, 0.1, 60)
+    sizes = np.geomspace(0.001, 0.1, 40)
     found = [fit_spin_down(T, COUNTS + size * noise, laws=["disc"]).fit("disc").parameters["c32"] for size in sizes]
     u = np.array([each.u for each in found])
     assert np.abs(np.diff(np.log(u))).max() < 1.5 * np.log(sizes[1] / sizes[0])
@@ -207,9 +207,9 @@ def test_a_release_and_a_drive_make_the_nutation_that_an_integrator_finds():
 
 @pytest.mark.slow
 def test_means_of_pulls_over_the_priors_are_zero():
-    """Tilt, nutation and noise are drawn as the analysis expects them; 120 pulls tell their mean to 0.09."""
+    """Tilt, nutation and noise are drawn as the analysis expects them; 60 pulls tell their mean to 0.13."""
     random, law, pulls = np.random.default_rng(20261128), LAWS["disc"], []
-    for _ in range(120):
+    for _ in range(60):
         top = CountedLaw(law, 40.0 / 28.0, 24.5 / 28.0, 28.0)
         expected, u = top.expected
         q = np.array([*law.dimensionless([40.0, 2.34e-4], 28.0, T[-1]), *(expected + u * random.normal(size=6))])
@@ -217,8 +217,8 @@ def test_means_of_pulls_over_the_priors_are_zero():
         run = fit_spin_down(T, 28.0 * top.spin(T / T[-1], q) + 0.02 * noise, laws=["disc"], keep_outliers=True)
         found = run.fit("disc").parameters["c32"]
         pulls.append((found.value - 2.34e-4) / found.u)
-    assert abs(np.mean(pulls)) < 0.27  # three standard errors
-    assert np.std(pulls) == pytest.approx(1.0, abs=0.2)
+    assert abs(np.mean(pulls)) < 0.39  # three standard errors
+    assert np.std(pulls) == pytest.approx(1.0, abs=0.27)  # likewise
 
 
 PRACTICE = json.loads((Path(__file__).parent / "practice.json").read_text(encoding="utf-8"))
@@ -298,17 +298,17 @@ def test_a_tilt_that_noise_hides_is_in_the_uncertainties():
 
 
 @pytest.mark.parametrize("u", [0.03, None])
-@pytest.mark.parametrize(("rho", "most"), [(0.0, 1.1), (0.3, 1.15), (0.7, 1.4)])
+@pytest.mark.parametrize(("rho", "most"), [(0.0, 1.2), (0.3, 1.25), (0.7, 1.5)])
 def test_u_holds_correlated_noise(rho, most, u):
-    """Pulls of C scatter by 0.7 to 1.25 in `benchmarks/spindown_motion.py`; 150 runs tell that to 6 %."""
+    """Pulls of C scatter by 0.7 to 1.25 in `benchmarks/spindown_motion.py`; 60 runs tell that to 9 %."""
     rng, t = np.random.default_rng(7), np.arange(0, 200, 10.0)
     truth = spin("disc", t, 40.0, 2.34e-4)
-    runs = [fit_spin_down(t, truth + 0.03 * ar1(rho, 20, rng), u, laws=["disc"], tilt=False) for _ in range(150)]
+    runs = [fit_spin_down(t, truth + 0.03 * ar1(rho, 20, rng), u, laws=["disc"], tilt=False) for _ in range(60)]
     constants = [run.fit("disc").parameters["c32"] for run in runs]
     pull = np.array([(each.value - 2.34e-4) / each.u for each in constants])
     assert 0.6 < np.std(pull) < most
-    assert np.mean(np.abs(pull) > 3) <= 0.03
-    assert abs(np.mean(pull)) < 0.35  # four standard errors at a scatter of 1.1
+    assert np.mean(np.abs(pull) > 3) <= 0.05
+    assert abs(np.mean(pull)) < 0.57  # four standard errors at a scatter of 1.1
     assert np.mean([run.correlation.value for run in runs]) == pytest.approx(rho, abs=0.25)
 
 

@@ -11,10 +11,8 @@ from levilab.motion.table import print_effects
 from levilab.simulator.scene import SceneError, preset
 from levilab.simulator.single import simulate
 
-CALM = {"start.place": "equilibrium", "start.tilt_rad": 0.01}
 SCENES = {
     "undriven": preset("undriven"),
-    "calm": preset("undriven").changed(CALM),
     "wide": preset("undriven").changed({"start.position_m": [0.004, 0.0, 0.0725]}),
     "tilted": preset("tilted"),
 }

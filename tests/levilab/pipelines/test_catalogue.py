@@ -164,11 +164,6 @@ def test_a_result_beside_a_run_of_another_kind_is_reported(tmp_path, sample_data
     assert [row.name for row, _ in found] == ["spindown", "limit"]
 
 
-def test_the_analysis_made_for_an_experiment_goes_before_one_that_takes_its_records(sample_data):
-    for name, wanted in (("precession-sweep", "precession"), ("trace-tape", "spin"), ("scope-files", "spin")):
-        assert [row.name for row, _ in recall_suiting([sample_data / name], {})] == [wanted], name
-
-
 def test_what_no_analysis_takes_is_refused_with_what_is_there(tmp_path, sample_data):
     run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "runs" / "one")
     text = (run / "run.json").read_text(encoding="utf-8")

@@ -55,7 +55,7 @@ def laboratory(tmp_path):
 
 def test_no_chunk_is_marked_whose_values_are_lost(laboratory):
     _, steps = laboratory("whole", -1)
-    for seed in range(40):
+    for seed in range(20):
         path, _ = laboratory(seed, 1 + (7 * seed) % steps)
         store = Store.open(path, writable=True)
         found = store.load()

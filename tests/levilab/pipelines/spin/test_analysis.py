@@ -22,7 +22,7 @@ from levilab.pipelines.spin.document import SPIN
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spin.report import frequency_table, meaning, spin_part, spin_tables
 from levilab.pipelines.spindown.document import SPINDOWN
-from levilab.pipelines.suits import analyze_suiting
+from levilab.pipelines.suits import analyze_suiting, suiting
 from levilab.pipelines.suits import save as save_found
 from levilab.runs.run import Run, RunRecord
 from levilab.runs.waveforms import run_waveforms
@@ -251,7 +251,7 @@ def test_each_analysis_takes_its_own_out_of_a_folder(sample_data, tmp_path):
     }.items():
         (root / name).write_text(text, encoding="utf-8")
     coasting_wav(root / "long.wav", seconds=10)
-    found = {row.name: analysis for row, analysis in analyze_suiting([root], {})}
+    found = {one.analysis.name: one.found for one in suiting([root], {})}
     down, spin = found["spindown"], found["spin"]
     assert [source.name for source in down.sources][:2] == ["spin-down-1", "spin-down-2"]
     assert [source.name for source in down.sources][4:] == ["long.wav"]

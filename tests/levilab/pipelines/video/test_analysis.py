@@ -99,9 +99,9 @@ def test_a_dot_on_the_stem_shows_the_precession_and_the_size_of_the_rim_the_rise
 
 def test_a_camera_beside_the_top_shows_place_height_lean_and_spin(folder):
     scene = run_path(str(SAMPLE_DATA / "make.py"))["TRACK_SCENE"]
-    flight = flight_of(preset("undriven").changed({**scene, "start.spin_hz": 32.0}), 2.2)
+    flight = flight_of(preset("undriven").changed({**scene, "start.spin_hz": 32.0}), 1.3)
     camera = Camera(pose=BESIDE, away=(5.3, -45), distance=0.4)
-    path = film(folder / "side.mp4", camera, flight, phone_times(2.1))
+    path = film(folder / "side.mp4", camera, flight, phone_times(1.2))
     video = ANALYSES["video"]
     analysis = video.analyze([path], VideoOptions(rim_m=2 * RIM, beside=True))
     (found,) = analysis.runs
