@@ -21,7 +21,8 @@ from analysis.spindown import drag
 row = drag.power_law("turbulent", drag.Fraction(9, 5), "the spin to the power 9/5, as of turbulent air")
 drag.LAWS = MappingProxyType({**drag.LAWS, row.name: row})
 """
-#: Several commands in one process, which shares imports and kernels; no test looks at the trials of this report.
+#: Several commands in one process, which shares imports and kernels, and the head of a page while a run goes on; no
+#: test looks at the trials of this report.
 COMMANDS = """
 import json
 from pathlib import Path
@@ -33,8 +34,6 @@ with with_less_work():
         ended = command(*words, cwd=Path.cwd())
         assert ended.status == 0, ended.err
         print(ended.out)
-"""
-LIVE = """
 import numpy as np
 from levilab.live.running import spin_down
 time = np.linspace(0.0, 60.0, 101)  # ends before the top leans
@@ -57,14 +56,6 @@ def test_what_is_said_to_be_straight_is_straight(law):
     assert np.diff(drawn, 2) == pytest.approx(0, abs=1e-12)  # rounding of numbers of order one
 
 
-def with_turbulent_law(program, *words):
-    """Return what a program prints where the table of laws has a row more."""
-    command = [sys.executable, "-W", "error", "-c", TURBULENT + program, *words]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=ROOT)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
 def test_a_new_law_is_one_row_from_the_fit_to_every_page(tmp_path):
     t = np.linspace(0.0, 200.0, 101)
     noise = np.random.default_rng(1).normal(0, 0.01, len(t))
@@ -78,7 +69,10 @@ def test_a_new_law_is_one_row_from_the_fit_to_every_page(tmp_path):
         ("report", data, "--tables", "-o", page),
         ("analyze", "spindown", SAMPLE_DATA / "spin-down-1", data, "--table", many, "--cores=1"),
     )
-    shown = with_turbulent_law(COMMANDS, json.dumps(commands, default=str))
+    program = [sys.executable, "-W", "error", "-c", TURBULENT + COMMANDS, json.dumps(commands, default=str)]
+    done = subprocess.run(program, capture_output=True, text=True, check=False, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    shown = done.stdout
     assert "C₉/₅ = " in shown
     assert "(rad/s)^−4/5/s" in shown
     assert "ω^−4/5" in shown
@@ -90,7 +84,4 @@ def test_a_new_law_is_one_row_from_the_fit_to_every_page(tmp_path):
     assert "turbulent_c95_per_rad_s_4_5_per_s" in tables["spindown-inputs.csv"]
     assert "turbulent" in tables["spindown-laws.tex"]
     assert "turbulent_c95_u_per_rad_s_4_5_per_s" in many.read_text()
-
-
-def test_the_live_page_has_the_equation_of_a_new_law():
-    assert "ω̇ = −C₉/₅ω^(9/5)" in with_turbulent_law(LIVE)
+    assert "ω̇ = −C₉/₅ω^(9/5)" in shown
