@@ -15,6 +15,7 @@ from levilab.live.doors import Doors, doors_for_guests
 from levilab.live.serve import configuration
 from levilab.live.server import Hall
 from levilab.runs.run import lock_of
+from support.commands import command
 
 #: A page is waited for so long; one that works is not waited for [s].
 PATIENCE_S = 90.0
@@ -40,6 +41,12 @@ def serving(root, shown="", desk=None):
             hall.analyses.end()
 
 
+def carry_out_here(words):
+    """Carry out a command of the server in this process, where all is imported, and without a report's trials."""
+    ended = command(*words, *["--no-crosscheck"] * (words[0] == "report"), cwd=".")
+    return ended.status, ended.err
+
+
 def address(hall, run="", *, token=False):
     """Where a page of the server is."""
     return f"http://127.0.0.1:{hall.doors.port}/" + (f"?run={run}" if run else "") + (f"#{hall.doors.token}" * token)
@@ -61,10 +68,11 @@ def request(there, path, body=None, *, method="", headers=None):
 
 def until(page, expression):
     """Wait for something in a page.  The page's policy forbids Playwright's own way, which evaluates text."""
-    end = time.monotonic() + PATIENCE_S
+    end, pause_ms = time.monotonic() + PATIENCE_S, 20.0
     while not (found := page.evaluate(expression)):
         assert time.monotonic() < end, f"still not: {expression}; {page.evaluate('document.body.innerText')[:600]}"
-        page.wait_for_timeout(30)
+        page.wait_for_timeout(pause_ms)
+        pause_ms = min(1.5 * pause_ms, 250.0)  # a question costs milliseconds in three processes
     return found
 
 

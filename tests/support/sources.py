@@ -24,3 +24,11 @@ def sources():
     finally:
         gc.freeze()
         gc.enable()
+
+
+@cache
+def nodes(*kinds):
+    """The nodes of these classes in each module."""
+    if kinds == (ast.AST,):
+        return {name: [*ast.walk(tree)] for name, tree in sources().items()}
+    return {name: [node for node in found if isinstance(node, kinds)] for name, found in nodes(ast.AST).items()}

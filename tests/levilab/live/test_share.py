@@ -3,6 +3,7 @@
 import contextlib
 import json
 import socket
+from types import SimpleNamespace
 from unittest.mock import Mock
 from urllib.parse import urlsplit
 from urllib.request import urlopen
@@ -13,11 +14,21 @@ from websockets.sync.client import connect
 
 from levilab.interruption import End
 from levilab.live.desk import Desk
-from levilab.live.practice.bench import PracticeBench
 from levilab.live.serve import LiveOptions, serve_live
 from levilab.live.share import NoNetwork, address_in_network, code_of, who_may_look
+from levilab.telemetry.messages import Drive, State
 from support.browser import PHONE
-from support.live_pages import PATIENCE_S, GrowingRun, address, address_for_guests, request, serving, spin_down, until
+from support.live_pages import (
+    PATIENCE_S,
+    GrowingRun,
+    address,
+    address_for_guests,
+    publish,
+    request,
+    serving,
+    spin_down,
+    until,
+)
 
 COMMANDS = [{"do": "pause", "on": True}, {"do": "analyze", "run": "one"}, {"do": "switch the drive", "on": True}]
 
@@ -29,7 +40,9 @@ def hall(tmp_path_factory):
     run.readings(spin_down(19))
     (run.folder / "report.html").write_text("secret", encoding="utf-8")
     (run.folder / "spindown.png").write_text("secret", encoding="utf-8")
-    with PracticeBench(root) as bench, serving(root, desk=Desk(bench)) as hall:
+    commands = []
+    bench = SimpleNamespace(address=None, may_record=False, events=list, command=commands.append, commands=commands)
+    with serving(root, desk=Desk(bench)) as hall:
         yield hall
 
 
@@ -136,6 +149,9 @@ def test_a_connection_without_a_request_is_closed(hall, monkeypatch):
 def test_a_phone_sees_the_practice_bench_without_its_controls(hall, watched):
     page = watched(viewport=PHONE, color_scheme="dark")
     page.goto(address_for_guests(hall))
+    until(page, "levilab.frames > 0")
+    for watch in hall.watches.values():
+        publish(watch, State(2.0, last={"spin_frequency_hz": 30.0}, drive=Drive("SQU", 30.0, 10.0)))
     until(page, "levilab.data.bench && Number(document.getElementById('spin-value').textContent) > 20")
     of_bench = "[...document.querySelectorAll('#practice button, #practice input, #practice select')]"
     assert page.evaluate(f"{of_bench}.length > 5 && {of_bench}.every((one) => !one.offsetParent)")
@@ -143,7 +159,7 @@ def test_a_phone_sees_the_practice_bench_without_its_controls(hall, watched):
         page.keyboard.press(key)
     assert page.evaluate("document.getElementById('practice').hidden")
     assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
-    assert hall.desk.bench.may_record is False
+    assert hall.desk.bench.commands == []
 
 
 def test_the_code_is_a_square_with_its_three_marks():

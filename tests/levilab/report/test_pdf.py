@@ -92,7 +92,7 @@ def test_a_heading_and_what_introduces_its_table_stand_on_the_page_of_the_table(
     rows = [(f"run {k}", f"{k}") for k in range(10)]
     below = Section("Below", (Paragraph("It says what follows."), Tabular("t", table("Ten", ("run", "n"), rows))))
     seen = set()
-    for lines in range(26, 42, 2):  # the heading comes to the end of the first page, and beyond
+    for lines in range(26, 42, 4):  # the heading comes to the end of the first page, and beyond
         above = Section("Above", (Paragraph("x"),) * lines)
         (_, heading), (place,) = said_of(Document("t", "", (above, below)), "places")
         assert heading == place
@@ -100,7 +100,7 @@ def test_a_heading_and_what_introduces_its_table_stand_on_the_page_of_the_table(
     assert seen == {1, 2}
 
 
-@pytest.mark.parametrize("heights", [(4.6,), (3.4,), (4.6, 3.4), (4.6, 4.6, 3.3)])
+@pytest.mark.parametrize("heights", [(4.6,), (4.6, 4.6, 3.3)])
 def test_a_tall_figure_stands_between_the_heading_of_its_chapter_and_the_next_one(monkeypatch, heights):
     monkeypatch.setattr("levilab.present.style.as_pdf", cache(as_pdf_page))  # few figures, again and again
 
@@ -116,7 +116,7 @@ def test_a_tall_figure_stands_between_the_heading_of_its_chapter_and_the_next_on
         return Section(name, (Paragraph("x"), *pictures, *(Paragraph("x"),) * lines))
 
     pages = set()
-    for lines in (2, 5, 8, 14, 20, 23, 26, 32):  # the figures fit on the page, or leave it for the next one
+    for lines in (2, 8, 14, 23, 32):  # the figures fit on the page, or leave it for the next one
         chapters = tuple(chapter(name, lines) for name in ("one", "two", "three"))
         headings, figures = map(sorted, said_of(Document("t", "", chapters), "spots"))
         beyond = [*headings[1:], [99, 0.0]]
@@ -185,11 +185,11 @@ def test_letters_are_smaller_where_that_saves_a_last_page():
     def said(lines):
         return said_of(Document("t", "", (Paragraph("x"),) * lines), "setting")
 
-    pages = [said(lines) for lines in range(36, 64, 2)]  # the second page begins, and fills beyond its middle
+    pages = [said(lines) for lines in range(46, 54)]  # the second page begins
     assert {one["pages"] for one in pages} == {1, 2}
     full = max(k for k, one in enumerate(pages) if one["pages"] == 1)
     assert pages[full]["end"] > 0.85
-    assert min(one["end"] for one in pages[full + 1 :]) > 0.07
+    assert min(one["end"] for one in pages[full + 1 :]) > 0.11  # a line ends at 0.075, and each adds 0.018
 
 
 def test_without_the_extra_the_message_says_how_to_install_it(tmp_path, monkeypatch):

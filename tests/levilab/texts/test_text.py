@@ -41,7 +41,7 @@ from levilab.settings import KINDS, LIMITS, WHOLE
 from levilab.simulator.scene import REMARKS, RULES, SWITCHES, Scene, preset, presets
 from levilab.texts.text import Text, in_language, language_of, languages, speak, text_from, text_of
 from support.paths import SAMPLE_DATA
-from support.sources import sources
+from support.sources import nodes
 
 LANGUAGES = [code for code in languages() if code != "en"]
 #: Functions whose text a person reads, in the modules of these rooms, and the number of the argument.
@@ -119,8 +119,7 @@ def errors(base):
 def of_analyses():
     """What errors of the analyses say, and of what."""
     found = set()
-    calls = [(name, node) for name, tree in sources().items() for node in ast.walk(tree) if isinstance(node, ast.Call)]
-    for name, call in calls:
+    for name, call in ((name, call) for name, calls in nodes(ast.Call).items() for call in calls):
         if name.startswith("analysis.") and ast.unparse(call.func) in {"super().__init__", *errors(AnalysisError)}:
             found |= {text for one in (*call.args, *(word.value for word in call.keywords)) for text in strings(one)}
     return found | {TooFewPulses.HINT, OnlyHum.HINT}
@@ -138,15 +137,13 @@ def of_program():
     """What the program says in sentences: each `Text`, and what the functions of SAYING are given."""
     found = of_analyses() | of_tables()
     refusals = errors(LevilabError)
-    for name, tree in sources().items():
+    for name, calls in nodes(ast.Call).items():
         named = {}
-        for node in ast.walk(tree):
-            if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+        for node in nodes(ast.Assign)[name]:
+            if isinstance(node.targets[0], ast.Name):
                 known = (text for text in strings(node.value) if not text.startswith("f-string"))
                 named.setdefault(node.targets[0].id, set()).update(known)
-        for call in ast.walk(tree):
-            if not isinstance(call, ast.Call):
-                continue
+        for call in calls:
             called = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
             has_values = called in refusals and {word.arg for word in call.keywords} - NO_VALUES
             said = call.args if has_values else call.args[: called in {"Text", "title_of"}]
@@ -179,7 +176,7 @@ def test_a_text_has_the_values_of_the_english_one(code):
 def settings_fields():
     """Names of settings: fields of the classes of experiments' settings, and what drivers declare by `Setting`."""
     named = set()
-    for one in (node for tree in sources().values() for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
+    for one in (node for classes in nodes(ast.ClassDef).values() for node in classes):
         for node in one.body:
             if isinstance(node, ast.AnnAssign) and one.name.endswith("Settings"):
                 named.add(ast.unparse(node.target))
@@ -190,13 +187,13 @@ def settings_fields():
 
 @pytest.mark.parametrize("code", LANGUAGES)
 def test_no_text_is_of_a_sentence_that_is_said_no_more(code):
-    trees = [*sources().values(), ast.parse((SAMPLE_DATA / "make.py").read_text("utf-8"))]
-    nodes = (node for tree in trees for node in ast.walk(tree))
+    samples = ast.walk(ast.parse((SAMPLE_DATA / "make.py").read_text("utf-8")))
+    constants = (node for found in (*nodes(ast.Constant).values(), samples) for node in found)
     said = (
         of_pages()
         | of_worksheets()
         | of_files()
-        | {node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+        | {node.value for node in constants if isinstance(getattr(node, "value", None), str)}
     )
     said |= {re.sub(r"(_frequency)?_(hz|v|t|m|s)$", "", text).replace("_", " ") for text in said}  # heads of columns
     said |= {split(name)[0].replace("_", " ") for name in settings_fields()}

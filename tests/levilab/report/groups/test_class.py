@@ -61,12 +61,6 @@ def test_each_group_is_beside_the_truth_of_its_seed(of_three):
     assert (c32.mean.value, c32.mean.u) == pytest.approx((reported.value, reported.u), rel=1e-12)
 
 
-def test_twenty_groups_lie_within_two_u_of_their_truths(tmp_path):
-    (c32,) = compared(measured(tmp_path, [f"Group {k}" for k in range(1, 21)])).quantities
-    assert sum(abs(one) <= 2 for one in c32.from_truth) >= 17  # 19 are expected; fewer than 17 in one of 77 classes
-    assert max(map(abs, c32.from_truth)) < 3.5
-
-
 def with_changes(root, into, group, changes):
     """Copy runs, and change the record of one group's."""
     for folder in root.glob("2*"):
@@ -126,7 +120,7 @@ def test_a_value_without_a_finite_u_is_not_compared(value, u):
 
 @pytest.mark.parametrize(("experiment", "names"), [("field", ["strength", "origin", "thickness"]), ("limit", ["mean"])])
 def test_other_experiments_have_their_truths_too(experiment, names, tmp_path):
-    settings = {"field": ("field.settle_s=0",), "limit": ("limit.repetitions=5", "limit.hold_s=0")}
+    settings = {"field": ("field.settle_s=0",), "limit": ("limit.repetitions=3", "limit.hold_s=0")}
     of = compared(measured(tmp_path, ["A", "B"], experiment, *settings[experiment]), experiment)
     assert [one.name for one in of.quantities] == names
     scene = random_scene(1)
