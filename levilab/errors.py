@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import Any
 
 from levilab.texts.text import Text, languages
 
@@ -14,9 +15,9 @@ class LevilabError(Exception):
     "free space, or choose another place with `out`". The command line writes it as its option, ``--out``.
     """
 
-    def __init__(self, text: str = "", /, **values: object) -> None:
-        """Say why, in a template with its values, which has other languages; without values in a text."""
-        super().__init__(Text(text, **values) if values else text)
+    def __init__(self, text: str = "", /, *in_order: Any, **values: object) -> None:
+        """Say why, in a template with its values as `Text` takes them, which has other languages, or in a text."""
+        super().__init__(Text(text, *in_order, **values) if in_order or values else text)
 
 
 #: A quantity in a message.
@@ -71,8 +72,8 @@ class UsageError(RequestError):
         value: the wrong value as text; None where it does not matter.
     """
 
-    def __init__(self, name: str, text: str, *, value: object = None) -> None:
-        self.name, self.text = name, text
+    def __init__(self, name: str, text: str, *in_order: Any, value: object = None) -> None:
+        self.name, self.text = name, Text(text, *in_order) if in_order else text
         self.value = None if value is None else _short_text(value)
         super().__init__("{name}: {text}" if value is None else "{name} = {value}: {text}", **vars(self))
 
@@ -102,9 +103,9 @@ class NoneUsable(DataError):
         reasons: why each of what is there cannot be used.
     """
 
-    def __init__(self, text: str, reasons: tuple[str, ...] = ()) -> None:
+    def __init__(self, text: str, *in_order: Any, reasons: tuple[str, ...] = ()) -> None:
         self.reasons = reasons
-        super().__init__(text)
+        super().__init__(text, *in_order)
 
 
 class NoInstrument(LevilabError):

@@ -146,7 +146,7 @@ def _hint(text: str, said: str) -> str:
     return ""
 
 
-_TOO_DEEP = f"it is nested more than {DEEPEST} levels deep"
+_TOO_DEEP = Text("it is nested more than {n} levels deep", n=DEEPEST)
 _NOT_FINITE = "a number in it is not finite"
 _TOO_LARGE = "a whole number in it has more than 300 digits"
 

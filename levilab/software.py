@@ -7,6 +7,8 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
+from levilab.texts.text import Text
+
 #: The libraries that compute or speak to instruments.
 LIBRARIES = ("levilab", "numpy", "numba", "scipy", "pandas", "pyvisa", "pyvisa-py")
 
@@ -25,7 +27,7 @@ def how_to_install(extra: str) -> str:
         command = f'uv tool install ".[{",".join(sorted({*_USUAL_EXTRAS, extra}))}]"'
     else:
         command = f'pip install ".[{extra}]"'
-    return f"type {command} in the folder of levilab's clone"
+    return Text("type {command:s} in the folder of levilab's clone", command)
 
 
 def software_versions() -> dict[str, str]:

@@ -362,7 +362,8 @@ def _exit_with(error: Exception) -> NoReturn:
     try:
         status, text = exit_codes.exit_status(error), in_options(error)
         if isinstance(error, PermissionError) and error.filename:
-            text = f"{error.filename}: may not be opened by you; change its permissions or choose another place"
+            closed = "{path:s}: may not be opened by you; change its permissions or choose another place"
+            text = in_language(Text(closed, error.filename))
     except OSError:  # no file can be opened any more, not even that of a module
         status, text = exit_codes.FAILED, str(error)
     if status is None:

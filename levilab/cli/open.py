@@ -69,8 +69,9 @@ def open_files(
 
 def _refusal(look: "Look") -> NoneUsable:
     if any(run.doubts for run in look.runs):
-        return NoneUsable(Text("{path:s}: is not read before the question is answered, by `columns`", path=look.path))
-    return NoneUsable(look.problem if str(look.path) in look.problem else f"{look.path}: {look.problem}")
+        return NoneUsable("{path:s}: is not read before the question is answered, by `columns`", look.path)
+    named = str(look.path) in look.problem
+    return NoneUsable(look.problem) if named else NoneUsable("{path:s}: {what}", look.path, look.problem)
 
 
 def _analyze(paths: "Sequence[Path]", options: "Mapping[str, Any]") -> None:
@@ -169,7 +170,7 @@ def _print_doubts(look: "Look", run: "UnderstoodRun") -> None:
         if doubt.kind == "titles":  # each column could be each of them
             keys = dict.fromkeys(key for choice in doubt.choices for key in choice.columns)
             with_unit = [(text, columns) for text, columns in answers if "[" in columns]
-            answers = [*with_unit, ("by their numbers", ",".join(f"{key}=NUMBER" for key in keys))]
+            answers = [*with_unit, ("by their numbers", ",".join(f"{key}={in_language('NUMBER')}" for key in keys))]
         for text, columns in answers:
             console.print(escape(f'  {in_language(text)}: levilab open {as_typed(look.path)} --columns "{columns}"'))
     if run.problem and not run.doubts and run.problem != look.problem:

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 from levilab.cli.options import Json, existing_path, flag, option
 from levilab.cli.output import message, print_json, result
 from levilab.errors import UsageError
-from levilab.present.numbers import how_many
-from levilab.texts.text import Sentences, Text, text_of
+from levilab.texts.text import Sentences, Text, how_many, text_of
 
 if TYPE_CHECKING:
     from levilab.pipelines.tune.advice import Advice

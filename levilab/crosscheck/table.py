@@ -9,9 +9,9 @@ from levilab.crosscheck.own.model import OF_ONE_RUN
 from levilab.crosscheck.own.study import ENOUGH, TRIALS
 from levilab.crosscheck.study import LONG_TAILS, Judge, Spread, Study, Verdict, by_pulls
 from levilab.present.document.blocks import Block, Details, Note, Paragraph, Tabular
-from levilab.present.numbers import enumeration, how_many, with_sign
+from levilab.present.numbers import enumeration, with_sign
 from levilab.present.tables import Row, Table, table
-from levilab.texts.text import Sentences, Text
+from levilab.texts.text import Sentences, Text, how_many
 
 _NUMBERS = ("pulls", "mean pull", "s.d. of pulls\n(wanted)", "within 1 u\n(wanted)", "u/value")
 #: Degrees of freedom from which on u is as if known.

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.kinds import Kind
@@ -59,28 +59,35 @@ def key_of(name: str) -> str | None:
 
 
 class TableError(DataError):
-    """A table that cannot be used.  path: of the file; line: its 1-based line, or None; message: all but these."""
+    """A table that cannot be used.  path: of the file; line: its 1-based line, or None; message: all but these.
 
-    def __init__(self, path: Path, message: str, *, line: int | None = None) -> None:
-        self.path, self.line, self.message = path, line, message
+    The message may be a template, whose values follow it in their order.
+    """
+
+    def __init__(self, path: Path, message: str, *in_order: Any, line: int | None = None) -> None:
+        self.path, self.line, self.message = path, line, Text(message, *in_order) if in_order else message
         at = "{path:s}: {message}" if line is None else "{path:s}, line {line}: {message}"
-        super().__init__(at, path=shorten(str(path), 200), line=line, message=message)
+        super().__init__(at, path=shorten(str(path), 200), line=line, message=self.message)
 
 
 class NoTable(TableError, DoesNotSuit):
     """A file that holds no table of text.  `kind`: of file, where its first bytes show it."""
 
-    def __init__(self, path: Path, message: str, *, line: int | None = None, kind: "Kind | None" = None) -> None:
+    def __init__(
+        self, path: Path, message: str, *in_order: Any, line: int | None = None, kind: "Kind | None" = None
+    ) -> None:
         self.kind = kind
-        super().__init__(path, message, line=line)
+        super().__init__(path, message, *in_order, line=line)
 
 
 class NoSuchColumn(TableError, DoesNotSuit):
     """A table without a quantity that is wanted.  `doubt` is the question whose answer would give it, else None."""
 
-    def __init__(self, path: Path, message: str, *, line: int | None = None, doubt: "Doubt | None" = None) -> None:
+    def __init__(
+        self, path: Path, message: str, *in_order: Any, line: int | None = None, doubt: "Doubt | None" = None
+    ) -> None:
         self.doubt = doubt
-        super().__init__(path, message, line=line)
+        super().__init__(path, message, *in_order, line=line)
 
 
 class Ambiguous(TableError):
@@ -231,7 +238,7 @@ def _of_count(path: Path, name: str, index: int, label: str, unit: str | None) -
     """Return the column of turns since the start, or of their u.  Raises TableError for a u in another unit."""
     if unit != TOTAL:
         said = "column '{title:s}' is in {unit:s} beside turns since the start: give u of the count, in turns"
-        raise TableError(path, Text(said, title=shorten(label), unit=unit))
+        raise TableError(path, said, shorten(label), unit)
     return Column(name, index, label, 1.0, unit=TOTAL, written=True)
 
 
@@ -296,8 +303,8 @@ def _factor(path: Path, name: str, label: str, unit: str | None) -> float:
     """
     other = None if unit else foreign_unit(label, dimension(name))
     if other:
-        what = f"column '{shorten(label)}' is to be {name} and has the unit {other}, which is none of "
-        raise TableError(path, f"{what}{dimension(name)}: {how_else(label, name)}")
+        what = "column '{title:s}' is to be {name:s} and has the unit {unit:s}, which is none of {kind}: {do}"
+        raise TableError(path, what, shorten(label), name, other, dimension(name), how_else(label, name))
     return (unit_factor(unit, dimension(name)) if unit else None) or 1
 
 
@@ -377,12 +384,12 @@ def _is_of_a_period(title: Title, titles: Sequence[Title]) -> bool:
 def how_else(title: str, name: str) -> str:
     """Return advice for a column that is not the quantity of this canonical name."""
     kind = dimension(name)
-    own = f"say which unit it is, as NAME [{next(iter(UNITS[kind]))}]"
+    own = Text("say which unit it is, as NAME [{unit:s}]", next(iter(UNITS[kind])))
     if kind != "frequency":
         return own
     unit = read_title(title).unit
     if unit and unit_factor(unit, "time"):
-        return f"correct it, or if these are the times of a turn call the column period [{shorten(unit)}]"
+        return Text("correct it, or if these are the times of a turn call the column period [{unit:s}]", shorten(unit))
     return nearly_a_frequency(title) or own
 
 
@@ -395,24 +402,18 @@ def _wanted_columns(
     for key, title in wanted.items():
         name = SHORTHANDS.get(key, key)
         if name not in CANONICAL:
-            what = f"`columns` cannot set '{shorten(key)}'; it sets {', '.join(SHORTHANDS)} or {', '.join(LISTED)}"
-            raise TableError(path, what)
+            what = "`columns` cannot set '{key:s}'; it sets {short:s} or {long:s}"
+            raise TableError(path, what, shorten(key), ", ".join(SHORTHANDS), ", ".join(LISTED))
         index = _find(header, title.strip())
         if index is None and (with_unit := re.fullmatch(r"(.+?)\s*\[([^\[\]]+)\]\s*", title)):
             index = _find(header, with_unit[1].strip())
             stated[name] = _stated_unit(path, name, with_unit[2].strip())
         if index is None:
-            raise TableError(
-                path,
-                Text(
-                    "has no column '{title:s}'; it has {header:s}: correct `columns` = {key:s}=NAME or NUMBER",
-                    title=shorten(title),
-                    header=quote_names(header),
-                    key=key,
-                ),
-            )
+            what = "has no column '{title:s}'; it has {header:s}: correct `columns` = {key:s}=NAME or NUMBER"
+            raise TableError(path, what, shorten(title), quote_names(header), key)
         if index in chosen.values():
-            raise TableError(path, f"`columns` names column '{shorten(title)}' twice; each column holds one quantity")
+            what = "`columns` names column '{title:s}' twice; each column holds one quantity"
+            raise TableError(path, what, shorten(title))
         chosen[name] = index
     return chosen, stated
 
@@ -423,9 +424,9 @@ def _stated_unit(path: Path, name: str, unit: str) -> str:
     if turns and is_total(unit):
         return TOTAL
     if not (_is_unit_of(unit, name) or (turns and unit_factor(unit, "time"))):
-        of_turns = ", s and ms of a turn, turns in 10 s, turns since the start as turns"
-        known = ", ".join(UNITS[kind]) + of_turns * turns
-        raise TableError(path, f"`columns`: '{shorten(unit)}' is no unit of {kind}; known are {known}")
+        of_turns = ", s and ms of a turn, turns in 10 s, turns since the start as turns" if turns else ""
+        what = "`columns`: '{unit:s}' is no unit of {kind}; known are {known:s}{of_turns}"
+        raise TableError(path, what, shorten(unit), kind, ", ".join(UNITS[kind]), of_turns)
     return unit
 
 
@@ -446,12 +447,13 @@ def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) 
     if len(exact or indices) == 1:
         return (exact or indices)[0]
     key = next((short for short, long in SHORTHANDS.items() if long == name), name)
-    numbers = " or ".join(f"{key}={index + 1}" for index in indices)
+    *some, last = (f"{key}={index + 1}" for index in indices)
     period = "; if T is the time of a turn say its unit, as T [ms]" if any(header[i] == "T" for i in indices) else ""
-    text = f"columns {quote_names(header[i] for i in indices)} could each be {name}"
+    text = Text("columns {names:s} could each be {name:s}", quote_names(header[i] for i in indices), name)
     choices = tuple(Choice(shorten(header[index]), {key: str(index + 1)}) for index in indices)
-    doubt = Doubt("column", f"{text}: which?", None, choices)
-    raise Ambiguous(path, f"{text}; say which: `columns` = {numbers}{period}", doubt)
+    doubt = Doubt("column", Text("{text}: which?", text), None, choices)
+    numbers = Text("{some:s} or {last:s}", " or ".join(some), last)
+    raise Ambiguous(path, Text("{text}; say which: `columns` = {numbers}{period}", text, numbers, period), doubt)
 
 
 def _written_unit(name: str, meant: str) -> str | None:

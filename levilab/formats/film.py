@@ -85,9 +85,8 @@ def pictures(film: Film, start: float = 0.0, stop: float = np.inf) -> Iterator[t
         try:
             for frame in container.decode(stream):
                 if frame.pts is None:
-                    raise NoFilm(
-                        f"{film.path}: its pictures have no times: take the phone's own file, not a raw stream"
-                    )
+                    said = "{path:s}: its pictures have no times: take the phone's own file, not a raw stream"
+                    raise NoFilm(said, film.path)
                 time = float(frame.pts * stream.time_base)
                 if time > stop:
                     return
@@ -95,8 +94,8 @@ def pictures(film: Film, start: float = 0.0, stop: float = np.inf) -> Iterator[t
                     before = time
                     yield time, _brightness(frame)
         except av.FFmpegError as error:
-            raise NoFilm(f"{film.path}: is damaged after {max(before, 0):.2f} s ({error}): copy it again, or end "
-                         "before that by `stop`") from error  # fmt: skip
+            said = "{path:s}: is damaged after {s:.2f} s: copy it again, or end before that by `stop`"
+            raise NoFilm(said, film.path, max(before, 0)) from error
 
 
 def _brightness(frame: Any) -> Picture:
@@ -117,7 +116,8 @@ def _number(text: str | None) -> float | None:
 def check_reader(path: Path) -> None:
     """Raise NoFilm where the extra is not installed, by which a film is read and written."""
     if find_spec("av") is None:
-        raise NoFilm(f"{path}: films need the extra video (av, which is not installed): {how_to_install('video')}")
+        said = "{path:s}: films need the extra video (av, which is not installed): {how}"
+        raise NoFilm(said, path, how_to_install("video"))
 
 
 @contextmanager
@@ -129,9 +129,9 @@ def _opened(path: Path) -> Iterator[tuple[Any, Any]]:
     try:
         container: Any = av.open(str(path))
     except (av.FFmpegError, OSError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise NoFilm(f"{path}: holds no film that can be read ({why}): give the file that the camera wrote") from error
+        said = "{path:s}: holds no film that can be read: give the file that the camera wrote"
+        raise NoFilm(said, path) from error
     with container:
         if not container.streams.video:
-            raise NoFilm(f"{path}: holds no film: a film of the top from above is expected")
+            raise NoFilm("{path:s}: holds no film: a film of the top from above is expected", path)
         yield container, container.streams.video[0]

@@ -22,7 +22,6 @@ from levilab.formats.dialect import (
 from levilab.formats.kinds import OTHER, kind_of_bytes
 from levilab.formats.texts import Text
 from levilab.formats.titles import UNITS, implied_unit, is_unit, known_titles, read_title, unit_factor
-from levilab.texts.text import Text as Said
 
 HEAD = 65536  # bytes that the guess rests upon
 SAMPLE = 100  # lines, the last of the head: those are rows even below a long preamble
@@ -75,8 +74,8 @@ class Layout:
         title, unit = "".join(self.header[index : index + 1]), "".join(self.units[index : index + 1])
         own = "" if implied_unit(title) else read_title(title).unit or ""
         if any(unit_factor(unit, kind) not in {None, unit_factor(own, kind) or 0} for kind in UNITS if is_unit(own)):
-            what = f"column '{shorten(title)}' has the unit '{shorten(unit)}' in the row beneath; correct one of them"
-            raise TableError(path, what)
+            what = "column '{title:s}' has the unit '{unit:s}' in the row beneath; correct one of them"
+            raise TableError(path, what, shorten(title), shorten(unit))
 
 
 def sniff(source: Text) -> Layout:
@@ -100,7 +99,7 @@ def sniff(source: Text) -> Layout:
         at, line = next((n, line) for n, line in enumerate(lines, 1) if line.strip())
         alone = "; if it holds one quantity alone, its times are needed, too: a column of them before it"
         text = "'{seen:s}' begins no table of at least two columns; {export}{alone}"
-        raise NoTable(path, Said(text, seen=shorten(line.strip()), export=EXPORT, alone=alone), line=at)
+        raise NoTable(path, text, shorten(line.strip()), EXPORT, alone, line=at)
     layout = lay_out(lines, encoding, dialect, head)
     if source.aligned and not layout.width:
         raise NoTable(path, "holds no rows of numbers")
@@ -148,13 +147,13 @@ def lines_of(path: Path, head: bytes, encoding: str, *, whole: bool, padding: st
     if CONTROL.search(text):
         clean = ["\n" if CONTROL.search(line) else line for line in lines]
         if sum(one != line for one, line in zip(clean, lines, strict=True)) > _MOST_NOISE * len(lines):
-            raise NoTable(path, Said("is a binary file; {export}", export=EXPORT))
+            raise NoTable(path, "is a binary file; {export}", EXPORT)
         lines = clean
     if not whole and lines and not lines[-1].endswith("\n"):
         lines.pop()
     if not any(line.strip() for line in lines):
         seen = "is empty; {export}" if whole else "is one line without end; {export}"
-        raise NoTable(path, Said(seen, export=EXPORT))
+        raise NoTable(path, seen, EXPORT)
     return lines
 
 
@@ -178,7 +177,7 @@ def refuse_other_kinds(path: Path, head: bytes) -> None:
     """Raise NoTable for a file that is no text by its first bytes, with what to do."""
     kind = kind_of_bytes(head)
     if kind is not OTHER:
-        raise NoTable(path, Said("is {kind}: {advice}", kind=kind.name, advice=kind.advice), kind=kind)
+        raise NoTable(path, "is {kind}: {advice}", kind.name, kind.advice, kind=kind)
 
 
 def _of_words(lines: list[str], encoding: str, head: bytes) -> Layout | None:

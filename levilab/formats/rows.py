@@ -19,7 +19,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.numbers import how_many
 from levilab.formats.columns import Column, TableError, shorten
 from levilab.formats.dialect import (
     CLOCK,
@@ -37,9 +36,11 @@ from levilab.formats.titles import dimension, is_unit, read_title, unit_factor
 from levilab.formats.transposed import LIES
 from levilab.texts.note import Note
 from levilab.texts.text import Text as Said
+from levilab.texts.text import how_many
 
 #: Decimal mark → what is expected, for messages.
 EXPECTED = {",": Said("a number with decimal comma"), ".": Said("a number with decimal point")}
+FIELDS = "'{row:s}' has {fields}, {width} are expected: complete or remove the line{hint}"
 FEW = 1 << 16  # bytes that are read line by line before pandas is imported
 BLOCK = 1 << 17  # bytes counted at once: small enough for the cache
 ONE_BYTE_ENCODINGS = ("utf-8", "utf-8-sig", "latin-1")  # those in which a line end is one byte, whatever precedes it
@@ -88,7 +89,7 @@ def read_rows(
     except TableError as error:
         if not text.lies:
             raise
-        raise TableError(error.path, f"{error.message}; {LIES}", line=error.line) from None
+        raise TableError(error.path, "{wrong}; {lies}", error.message, LIES, line=error.line) from None
 
 
 def _read_at_once(text: Text, layout: Layout, chosen: Sequence[Column], *, drop_unended: bool) -> Rows | None:
@@ -182,7 +183,7 @@ def _with_last(
     line = layout.first_line + rows.lines.size
     last = None if drop_unended else _row_or_none(path, layout, chosen, line, rest)
     if last is None:
-        return replace(rows, notes=(_left_out(line, rest, "was cut off"),))
+        return replace(rows, notes=(left_out(line, rest, "was cut off"),))
     values = tuple(np.append(column, number) for column, number in zip(rows.values, last, strict=True))
     return Rows(values, np.append(rows.lines, line))
 
@@ -199,7 +200,7 @@ def _read_lines(
         if not line.endswith("\n"):
             row = None if drop_unended else _row_or_none(path, layout, chosen, number, line)
             if row is None:
-                notes.append(_left_out(number, line, "was cut off"))
+                notes.append(left_out(number, line, "was cut off"))
                 break
         try:
             row = _row(path, layout, chosen, number, line)
@@ -221,7 +222,7 @@ def _read_lines(
     )
     refused = refused if lines else [*remarks[:1], *refused]
     notes += _notes_on_refused(refused, len(lines), skip=skip_doubtful, may_skip=not drop_unended)
-    notes += [_left_out(error.line or 0, line, "is no reading") for error, line in remarks[:_MOST_NAMED]]
+    notes += [left_out(error.line or 0, line, "is no reading") for error, line in remarks[:_MOST_NAMED]]
     if len(remarks) > _MOST_NAMED:
         notes.append(Note("words", Said("{n} rows without a number are left out, these and others", len(remarks))))
     return Rows(numbers, np.array(lines, np.int64), (*notes, *_doubts_about(time)))
@@ -245,9 +246,9 @@ def _notes_on_refused(
     places = ", ".join([*numbers[:_MOST_NAMED], *["…"] * (len(numbers) > _MOST_NAMED)])
     if doubtful and not skip:
         error, _ = doubtful[0]
-        also = f" (also in {how_many(len(numbers) - 1, 'other line')})" if len(numbers) > 1 else ""
+        also = Said(" (also in {lines})", how_many(len(numbers) - 1, "other line")) if len(numbers) > 1 else ""
         do = "; `skip_doubtful` leaves such rows out" if may_skip and len(doubtful) < read else ""
-        raise TableError(error.path, f"{error.message}{also}{do}", line=error.line)
+        raise TableError(error.path, "{wrong}{also}{do}", error.message, also, do, line=error.line)
     if doubtful:
         many = "{n} doubtful rows are left out, as asked: lines {places:s}"
         one = "{n} doubtful row is left out, as asked: line {places:s}"
@@ -263,7 +264,7 @@ def _lines(text: Text, layout: Layout, notes: list[str] | None = None) -> Iterat
             if not CONTROL.search(line):
                 yield number, line
             elif notes is not None:
-                notes.append(_left_out(number, line, "has bytes that are no text"))
+                notes.append(left_out(number, line, "has bytes that are no text"))
 
 
 def _remark_behind(layout: Layout, number: int, line: str) -> Iterator[str]:
@@ -293,8 +294,8 @@ def _with_order_of_dates(text: Text, layout: Layout, chosen: Sequence[Column], n
     days = [(date(y, b, a).toordinal(), date(y, a, b).toordinal()) for a, b, y in dates]
     by_day, by_month = (max(order) - min(order) for order in zip(*days, strict=True))
     name = "month/day" if by_month < by_day else "day/month"
-    said = f"its dates are taken for {name}/year, in which it lasts less: write 2026-12-31 if they are not"
-    notes.append(Note("dates", said))
+    said = "its dates are taken for {order}/year, in which it lasts less: write 2026-12-31 if they are not"
+    notes.append(Note("dates", Said(said, name)))
     return months_first if by_month < by_day else layout
 
 
@@ -339,22 +340,18 @@ def _doubts_about(time: str) -> Iterator[str]:
     """Yield the doubt about a first time: a stopwatch begins at 0:00 or so, hours and minutes of a clock do not."""
     minutes = re.fullmatch(r"(\d{1,2}):\d\d", time)
     if minutes and int(minutes[1]):
-        text = f"the times, as {time}, are taken for minutes and seconds; of a clock write the seconds, too: {time}:00"
-        yield Note("clock", text)
+        text = "the times, as {t:s}, are taken for minutes and seconds; of a clock write the seconds, too: {t:s}:00"
+        yield Note("clock", Said(text, time))
 
 
 def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: str) -> list[float]:
     """Return the numbers of one row, NaN where a reading is missed."""
     fields = layout.dialect.split(text)
     if not layout.aligned and (len(fields) < layout.width or any(map(_NUMBER_IN.search, fields[layout.width :]))):
-        hint = "; if the comma is a decimal mark, separate by ; or tab" if layout.dialect.separator == "," else ""
+        hint = Said("; if the comma is a decimal mark, separate by ; or tab") if layout.dialect.separator == "," else ""
         begins_with_words = not _NUMBER_IN.search(next(filter(None, fields), ""))
-        raise (_Words if begins_with_words else TableError)(
-            path,
-            f"'{shorten(text.strip())}' has {how_many(len(fields), 'field')}, {layout.width} are "
-            f"expected: complete or remove the line{hint}",
-            line=line,
-        )
+        said = Said(FIELDS, shorten(text.strip()), how_many(len(fields), "field"), layout.width, hint)
+        raise (_Words if begins_with_words else TableError)(path, said, line=line)
     fields += [""] * (layout.width - len(fields))
     try:
         return [_number(path, layout, column, line, fields[column.index]) for column in chosen]
@@ -396,8 +393,8 @@ def _number(path: Path, layout: Layout, column: Column, line: int, cell: str) ->
         with contextlib.suppress(ValueError):
             return clock_time(text, month_first=layout.dialect.month_first) / column.factor
     if text == UNVALUED:
-        what = f"column '{shorten(column.label)}' holds a formula without its value"
-        raise TableError(path, f"{what}: open the file in Excel or LibreOffice, save it", line=line)
+        what = "column '{label:s}' holds a formula without its value: open the file in Excel or LibreOffice, save it"
+        raise TableError(path, what, shorten(column.label), line=line)
     no_number = "'{cell:s}' stands in column '{column:s}', {expected} is expected: {do}"
     do = "correct it, or leave it empty if the reading was missed"
     if column.name == "time_s":
@@ -427,9 +424,9 @@ def _number_with_unit(path: Path, layout: Layout, column: Column, line: int, cel
         return scale * layout.dialect.number(text[: -len(unit)].strip())
     except ValueError:
         other = "'{cell:s}' has the other decimal mark, {expected} is expected: correct it"
-        said = Said(other, cell=shorten(cell), expected=EXPECTED[layout.dialect.decimal])
-        raise TableError(path, said, line=line) from None
+        raise TableError(path, other, shorten(cell), EXPECTED[layout.dialect.decimal], line=line) from None
 
 
-def _left_out(line: int, text: str, why: str) -> str:
+def left_out(line: int, text: str, why: str) -> str:
+    """Return the note on a line that is left out."""
     return Note(why, Said("line {line}: '{text:s}' {why} and is left out", line, shorten(" ".join(text.split())), why))

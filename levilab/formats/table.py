@@ -4,25 +4,25 @@ A file is opened (`texts`) and understood (`understanding`), and its rows are re
 """
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.numbers import how_many
 from levilab.errors import UsageError
 from levilab.formats.columns import SHORTHANDS, Column, TableError, key_of, shorten
 from levilab.formats.dialect import Dialect
 from levilab.formats.layout import Layout
-from levilab.formats.rows import Rows, read_rows
+from levilab.formats.rows import Rows, left_out, read_rows
 from levilab.formats.texts import Text, must_be_file
 from levilab.formats.titles import CANONICAL, COMPANIONS, QUANTITIES, companion
 from levilab.formats.understanding import Plan, Request, no_column, plan_of
 from levilab.texts.note import of_file, reword
+from levilab.texts.text import Sentences, how_many
 from levilab.texts.text import Text as Said
 
 if TYPE_CHECKING:
@@ -108,29 +108,32 @@ def read_table(
     path = plan.path
     if len(table) >= FEWEST:
         return table
-    what = how_many(len(table), "reading") if rows.lines.size else "only a header"
-    missed = f" and {rows.lines.size - len(table)} missed ones" if rows.lines.size > len(table) else ""
-    left_out = "".join(f"; {note}" for note in rows.notes)
-    what = f"holds {what}{missed}, at least {FEWEST} readings are needed: record longer{left_out}"
+    holds = how_many(len(table), "reading") if rows.lines.size else Said("only a header")
+    missed = rows.lines.size - len(table)
+    holds = Said("{readings} and {n} missed ones", holds, missed) if missed else holds
+    what = "holds {what}, at least {fewest} readings are needed: record longer"
+    what = Sentences(Said(what, holds, FEWEST), *rows.notes, between="; ")
     raise TableError(path, what, line=layout.header_line or layout.first_line)
 
 
-def refuse(table: Table, wrong: "NDArray[np.bool_]", say: Callable[[int], str]) -> None:
+def refuse(table: Table, wrong: "NDArray[np.bool_]", message: str, *values: Any) -> None:
     """Raise TableError, which names the line, for the first of the wrong readings.
 
     Args:
         table: of the readings.
         wrong: which of them, shape (n,).
-        say: from the index of a reading, what is wrong with it.
+        message: what is wrong with it, a template.
+        values: in the message; of an array that of the reading.
     """
     if wrong.any():
         i = int(wrong.argmax())
-        raise TableError(table.path, say(i), line=int(table.lines[i]))
+        of_it = (value[i] if isinstance(value, np.ndarray) else value for value in values)
+        raise TableError(table.path, message, *of_it, line=int(table.lines[i]))
 
 
 def must_be_positive(table: Table, values: "NDArray[np.float64]", what: str, advice: str) -> None:
     """Raise TableError, which names the line, for the first of these values that is not above 0."""
-    refuse(table, values <= 0, lambda i: f"{what} is {values[i]:.9g} {advice}")
+    refuse(table, values <= 0, "{what} is {value:.9g} {advice}", what, values, advice)
 
 
 def read_run_readings(path: Path, channels: Collection[str] = ()) -> Table:
@@ -153,9 +156,9 @@ def read_run_readings(path: Path, channels: Collection[str] = ()) -> Table:
         known = dict.fromkeys((*channels, *CANONICAL))
         chosen = tuple(Column(n, header.index(n), n, 1) for n in known if n in header)
         if header and not (chosen and "".join(header).isprintable()):
-            raise TableError(path, f"'{shorten(title.strip())}' is no header of a run, as time_s,… is", line=1)
+            raise TableError(path, "'{title:s}' is no header of a run, as time_s,… is", shorten(title.strip()), line=1)
         layout = Layout("utf-8-sig", Dialect(",", "."), header, 1, (), 2, len(first), len(header))
-        cut = (f"line 1: '{shorten(title)}' was cut off and is left out",) if title else ()
+        cut = (left_out(1, title, "was cut off"),) if title else ()
         nothing = Rows((), np.zeros(0, np.int64), cut)
         rows = read_rows(Text(path), layout, chosen, drop_unended=True) if header else nothing
     return _table(path, header, chosen, rows, (), gaps=set(channels) - set(CANONICAL))
@@ -193,8 +196,8 @@ def parse_columns(given: object) -> dict[str, str]:
         raise ColumnsError("columns", expected, value=f"'{shorten(str(given))}'")
     if None in keys:
         unknown = shorten(parts[keys.index(None)][0])
-        what = f"'{unknown}' is no quantity known here; {', '.join(SHORTHANDS)} are, as t=Zeit,f=3"
-        raise ColumnsError("columns", what)
+        what = "'{unknown:s}' is no quantity known here; {known:s} are, as t=Zeit,f=3"
+        raise ColumnsError("columns", what, unknown, ", ".join(SHORTHANDS))
     return {key: title for key, (_, title) in zip(keys, parts, strict=True) if key}
 
 
@@ -209,8 +212,8 @@ def file_errors(path: Path) -> Iterator[None]:
     except PermissionError as error:
         raise TableError(path, "may not be read by you; change its permissions or copy it") from error
     except OSError as error:
-        what = f"cannot be read ({error.strerror or type(error).__name__}); check the name and the disk"
-        raise TableError(path, what) from error
+        what = "cannot be read ({why:s}); check the name and the disk"
+        raise TableError(path, what, error.strerror or type(error).__name__) from error
 
 
 def _of_run(rows: Rows, plan: Plan) -> Rows:
@@ -240,7 +243,7 @@ def _table(
     name = shorten(str(path), 200)
     notes = [*warnings, *(reword(note, Said("{path:s}: {what}", name, note), names_input=True) for note in rows.notes)]
     numbers = dict(zip(chosen, rows.values, strict=False))
-    notes += [of_file("±", f"{_seen(name, column)} is not used") for column in _drop_unused(numbers, wanted)]
+    notes += [of_file("±", Said("{seen} is not used", _seen(name, c))) for c in _drop_unused(numbers, wanted)]
     # The comparison is false for NaN, too.
     present = {column: np.abs(values) < NO_READING for column, values in numbers.items() if column.name not in gaps}
     present = {column: there & (numbers[column] != 0) if column.inverse else there for column, there in present.items()}
@@ -334,16 +337,18 @@ def _drop_unused(numbers: "dict[Column, NDArray[np.float64]]", wanted: Collectio
 
 def _seen(name: str, column: Column) -> str:
     """Return the beginning of a note on a column."""
-    return f"{name}: column '{shorten(column.label)}'" + ": the number behind the ±" * column.behind
+    behind = "{name:s}: column '{label:s}': the number behind the ±"
+    return Said(behind if column.behind else "{name:s}: column '{label:s}'", name, shorten(column.label))
 
 
 def _notes_on_u(seen: str, column: Column, missing: "NDArray[np.bool_]", read: "NDArray[np.bool_]") -> Iterator[str]:
     """Yield a note on a column of uncertainties that has gaps among the rows that are read, or stands behind a ±."""
     if missing.any():
-        gap = "missing" if column.behind else "empty"
-        yield of_file("gaps", f"{seen} is {gap} in {missing.sum()} of {read.sum()} rows and is not used")
+        gap = "{seen} is {missing} in {n} of {rows} rows and is not used"
+        how = "missing" if column.behind else "empty"
+        yield of_file("gaps", Said(gap, seen, how, missing.sum(), read.sum()))
     elif column.behind:
-        yield of_file("±", f"{seen} is taken as the standard uncertainty")
+        yield of_file("±", Said("{seen} is taken as the standard uncertainty", seen))
 
 
 def _missed_warning(name: str, lines: "NDArray[np.int64]", rows: int, *, periods: bool) -> str:

@@ -19,9 +19,10 @@ from typing import Any, BinaryIO
 
 import python_calamine
 
-from levilab.formats.columns import NoTable, TableError, shorten
+from levilab.formats.columns import NoTable, TableError
 from levilab.formats.dialect import UNVALUED, value_and_u
 from levilab.formats.dress import undress
+from levilab.texts.text import Text as Said
 
 #: Bytes that a workbook or an archive may unpack to: a spreadsheet of a million rows has some 100 MB, and a reader
 #: needs several times as much memory.
@@ -106,8 +107,8 @@ def must_be_file(path: Path) -> None:
     path = locate(path)[0]
     if path.is_dir():
         names = name_files(path, (*TEXTS, *SPREADSHEETS)) or name_files(path)
-        advice = f"name one in it: {names}" if names else "there are no files in it"
-        raise TableError(path, f"is a folder; a data file is expected: {advice}")
+        advice = Said("name one in it: {names:s}" if names else "there are no files in it", names=names)
+        raise TableError(path, "is a folder; a data file is expected: {advice}", advice)
     if not path.exists():  # also for a name that no file can have
         raise FileNotFoundError
     if not path.is_file():
@@ -160,7 +161,8 @@ def forget() -> None:
 
 def _read(file: Path, size: int) -> bytes:
     if size > MOST_REWRITTEN:
-        raise TableError(file, f"has {size >> 20} MB, up to {MOST_REWRITTEN >> 20} MB are read in this form: use CSV")
+        most = "has {size} MB, up to {most} MB are read in this form: use CSV"
+        raise TableError(file, most, size >> 20, MOST_REWRITTEN >> 20)
     return file.read_bytes()
 
 
@@ -183,18 +185,18 @@ def _unpacked(file: Path) -> tuple[Text, ...]:
             members = [member for member in archive.infolist() if not member.is_dir()]
             names = {member.filename for member in members}
             if what := next((what for name, what in _OTHER_ARCHIVES.items() if name in names), None):
-                raise NoTable(file, f"is {what}")
+                raise NoTable(file, "is {what}", what)
             workbook = bool({"xl/workbook.xml", "content.xml"} & names)
             taken = members if workbook else [member for member in members if _may_be_table(member.filename)]
             seen = sum(member.file_size for member in taken)
             if len(taken) > MOST_MEMBERS or seen > MOST_UNPACKED:
-                raise _too_large(file, f"{len(taken)} files of {seen / 2**30:.1f} GB")
+                raise _too_large(file, "{n} files of {size:.1f} GB", len(taken), seen / 2**30)
             if workbook:
                 return _sheets(file, _marked(file, archive, taken) if _check(file, archive, taken) else file)
             found = list(_members(file, archive, taken))
     except (zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError, ValueError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
-        what = "is locked by a password" if "encrypted" in str(error) else f"is a damaged ZIP or Excel file ({error})"
-        raise TableError(file, f"{what}: open it with its own program and save it again, unlocked") from error
+        what = "is locked by a password" if "encrypted" in str(error) else "is a damaged ZIP or Excel file"
+        raise TableError(file, "{what}: open it with its own program and save it again, unlocked", what) from error
     if not found:
         raise NoTable(file, "is a ZIP file without a table: CSV, TXT or a spreadsheet is expected in it: unpack it")
     return tuple(found)
@@ -206,10 +208,9 @@ def _may_be_table(name: str) -> bool:
     return not hidden and Path(name).suffix.casefold() in TEXTS
 
 
-def _too_large(file: Path, what: str) -> TableError:
-    return TableError(
-        file, f"unpacks to {what}, up to {MOST_UNPACKED >> 20} MB and {MOST_CELLS:,} cells are read: export it as CSV"
-    )
+def _too_large(file: Path, what: str, *values: float) -> TableError:
+    most = "unpacks to {what}, up to {size} MB and {cells:,} cells are read: export it as CSV"
+    return TableError(file, most, Said(what, *values), MOST_UNPACKED >> 20, MOST_CELLS)
 
 
 def _members(file: Path, archive: zipfile.ZipFile, members: Iterable[zipfile.ZipInfo]) -> Iterator[Text]:
@@ -238,6 +239,7 @@ def _blocks(file: Path, archive: zipfile.ZipFile, member: zipfile.ZipInfo, most:
 # --- spreadsheets --------------------------------------------------------------------------------------
 
 
+_CELLS_OF = "{rows:,} rows of {columns:,} columns"
 _ADDRESS = re.compile(rb"r=[\"']([A-Z]{1,3})(\d{1,7})")
 #: The address of a cell right of column Z or below row 999 999; without any such a sheet is of an allowed size.
 _FAR = re.compile(rb"r=[\"'](?:[A-Z]{2}|[A-Z]\d{7})")
@@ -269,9 +271,9 @@ def _check(file: Path, archive: zipfile.ZipFile, members: Sequence[zipfile.ZipIn
         if far:
             rows, columns = _extent(_blocks(file, archive, member, MOST_UNPACKED))
         if rows * columns > MOST_CELLS:
-            raise _too_large(file, f"{rows:,} rows of {columns:,} columns")
+            raise _too_large(file, _CELLS_OF, rows, columns)
     if longest * texts > 4 * MOST_UNPACKED:
-        raise _too_large(file, f"{texts:,} cells with texts of up to {longest:,} letters")
+        raise _too_large(file, "{cells:,} cells with texts of up to {letters:,} letters", texts, longest)
     return unvalued
 
 
@@ -327,6 +329,7 @@ class _OdsCells:
                     self.columns = max(self.columns, self._column)
 
 
+_DAMAGED = "is a damaged spreadsheet: open it and save it again as .xlsx"
 _VISIBLE = python_calamine.SheetVisibleEnum.Visible
 
 
@@ -341,13 +344,11 @@ def _sheets(file: Path, source: Path | BinaryIO) -> tuple[Text, ...]:
     except python_calamine.PasswordError as error:
         raise TableError(file, "is locked by a password: save it without one") from error
     except (python_calamine.CalamineError, OSError, ValueError) as error:
-        said = shorten(" ".join(str(error).split()), 80)
-        what = f"cannot be read as a spreadsheet ({said}): open it and save it again as .xlsx"
-        raise TableError(file, what) from error
+        raise TableError(file, _DAMAGED) from error
     except BaseException as error:  # a defect of the library in a damaged file; it is written in Rust
         if type(error).__name__ != "PanicException":
             raise
-        raise TableError(file, "is a damaged spreadsheet: open it and save it again as .xlsx") from error
+        raise TableError(file, _DAMAGED) from error
     if not found:
         raise NoTable(file, "is an empty spreadsheet")
     return tuple(Text(_place(file, name.replace("/", "-")), _lines(rows), aligned=True) for name, rows in found)
@@ -356,7 +357,7 @@ def _sheets(file: Path, source: Path | BinaryIO) -> tuple[Text, ...]:
 def _must_be_of_a_size(file: Path, sheets: Sequence[Any]) -> None:
     for sheet in sheets:
         if sheet.total_height * sheet.total_width > MOST_CELLS:
-            raise _too_large(file, f"{sheet.total_height:,} rows of {sheet.total_width:,} columns")
+            raise _too_large(file, _CELLS_OF, sheet.total_height, sheet.total_width)
 
 
 def _lines(rows: Sequence[Sequence[Any]]) -> bytes:
@@ -432,7 +433,7 @@ def _of_json(file: Path, size: int) -> Text:
     rows = _rows_of(data)
     if rows is None:
         expected = '{"t": [0, 1, …], "f": [38, 37.9, …]} or [{"t": 0, "f": 38}, …] is expected'
-        raise NoTable(file, f"is a JSON file without a table: {expected}")
+        raise NoTable(file, "is a JSON file without a table: {expected}", expected)
     return Text(file, _lines([["" if cell is None else cell for cell in row] for row in rows]), aligned=True)
 
 

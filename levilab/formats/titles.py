@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
 
+from levilab.texts.text import Text
+
 PER_MINUTE = 1 / 60
 PER_RADIAN = 1 / (2 * pi)
 
@@ -372,8 +374,8 @@ def nearly_a_frequency(text: str) -> str | None:
     """
     name = plain_name(text)
     if name in NEED_UNITS:
-        title = text.strip()
-        return f'say its unit in the title, or `columns` = "f={title} [Hz]" or "f={title} [rpm]", whichever it is in'
+        said = 'say its unit in the title, or `columns` = "f={title:s} [Hz]" or "f={title:s} [rpm]", whichever it is in'
+        return Text(said, text.strip())
     return next((how for word, how in NEARLY_FREQUENCIES.items() if name.startswith(word)), None)
 
 

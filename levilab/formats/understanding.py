@@ -57,6 +57,7 @@ from levilab.formats.titles import (
 from levilab.formats.transposed import LIES, set_upright, tables_of
 from levilab.texts.note import of_file
 from levilab.texts.text import Text as Said
+from levilab.texts.text import text_of
 
 TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: No such top floats far below or above these [Hz], linear theory says 21.65 to 80.6: the unit is in doubt there.
@@ -166,7 +167,7 @@ def understand(
     try:
         looks = list(_looks(path, request))
     except (TableError, OSError) as error:
-        return Understanding(path, (), str(error))
+        return Understanding(path, (), text_of(error))
     runs = tuple(_shown(look, request, alone=len(looks) == 1) for look in looks)
     problem = "" if any(not run.problem for run in runs) else next(run.problem for run in runs)
     return Understanding(path, runs, problem)
@@ -177,14 +178,14 @@ def _shown(look: "_Look", request: "Request", *, alone: bool) -> UnderstoodRun:
     plan, error, layout, part = look.plan, look.error, look.layout, look.part
     name = "" if alone else look.name
     if layout is None or part is None or isinstance(error, NoTable):
-        return UnderstoodRun(look.path, name, 0, (), problem=str(error))
+        return UnderstoodRun(look.path, name, 0, (), problem=text_of(error) if error else "")
     used = {column.index: column for column in _known(look, layout, part, request) if not column.behind}
     seen = [_column(k, layout, used.get(k)) for k in range(layout.width) if part.has(k, layout.header)]
     seen = [column for column in seen if column.title or any(column.values)]
     doubts = [doubt for column in used.values() if (doubt := _unit_doubt(layout, column, used.values()))]
     asked = error.doubt if isinstance(error, NoSuchColumn | Ambiguous) else None
     doubts += [asked] if asked and asked not in doubts else []
-    problem = str(error) if error else ""
+    problem = text_of(error) if error else ""
     return UnderstoodRun(
         look.path, name, layout.header_line, tuple(seen), tuple(doubts), plan.warnings if plan else (), problem
     )
@@ -303,8 +304,7 @@ def _unanswered(path: Path, doubt: Doubt) -> NoSuchColumn:
     example = ",".join(f"{key}={to}" for key, to in doubt.choices[0].columns.items())
     if doubt.open:
         example = re.sub(r"\[.*\]$", "[UNIT]", example)
-    text = Said('{question} say `columns` = "{example:s}"', question=doubt.text, example=example)
-    return NoSuchColumn(path, text, doubt=doubt)
+    return NoSuchColumn(path, '{question} say `columns` = "{example:s}"', doubt.text, example, doubt=doubt)
 
 
 def _must_be_sure(plan: "Plan") -> "Plan":
@@ -441,7 +441,8 @@ class SeveralRuns(TableError):
 
     def __init__(self, path: Path, paths: tuple[Path, ...], names: Iterable[str]) -> None:
         self.paths = paths
-        super().__init__(path, f"holds several runs ({quote_names(names)}): name one, as {shorten(str(paths[0]), 200)}")
+        one = shorten(str(paths[0]), 200)
+        super().__init__(path, "holds several runs ({names:s}): name one, as {path:s}", quote_names(names), one)
 
 
 def plan_of(path: Path, request: Request) -> Plan:
@@ -458,8 +459,9 @@ def plan_of(path: Path, request: Request) -> Plan:
     errors = [look.error for look in looks if look.error]
     if plans:
         (plan,) = plans
-        notes = [str(error) for error in errors if not isinstance(error, NoTable | NoSuchColumn)]
-        return replace(plan, warnings=(*plan.warnings, *(of_file("not read", f"not read: {note}") for note in notes)))
+        wrong = [error for error in errors if not isinstance(error, NoTable | NoSuchColumn)]
+        notes = [of_file("not read", Said("not read: {problem}", error)) for error in wrong]
+        return replace(plan, warnings=(*plan.warnings, *notes))
     raise next((error for error in errors if not isinstance(error, NoTable)), errors[0])
 
 
@@ -470,7 +472,7 @@ def _looks(path: Path, request: Request) -> Iterator[_Look]:
     taken = [look for look in found if is_named(inside, look.name)]
     if not taken:
         names = quote_names(look.name for look in found if look.name) or "none"
-        raise TableError(file, f"has no sheet, file or run '{shorten(inside)}'; it has {names}")
+        raise TableError(file, "has no sheet, file or run '{name:s}'; it has {names}", shorten(inside), names)
     yield from taken
 
 
@@ -525,12 +527,8 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
         numbers = any(_numbers(layout, k) for k in range(layout.width))
         if not numbers and locate(path)[1]:
             raise NoTable(path, "is a sheet without numbers")
-        unknown = Said(
-            "no title is known ({known:s} …) among {titles:s}: say `columns` = {columns:s}",
-            known=known,
-            titles=quote_names(header),
-            columns=_in_one_word(f"{_key(name)}=NAME" for name in wanted_names),
-        )
+        among = "no title is known ({known:s} …) among {titles:s}: say `columns` = {columns:s}"
+        unknown = Said(among, known, quote_names(header), _in_one_word(f"{_key(name)}=NAME" for name in wanted_names))
         raise NoSuchColumn(
             path,
             unknown if numbers else Said("there are no numbers in it, and {text}", text=unknown),
@@ -551,13 +549,14 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
 def _notes_on_u(path: Path, layout: Layout, chosen: Sequence[Column], *, wanted: bool) -> list[str]:
     """Return notes on columns of expanded uncertainties, where standard ones are missing, and on cells in %."""
     name = shorten(str(path), 200)
-    how = "u is half of 2σ or of U (k = 2), and a greatest error divided by √3: write it in a column u [Hz]"
+    half = (
+        "{path:s}: column '{title:s}' is not read: u is half of 2σ or of U (k = 2), and a greatest error divided by "
+        "√3: write it in a column u [Hz]"
+    )
     missing = wanted and {_SPIN, companion(_SPIN)} & {one.name for one in chosen} == {_SPIN}
     titles = zip(layout.header, layout.titles(), strict=False) if missing else ()
     expanded = [title for title, full in titles if _EXPANDED.search(title) and _may_be_of_spin(read_title(full))]
-    notes: list[str] = [
-        of_file("expanded u", f"{name}: column '{shorten(title)}' is not read: {how}") for title in expanded
-    ]
+    notes: list[str] = [of_file("expanded u", Said(half, name, shorten(title))) for title in expanded]
     said = "{path:s}: column '{title:s}' holds {number:g}, taken in {unit:s}; if it shows {shown:g} %, write u in Hz"
     for column in (one for one in chosen if layout.aligned and one.name == companion(_SPIN)):
         bare = column.unit == "%" or read_title(column.label).unit is None
@@ -582,9 +581,9 @@ def _must_be_one_time(path: Path, layout: Layout, meant: Sequence[str]) -> None:
     for minutes in (k for k in range(len(times)) if times[k : k + 2] == [60, 1] and not as_a_period(meant[k + 1])):
         whole, seconds = _numbers(layout, minutes), _numbers(layout, minutes + 1)
         if any(whole) and all(n == int(n) for n in whole) and seconds and max(seconds) < 60:
-            what = f"its times stand in two columns, {quote_names(meant[minutes : minutes + 2])}"
-            do = "write them as one, in seconds (60 × minutes + seconds) or as 1:20"
-            raise TableError(path, f"{what}: {do}", line=layout.header_line or layout.first_line)
+            what = "its times stand in two columns, {names:s}: write them as one, in seconds or as 1:20"
+            names = quote_names(meant[minutes : minutes + 2])
+            raise TableError(path, what, names, line=layout.header_line or layout.first_line)
 
 
 def _which_columns(layout: Layout, names: Collection[str]) -> Doubt | None:
@@ -594,7 +593,10 @@ def _which_columns(layout: Layout, names: Collection[str]) -> Doubt | None:
     if not numeric:
         return None
     choices = tuple(
-        Choice(f"{_key(name)}: {shorten(title.get(k, f'column {k + 1}'))}", {_key(name): str(k + 1)})
+        Choice(
+            Said("{key:s}: {title}", _key(name), shorten(title[k]) if k in title else Said("column {number}", k + 1)),
+            {_key(name): str(k + 1)},
+        )
         for name in names
         for k in numeric
     )
@@ -649,31 +651,32 @@ def _total_of_turns(path: Path, name: str, layout: Layout, chosen: Sequence[Colu
 
 def no_column(path: Path, name: str, header: Sequence[str], doubt: Doubt | None = None) -> NoSuchColumn:
     """Return the error for a quantity that no column is known to hold."""
-    text: str = Said(
-        "no column is known to be {name:s}; it has {titles:s}: say `columns` = {key:s}=NAME",
-        name=name,
-        titles=quote_names(header),
-        key=_key(name),
-    )
+    said = "no column is known to be {name:s}; it has {titles:s}: say `columns` = {key:s}=NAME"
+    text = Said(said, name, quote_names(header), _key(name))
     nearly = next((title for title in header if nearly_a_frequency(title)), None) if "frequency" in name else None
     foreign = next((title for title in header if read_title(title).column == name), None)
     if foreign and dimension(name) == "frequency" and is_total(read_title(foreign).unit or ""):
         text = total_beside_others(foreign)
     elif foreign:
         unit = shorten(read_title(foreign).unit or "")
-        what = f"column '{shorten(foreign)}' is in {unit}, which is no unit of {dimension(name)}"
-        text = f"{what}: {how_else(foreign, name)}"
+        said = "column '{title:s}' is in {unit:s}, which is no unit of {kind}: {do}"
+        text = Said(said, shorten(foreign), unit, dimension(name), how_else(foreign, name))
     elif nearly:
-        text = f"no column is known to be {name}; '{shorten(nearly)}' could become one: {how_else(nearly, name)}"
+        said = "no column is known to be {name:s}; '{title:s}' could become one: {do}"
+        text = Said(said, name, shorten(nearly), how_else(nearly, name))
     else:
         sensors = {title: OTHER_SENSORS.get(plain_unit(read_title(title).unit or "")) for title in header}
         title, sensor = motion_sensor(header) or next((pair for pair in sensors.items() if pair[1]), ("", None))
         field = next((one for one in header if name == _SPIN and _is_field(one)), None)
         if field:
-            text = f"'{shorten(field)}' is a magnetic field, no spin frequency: levilab analyze spin FILE reads it"
+            said = "'{title:s}' is a magnetic field, no spin frequency: levilab analyze spin FILE reads it"
+            text = Said(said, shorten(field))
         elif sensor:
-            text = f"'{shorten(title)}' is of {sensor}, which shows no turns: record with the magnetometer, or name its"
-            text += f" sheet or file; no column is known to be {name}"
+            said = (
+                "'{title:s}' is of {sensor}, which shows no turns: record with the magnetometer, or name its sheet or "
+                "file; no column is known to be {name:s}"
+            )
+            text = Said(said, shorten(title), sensor, name)
             doubt = None  # no column is likely
     return NoSuchColumn(path, text, doubt=doubt)
 
@@ -696,11 +699,11 @@ def _titles(
     if wanted:
         return numbers, _with_time(wanted, filled), []
     if layout.header_line:
-        what = f'is no header for the {layout.width} columns below: correct it, or say `columns` = "t=1,f=2"'
-        raise NoSuchColumn(path, what, line=layout.header_line)
+        what = 'is no header for the {width} columns below: correct it, or say `columns` = "t=1,f=2"'
+        raise NoSuchColumn(path, what, layout.width, line=layout.header_line)
     if len(filled) > len(TITLES_WITHOUT_HEADER) or not guess:
-        what = f'{layout.width} columns and no header; add one, or say `columns` = "t=1,f=2"'
-        raise NoSuchColumn(path, what, line=layout.first_line)
+        what = '{width} columns and no header; add one, or say `columns` = "t=1,f=2"'
+        raise NoSuchColumn(path, what, layout.width, line=layout.first_line)
     taken = dict(zip(TITLES_WITHOUT_HEADER, filled, strict=False))
     said = "{path:s}: no header; the columns are taken as {names:s}"
     return numbers, taken, [of_file("no header", Said(said, shorten(str(path), 200), ", ".join(taken)))]

@@ -19,7 +19,7 @@ from levilab.live.envelope import Envelope
 from levilab.live.tail import Tail
 from levilab.runs.find import RECORD
 from levilab.runs.run import EVENTS, READINGS, Run, RunRecord
-from levilab.texts.text import text_from
+from levilab.texts.text import text_from, text_of
 
 #: Events that are kept: of more, the first and the last ones matter, and the file has all.
 MOST_EVENTS = 400
@@ -90,7 +90,7 @@ class Followed:
         try:
             run = Run.load(self.folder)
         except DataError as error:
-            self.problem = str(error)
+            self.problem = text_of(error)
             return
         self.record, self.status, self.problem = run.record, run.status, ""
 

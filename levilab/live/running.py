@@ -24,7 +24,7 @@ from levilab.pipelines.spindown.readings import release_of
 from levilab.pipelines.spindown.words import law_names
 from levilab.present.numbers import plain, with_uncertainty
 from levilab.runs.events import RunEvent
-from levilab.texts.text import Text
+from levilab.texts.text import Text, text_of
 
 #: Points of a curve.
 _POINTS = 400
@@ -102,9 +102,11 @@ def fit_so_far(
     try:
         found = method(by_name, groups.size, settings, events)
     except TooFewReadings as error:
-        return Running("no fit", (str(error),)) if ended else Running("no fit yet", ("it begins after some readings",))
+        why = text_of(error) if ended else "it begins after some readings"
+        return Running("no fit" if ended else "no fit yet", (why,))
     except (AnalysisError, KeyError) as error:
-        text = str(error) if isinstance(error, AnalysisError) else Text("there is no column {name}", name=str(error))
+        missing = Text("there is no column {name}", name=str(error))
+        text = text_of(error) if isinstance(error, AnalysisError) else missing
         return Running("no fit" if ended else "no fit yet", (text,))
     return _without_forecast(found) if ended else found
 

@@ -1,12 +1,11 @@
 """How a data file is read, kept beside it in FILE.levilab.toml: `levilab open` writes it, every analysis reads it."""
 
-import difflib
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from levilab.errors import DataError, UsageError
+from levilab.errors import DataError, UsageError, list_known
 from levilab.files import parse_toml, replace_atomically, toml_value, writing
 from levilab.formats.columns import SHORTHANDS, key_of
 from levilab.formats.texts import locate, texts_of
@@ -80,26 +79,26 @@ def _read_all(file: Path) -> dict[str, dict[str, Any]]:
     try:
         table = parse_toml(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise CorrectionError(f"{path}: cannot be read ({error.strerror})") from error
+        raise CorrectionError("{path:s}: cannot be read ({why:s})", path, error.strerror) from error
     except ValueError as error:
-        raise CorrectionError(f"{path}: is no TOML ({error}): correct it, or delete it") from error
+        raise CorrectionError("{path:s}: is no TOML ({why}): correct it, or delete it", path, error) from error
     sheets = table.pop(_SHEET, {})
     if not isinstance(sheets, dict) or not all(isinstance(one, dict) for one in sheets.values()):
-        raise CorrectionError(f'{path}: [{_SHEET}."NAME"] is expected, and below it {", ".join(OF_FILES)}')
+        said = '{path:s}: [sheet."NAME"] is expected, and below it {keys:s}'
+        raise CorrectionError(said, path, ", ".join(OF_FILES))
     try:
         return {name: read_file_options(options) for name, options in {"": table, **sheets}.items()}
     except UsageError as error:
-        raise CorrectionError(f"{path}: {error}") from error
+        raise CorrectionError("{path:s}: {error}", path, error) from error
 
 
 def read_file_options(table: Mapping[str, Any]) -> dict[str, Any]:
     """Return options that say how a file is read, out of a table from elsewhere.  Raises UsageError."""
     for key, value in table.items():
         if key not in OF_FILES:
-            near = difflib.get_close_matches(key, OF_FILES, n=1)
-            raise UsageError(key, f"did you mean {near[0]}?" if near else f"known are {', '.join(OF_FILES)}")
+            raise UsageError(key, list_known(key, OF_FILES))
         if not _is_of_kind(key, value):
-            raise UsageError(key, f"{_EXPECTED[key]} is expected", value=value)
+            raise UsageError(key, "{what} is expected", _EXPECTED[key], value=value)
     found = read_options({key: str(value) if key == "channel" else value for key, value in table.items()})
     if columns := found.get("columns"):
         found["columns"] = {_SHORT.get(name, name): to for name, to in columns.items()}

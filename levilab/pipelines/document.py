@@ -35,7 +35,7 @@ from levilab.pipelines.sources import Found, Needs, Skipped, Source, collect
 from levilab.present.units import name_with_unit, split
 from levilab.runs.find import find_run
 from levilab.software import software_versions
-from levilab.texts.text import Sentences, Text, as_tables
+from levilab.texts.text import Sentences, Text, as_tables, text_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -227,7 +227,7 @@ class Analysis(Needs[Any], Generic[A]):
                 errors.append(error)
         if not done:
             raise errors[-1]
-        return done, [str(Skipped(str(error))) for error in errors]
+        return done, [str(Skipped(text_of(error))) for error in errors]
 
     def about_inputs(self, sources: Sequence[Source[Any]], options: Any) -> Iterable[str]:
         """Return what to know of the inputs before using the numbers."""

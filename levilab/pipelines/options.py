@@ -110,7 +110,7 @@ def _read_laws(given: str | Sequence[str]) -> tuple[str, ...]:
 
     names = {name.strip() for name in (given.split(",") if isinstance(given, str) else given)}
     if not names or not names <= LAWS.keys():
-        raise UsageError("laws", f"some of {', '.join(LAWS)} are expected, as disc,stokes", value=given)
+        raise UsageError("laws", "some of {names:s} are expected, as disc,stokes", ", ".join(LAWS), value=given)
     return tuple(name for name in LAWS if name in names)
 
 
@@ -399,12 +399,12 @@ def read_options(given: Mapping[str, Any], *, typed: bool = False) -> dict[str, 
         one = OPTIONS[names[shown]]
         off = value != "none" and str(value).casefold() in _OFF
         if off and not typed and "none" in one.choices:
-            others = " or ".join(repr(choice) for choice in one.choices if choice != "none")
-            raise UsageError(shown, f"'none' in quotation marks is expected, or {others}", value=str(value))
+            others = ", ".join(repr(choice) for choice in one.choices if choice != "none")
+            raise UsageError(shown, "'none' in quotation marks is expected, or {others:s}", others, value=str(value))
         if value is None:
             continue
         if one.needs and given.get(typed_name(one.needs) if typed else one.needs) is None:
-            raise UsageError(shown, f"goes with `{typed_name(one.needs) if typed else one.needs}` alone")
+            raise UsageError(shown, "goes with `{name:s}` alone", typed_name(one.needs) if typed else one.needs)
         has_unit = isinstance(value, WithUnit)
         shown_value = value.text if has_unit else value
         in_si = value * one.factor if typed and one.factor != 1 else float(value) if has_unit else value

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.numbers import digits
 from levilab.present.document.blocks import Block, Points
-from levilab.present.numbers import how_many, short_name
-from levilab.texts.text import Text
+from levilab.present.numbers import short_name
+from levilab.texts.text import Text, how_many
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Sequence

@@ -113,7 +113,7 @@ def _array(numbers: list[Any]) -> Any:
 SCHEMA: Literal["levilab-result/1"] = "levilab-result/1"
 RESULT = "result.json"
 AGAIN = "analyze again with levilab analyze"
-_AGAIN_OR_AWAY = f"{AGAIN}, or move the file away"
+_AGAIN_OR_AWAY = Text("{again}, or move the file away", AGAIN)
 
 
 # --- what is in it -------------------------------------------------------------------------------------
@@ -336,7 +336,7 @@ def read_result(path: Path, model: type[R]) -> R | None:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        raise ResultError(f"{path}: {in_one_line(error)}; {_AGAIN_OR_AWAY}") from error
+        raise ResultError("{path:s}: {problem:s}; {do}", path, in_one_line(error), _AGAIN_OR_AWAY) from error
 
 
 def is_of_another(path: Path, analysis: str) -> bool:
@@ -352,14 +352,14 @@ def _read(path: Path) -> dict[str, Any]:
     try:
         data = parse_json(path.read_text(encoding="utf-8"))
     except OSError as error:
-        raise ResultError(f"{path}: cannot be read ({error.strerror}); {_AGAIN_OR_AWAY}") from error
+        raise ResultError("{path:s}: cannot be read ({why:s}); {do}", path, error.strerror, _AGAIN_OR_AWAY) from error
     except ValueError as error:
-        raise NoResult(f"{path}: is cut off or not JSON ({error}); {_AGAIN_OR_AWAY}") from error
+        raise NoResult("{path:s}: is cut off or not JSON ({why}); {do}", path, error, _AGAIN_OR_AWAY) from error
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
         ours = isinstance(seen, str) and seen.startswith("levilab-result/")
-        text = f"{path}: schema is {repr(seen)[:60]}, expected {SCHEMA!r} of this version; {_AGAIN_OR_AWAY}"
-        raise ResultError(text) if ours else NoResult(text)
+        said = "{path:s}: schema is {seen:s}, expected {schema:s} of this version; {do}"
+        raise (ResultError if ours else NoResult)(said, path, repr(seen)[:60], repr(SCHEMA), _AGAIN_OR_AWAY)
     return data
 
 
@@ -385,11 +385,12 @@ def read_inputs(path: Path) -> Written:
     try:
         written = _Head.model_validate(data)
     except ValidationError as error:
-        raise ResultError(f"{path}: {in_one_line(error)}; {_AGAIN_OR_AWAY}") from error
+        raise ResultError("{path:s}: {problem:s}; {do}", path, in_one_line(error), _AGAIN_OR_AWAY) from error
     inputs = tuple(path.parent / run.path for run in written.runs)
     for one in inputs:
         if not locate(one)[0].exists():
-            raise ResultError(f"{path}: is of {one}, which is not there: name the run or data file where it lies now")
+            said = "{path:s}: is of {one:s}, which is not there: name the run or data file where it lies now"
+            raise ResultError(said, path, one)
     return Written(path, written.analysis, inputs)
 
 

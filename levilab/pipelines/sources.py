@@ -27,12 +27,12 @@ from levilab.formats.waveforms.record import SEARCHED
 from levilab.pipelines.correction import corrected_parts, describe, place_of_correction, read_correction
 from levilab.pipelines.options import InputOptions
 from levilab.present.clock import local
-from levilab.present.numbers import filled, how_many, list_in_words, short_name
+from levilab.present.numbers import filled, list_in_words, short_name
 from levilab.runs.find import RECORD, find_runs, no_such_path
 from levilab.runs.run import READINGS, Run
 from levilab.texts.note import Note, of_file
 from levilab.texts.note import kind_of as kind_of_text
-from levilab.texts.text import Sentences, Text
+from levilab.texts.text import Sentences, Text, how_many, text_of
 
 #: A file of this name keeps its folder out of searches of the folders above.
 SKIP = ".levilab-skip"
@@ -359,8 +359,8 @@ def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Sou
             kept.append(source)
             cells.setdefault((length, cell), []).append(source)
         elif first.data.resolve() != source.data.resolve():
-            text = f"{source.path}: holds the same readings as {first.path}, counted once"
-            warnings.append(of_file("same readings", text))
+            text = "{path:s}: holds the same readings as {other:s}, counted once"
+            warnings.append(of_file("same readings", Text(text, source.path, first.path)))
     return kept
 
 
@@ -439,7 +439,7 @@ def _at(path: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) ->
     damage = [error for error in errors if not isinstance(error, DoesNotSuit)]
     if not sources:
         raise [*damage, *errors][0]
-    notes = (of_file("not read", f"not read: {error}") for error in damage)
+    notes = (of_file("not read", Text("not read: {problem}", error)) for error in damage)
     yield from (replace(sources[0], warnings=(*sources[0].warnings, *notes)), *sources[1:])
 
 
@@ -452,8 +452,8 @@ def _one(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
         try:
             return _of_run(Run.load(path.parent), needs, options)
         except DataError:  # its record is damaged; that the readings can be saved is what they are text for
-            text = f"{path}: its run.json cannot be used, so whether it is SYNTHETIC is not known"
-            doubt = of_file("no record", text)
+            text = "{path:s}: its run.json cannot be used, so whether it is SYNTHETIC is not known"
+            doubt = of_file("no record", Text(text, path))
             source = _of_file(path, needs, options)
             return replace(source, warnings=(*source.warnings, doubt))
     return _of_file(path, needs, options)
@@ -463,7 +463,8 @@ def _of_file(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
     """Read a data file.  Options that are given go before those of the correction beside it."""
     kept = {key: value for key, value in read_correction(path).items() if getattr(options, key) in (None, value)}
     readings = needs.read_file(path, replace(options, **kept))
-    text = f"{path.name}: is read as {place_of_correction(path).name} says: {describe(kept)}"
+    said = "{name:s}: is read as {file:s} says: {options:s}"
+    text = Text(said, path.name, place_of_correction(path).name, describe(kept))
     note = [of_file("correction", text)] if kept else []
     return Source(path, path, sha256_of(path), None, readings, path.name, (*readings.warnings, *note), kept)
 
@@ -513,7 +514,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
             else:
                 others[run.record.experiment] += 1
         except DataError as error:
-            broken.append(Skipped(str(error), type(error).__name__))
+            broken.append(Skipped(text_of(error), type(error).__name__))
     found.sort(key=_begun)
     files = data_files(root)
     remarks += [LeftOut(file, _kind(file)) for file in other_files(root)]
@@ -526,7 +527,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
         text = Text("{path:s}: {why}", path=str(root), why=_nothing_found(needs, kinds, broken, left_out))
         if not broken:
             raise NothingSuits(text, left_out)
-        raise NoneUsable(text, tuple(map(str, broken))) if broken else DoesNotSuit(text)
+        raise NoneUsable(text, reasons=tuple(map(str, broken)))
     notes = tuple(of_file(f"skipped {one.kind}", str(one)) for one in broken)
     return Found(tuple(found), notes, (*kinds, *remarks))
 
@@ -537,11 +538,11 @@ def _skipping(file: Path, broken: list[Skipped], remarks: list[NotTaken]) -> Ite
     try:
         yield
     except NoRate as error:
-        remarks.append(Skipped(str(error)))
+        remarks.append(Skipped(text_of(error)))
     except DoesNotSuit as error:
         remarks.append(LeftOut(file, OTHER_COLUMNS if isinstance(error, NoSuchColumn) else _kind(file)))
     except DataError as error:
-        broken.append(Skipped(str(error), type(error).__name__))
+        broken.append(Skipped(text_of(error), type(error).__name__))
 
 
 def _kind(file: Path) -> Kind:

@@ -34,10 +34,9 @@ from levilab.pipelines.sources import (
     join,
     number_by_kind,
 )
-from levilab.present.numbers import how_many
 from levilab.runs.find import RECORD, find_run, find_runs
 from levilab.runs.run import Run
-from levilab.texts.text import Text
+from levilab.texts.text import Text, how_many, text_of
 
 Tell = Callable[[str], None]
 
@@ -196,7 +195,7 @@ def _suiting(
     said = {text for one in done for text in one.found.warnings}
     for error in unusable:
         if tell and not said.issuperset(error.reasons):
-            tell(str(error))
+            tell(text_of(error))
     return done
 
 

@@ -7,7 +7,6 @@ import re
 from typing import TYPE_CHECKING, Any
 
 from analysis.numbers import digits, with_minus
-from analysis.numbers import how_many as counted
 from levilab.present.units import unit
 from levilab.texts.text import Text, fields_of
 
@@ -108,15 +107,6 @@ def enumeration(names: Sequence[str]) -> str:
     ('disc', 'disc, stokes and newton')
     """
     return names[0] if len(names) == 1 else Text("{first} and {last}", first=tuple(names[:-1]), last=names[-1])
-
-
-def how_many(n: int, noun: str) -> str:
-    """Return a number of things, which other languages can say.
-
-    >>> how_many(1, "run"), how_many(4, "run")
-    ('1 run', '4 runs')
-    """
-    return Text("{n} {things}", n=n, things=counted(n, noun).partition(" ")[2])
 
 
 def pulses_too_many(pulses: int) -> str:

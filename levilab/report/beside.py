@@ -19,10 +19,10 @@ from analysis.spindown.drag import LAWS
 from analysis.uncertainty import Estimate
 from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import unquote
-from levilab.present.numbers import enumeration, how_many, plain, with_sign, with_uncertainty
+from levilab.present.numbers import enumeration, plain, with_sign, with_uncertainty
 from levilab.present.units import unit
 from levilab.texts.note import is_doubt
-from levilab.texts.text import Sentences, Text, in_language
+from levilab.texts.text import Sentences, Text, how_many, in_language
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

@@ -29,12 +29,12 @@ from levilab.present.document.blocks import (
     Warnings,
     with_marks,
 )
-from levilab.present.numbers import enumeration, how_many, list_in_words
+from levilab.present.numbers import enumeration, list_in_words
 from levilab.report.beside import GOOD, class_of, count_marks
 from levilab.report.inputs import About, Input, describe, in_common
 from levilab.report.reproduction import Asked, paths_in_commands, reproduction
 from levilab.texts.note import is_doubt
-from levilab.texts.text import Sentences, Text, in_language
+from levilab.texts.text import Sentences, Text, how_many, in_language
 
 Results = Sequence[tuple[Analysis[Any], Any]]
 

@@ -23,10 +23,9 @@ from levilab.present.document.blocks import (
     Section,
     Tabular,
 )
-from levilab.present.numbers import how_many
 from levilab.present.tables import table
 from levilab.software import software_versions
-from levilab.texts.text import ENGLISH, Text, spoken
+from levilab.texts.text import ENGLISH, Text, how_many, spoken
 
 
 @dataclass(frozen=True)

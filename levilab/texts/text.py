@@ -115,6 +115,16 @@ class Sentences(Text):
         return tuple(self.values.values())
 
 
+def how_many(n: int, noun: str) -> str:
+    """Return a number of things, which other languages can say.
+
+    >>> how_many(1, "run"), how_many(4, "run")
+    ('1 run', '4 runs')
+    """
+    plural = f"{noun}es" if noun.endswith(("ch", "s")) else f"{noun}s"
+    return Text("{n} {things}", n=n, things=noun if n == 1 else plural)
+
+
 def fields_of(template: str) -> list[tuple[str, str]]:
     """Return the names of the values in a template, and how each is written."""
     return _FIELD.findall(template)
@@ -190,13 +200,15 @@ def _write(value: Any, how: str, code: str) -> str:
         return str(value)
     if isinstance(value, str):
         return numbers_in_language(value, code) if how == "n" else in_language(value, code)
-    return format(value, how).replace(".", decimal)
+    return format(value, how).translate({ord("."): decimal, ord(decimal): "."})
 
 
 def _known(value: Any) -> Any:
-    """Return a value that a `Text` can have: of an error its text, of a path its name."""
+    """Return a value that a `Text` can have: of an error its text, of a path its name, of a number the plain one."""
     if isinstance(value, BaseException):
         return text_of(value)
+    if hasattr(value, "item"):  # a number of NumPy's, which JSON does not take
+        return value.item()
     return str(value) if isinstance(value, Path) else value
 
 

@@ -18,9 +18,8 @@ from levilab.crosscheck.own.model import OF_ONE_RUN, Own
 from levilab.crosscheck.subject import Trial, pull_of
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.spindown.analysis import EXPERIMENT, SpinDownAnalysis
-from levilab.present.numbers import how_many
 from levilab.simulator import laws
-from levilab.texts.text import Text
+from levilab.texts.text import Text, how_many
 
 #: Processor time of the fits of one run [s]: of any, and for a reading.
 _COST_S, _COST_OF_READING_S = 0.006, 2e-5

@@ -43,7 +43,7 @@ def read_audio(path: Path) -> Waveform:
     """
     if not _is_installed():
         kind = replace(AUDIO, advice=advice_on_sound())
-        raise NoTable(path, Text("is {kind}: {advice}", kind=kind.name, advice=kind.advice), kind=kind)
+        raise NoTable(path, "is {kind}: {advice}", kind.name, kind.advice, kind=kind)
     errors: list[str] = []
     count, rate = 0, 0
     with _decoded(path, errors) as stream:
@@ -63,10 +63,9 @@ def read_audio(path: Path) -> Waveform:
                 whole = np.frombuffer(block[: len(block) // size * size], ">f4").reshape(-1, channels)
                 yield whole[:, signal].astype(np.float64)
 
-    damage = [
-        f"{path.name}: FFmpeg found damage ({text}): if a piece is missing, frequencies are wrong" for text in errors
-    ]
-    return Waveform(path, "sound file", 0.0, 1 / rate, count, signals_of(channels), read, tuple(damage))
+    said = "{name:s}: FFmpeg found damage ({what:s}): if a piece is missing, frequencies are wrong"
+    damage = tuple(Text(said, path.name, text) for text in errors)
+    return Waveform(path, "sound file", 0.0, 1 / rate, count, signals_of(channels), read, damage)
 
 
 def _is_installed() -> bool:
@@ -77,8 +76,11 @@ def advice_on_sound() -> str:
     """Return what to do with a sound file, with the extra and without."""
     if _is_installed():
         return AUDIO.advice
-    extra = f"the extra video (imageio-ffmpeg, which is not installed) reads it: {how_to_install('video')}"
-    return f"{extra}; or make it a WAV with Audacity (File, Export Audio) or by ffmpeg -i sound.m4a sound.wav"
+    said = (
+        "the extra video (imageio-ffmpeg, which is not installed) reads it: {how}; or make it a WAV with Audacity "
+        "(File, Export Audio) or by ffmpeg -i sound.m4a sound.wav"
+    )
+    return Text(said, how_to_install("video"))
 
 
 def _read_whole(stream: IO[bytes], size: int) -> bytes:
@@ -111,7 +113,7 @@ def _decoded(path: Path, errors: list[str]) -> Iterator[IO[bytes]]:
             command = [imageio_ffmpeg.get_ffmpeg_exe(), *before.split(), f"file:{os.fspath(path)}", *after.split()]
             decoder = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=said)  # noqa: S603
         except (OSError, RuntimeError) as error:
-            raise TableError(path, f"needs FFmpeg, which does not start ({error}): convert it to WAV") from error
+            raise TableError(path, "needs FFmpeg, which does not start: convert it to WAV") from error
         assert decoder.stdout
         whole = False
         try:
@@ -128,6 +130,5 @@ def _decoded(path: Path, errors: list[str]) -> Iterator[IO[bytes]]:
         with contextlib.suppress(NoFilm):
             open_film(path)
             raise NoTable(path, _SILENT)
-        why = shorten(lines[-1] if lines else f"it ended with {decoder.returncode}", 100)
-        raise TableError(path, f"holds no sound that FFmpeg reads ({why}): convert it to WAV with Audacity")
+        raise TableError(path, "holds no sound that FFmpeg reads: convert it to WAV with Audacity")
     errors += [shorten(line, 100) for line in lines[:1]] if whole else []

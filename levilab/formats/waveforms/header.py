@@ -31,7 +31,6 @@ from levilab.formats.titles import (
     without_runs_of_blanks,
 )
 from levilab.formats.waveforms.rows import Head
-from levilab.texts.text import Text
 
 #: What is read.
 WANTED = "samples beside their times, a scope's CSV, WAV, .npy, or a column of pulse times is expected"
@@ -175,7 +174,8 @@ def dialect_of(head: Head) -> Dialect:
         return found
     if sum(bool(re.fullmatch(r"[+-]?\d*[.,]?\d+([eE][+-]?\d+)?[,;]?", text)) for text in texts) < 0.5 * len(texts):
         at, line = next((n, line) for n, line in enumerate(head.lines, 1) if line.strip())
-        raise NoWaveform(head.path, f"'{shorten(line.strip())}' begins no table of samples; {WANTED}", line=at)
+        said = "'{line:s}' begins no table of samples; {wanted}"
+        raise NoWaveform(head.path, said, shorten(line.strip()), WANTED, line=at)
     return Dialect(None, "," if any(match for match in one_comma) else ".")
 
 
@@ -418,7 +418,7 @@ def _interval(head: Head, keys: Mapping[str, Sequence[str]], dialect: Dialect) -
     if interval is None and rate is not None and rate.value > 0:
         interval = Printed(1 / rate.value, rate.resolution / rate.value**2)
     if interval is not None and not interval.value > 0:
-        raise TableError(head.path, f"its header says a sample interval of {interval.value:g} s: export it again")
+        raise TableError(head.path, "its header says a sample interval of {s:g} s: export it again", interval.value)
     return interval
 
 
@@ -455,12 +455,12 @@ def _recognise_plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) ->
     layout = lay_out(list(head.lines), head.encoding, dialect, b"")
     if moving := motion_sensor(layout.header):
         title, sensor = moving
-        text = f"'{shorten(title)}' is of {sensor}, which shows no turns of the top: record with the magnetometer"
-        raise NoWaveform(head.path, text)
+        text = "'{title:s}' is of {sensor}, which shows no turns of the top: record with the magnetometer"
+        raise NoWaveform(head.path, text, shorten(title), sensor)
     titles = [read_title(text) for text in layout.header]
     readings = [title.column for title in titles if title.column in QUANTITIES and title.column not in _NO_READINGS]
     if readings:
-        raise NoWaveform(head.path, Text("holds readings ({names:s}) and no samples", names=readings[0]))
+        raise NoWaveform(head.path, "holds readings ({names:s}) and no samples", readings[0])
     width = len(layout.header) or layout.width
     if width < 2:
         raise NoWaveform(head.path, "has one column and no times beside it")
@@ -477,7 +477,7 @@ def _recognise_plain(head: Head, dialect: Dialect, wanted: Mapping[str, str]) ->
     rows = [dialect.split(line) for line in head.lines[layout.first_line - 1 :][:MOST_LINES] if not dialect.skips(line)]
     kept = _with_samples(columns, rows, 0, dialect)[0] if rows else ()
     if not kept:
-        raise NoWaveform(head.path, f"has no samples beside its times, its columns are {quote_names(names)}")
+        raise NoWaveform(head.path, "has no samples beside its times, its columns are {names:s}", quote_names(names))
     return Header(
         "CSV",
         dialect,
@@ -510,14 +510,14 @@ def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str]) -> int:
             return folded.index(name.casefold())
         if name.isdecimal() and 1 <= int(name) <= layout.width:
             return int(name) - 1
-        what = f"has no column '{shorten(name)}'; it has {quote_names(layout.header)}: correct `columns`"
-        raise TableError(head.path, what)
+        what = "has no column '{title:s}'; it has {header:s}: correct `columns`"
+        raise TableError(head.path, what, shorten(name), quote_names(layout.header))
     if not layout.header:
         return 0
     known = [k for k, text in enumerate(layout.header) if read_title(text).column == "time_s" or folded[k] in _TIMES]
     if len(known) != 1:
-        what = f"no title is known to be a time among {quote_names(layout.header)}: say `columns` = t=NAME"
-        raise NoWaveform(head.path, what)
+        what = "no title is known to be a time among {titles:s}: say `columns` = t=NAME"
+        raise NoWaveform(head.path, what, quote_names(layout.header))
     return known[0]
 
 
@@ -526,6 +526,6 @@ def _time_factor(head: Head, layout: Layout, time: int) -> float:
     unit = read_title(layout.titles()[time]).unit if layout.header else None
     factor = unit_factor(unit, "time") if unit else 1.0
     if factor is None:
-        text = f"'{shorten(unit or '')}' is no unit of time: correct the title"
-        raise TableError(head.path, text, line=layout.header_line or None)
+        text = "'{unit:s}' is no unit of time: correct the title"
+        raise TableError(head.path, text, shorten(unit or ""), line=layout.header_line or None)
     return factor

@@ -9,10 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
-from levilab.formats.columns import TableError, shorten
+from levilab.formats.columns import TableError
 from levilab.formats.waveforms.header import NoRate
 from levilab.formats.waveforms.waveform import BLOCK, PulseTimes, Signal, Waveform, check_count, check_step
 from levilab.texts.note import of_file
+from levilab.texts.text import Text
 
 #: An array with more columns than this lies on its side.
 MOST_CHANNELS = 64
@@ -32,22 +33,18 @@ def read_npy(path: Path, rate: float | None) -> Waveform | PulseTimes:
     columns = data.reshape(len(data), -1)
     columns = columns.T if columns.shape[1] > MOST_CHANNELS else columns
     check_count(path, len(columns))
-    check_step(path, 1 / rate, "the sampling interval")
+    check_step(path, 1 / rate)
 
     def read(signal: int) -> Iterator[Array]:
         for k in range(0, len(columns), BLOCK):
             block = columns[k : k + BLOCK, signal].astype(np.float64)
             if not bool(np.isfinite(block).all()):
-                raise TableError(path, f"has samples that are no numbers from sample {k} on: cut them off")
+                raise TableError(path, "has samples that are no numbers from sample {k} on: cut them off", k)
             yield block
 
     signals = tuple(Signal(f"CH{k + 1}") for k in range(columns.shape[1]))
-    whole = data.dtype.kind != "f"
-    counts = (
-        (of_file("codes", f"{path.name}: holds whole numbers, which are taken as V: voltages are in units of a code"),)
-        if whole
-        else ()
-    )
+    text = Text("{name:s}: holds whole numbers, which are taken as V: voltages are in units of a code", path.name)
+    counts = (of_file("codes", text),) if data.dtype.kind != "f" else ()
     return Waveform(path, "NumPy array", 0.0, 1 / rate, len(columns), signals, read, counts)
 
 
@@ -63,12 +60,13 @@ def _load(path: Path) -> NDArray[Any]:
     try:
         data: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
     except _BROKEN as error:
-        what = f"is no NumPy array that can be read ({shorten(str(error), 80)}): save it again"
-        raise TableError(path, what) from error
+        raise TableError(path, "is no NumPy array that can be read: save it again") from error
     if data.dtype.kind not in "iuf" or data.dtype.itemsize > 8:
-        raise TableError(path, f"holds {data.dtype}, plain numbers are expected: save them with numpy.save")
+        what = "holds {kind:s}, plain numbers are expected: save them with numpy.save"
+        raise TableError(path, what, str(data.dtype))
     if data.ndim not in {1, 2} or 0 in data.shape or (data.ndim == 2 and min(data.shape) > MOST_CHANNELS):
-        raise TableError(path, f"has the shape {data.shape}, (samples,) or (samples, channels) is expected: reshape it")
+        what = "has the shape {shape:s}, (samples,) or (samples, channels) is expected: reshape it"
+        raise TableError(path, what, str(data.shape))
     return data
 
 

@@ -56,12 +56,13 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
         raise NoRate(path, "holds one column of numbers that do not increase: of samples say the `rate` in Hz")
     if late.size:
         k = int(late[0])
-        what = f"pulse {k + 2}, at {times[k + 1]:.9g} s, does not come after the one at {times[k]:.9g} s: correct it"
-        raise TableError(path, what)
+        what = "pulse {n}, at {now:.9g} s, does not come after the one at {then:.9g} s: correct it"
+        raise TableError(path, what, k + 2, times[k + 1], times[k])
     if len(times) < FEWEST_PULSES:
-        raise NoWaveform(path, f"holds {len(times)} numbers, at least {FEWEST_PULSES} pulse times are needed")
+        what = "holds {n} numbers, at least {fewest} pulse times are needed"
+        raise NoWaveform(path, what, len(times), FEWEST_PULSES)
     _must_be_of_turns(path, times, first + 1)
-    warnings = [f"{path.name}, {block.torn}" for block in found if block.torn]
+    warnings = [Text("{name:s}, {text}", path.name, block.torn) for block in found if block.torn]
     return PulseTimes(path, "list of pulse times", times, tuple(warnings))
 
 
@@ -69,15 +70,14 @@ def _must_be_of_turns(path: Path, times: NDArray[np.float64], line: int) -> None
     """Raise TableError for times too far apart for a top's pulses, NoRate for times too near."""
     apart = float(np.median(np.diff(times)))
     if apart > _LONGEST_TURN_S:
-        what = f"its pulses are {apart:g} s apart, which no turn of a top lasts"
-        raise TableError(path, f"{what}: write the unit above the numbers, as t [us] or t [ms]", line=line)
+        what = "its pulses are {s:g} s apart, too far for turns: write the unit above the numbers, as t [us] or t [ms]"
+        raise TableError(path, what, apart, line=line)
     if apart < _SHORTEST_S:
-        said = Text(
+        what = (
             "as times of pulses its numbers are {apart:.3g} s apart, and no top turns so fast: of times from pulse to "
-            "pulse write the sums (numpy.cumsum), of samples say the `rate` in Hz",
-            apart=apart,
+            "pulse write the sums (numpy.cumsum), of samples say the `rate` in Hz"
         )
-        raise NoRate(path, said)
+        raise NoRate(path, what, apart)
 
 
 def _factor(path: Path, titles: list[str]) -> float:
@@ -91,8 +91,8 @@ def _factor(path: Path, titles: list[str]) -> float:
         unit = plain_unit(text) if is_unit(text) else title.unit or ""
         factor = unit_factor(unit, "time") if unit else None
         if (is_unit(unit) and factor is None) or title.column not in {None, "time_s"}:
-            what = f"holds one column, '{shorten(text)}', which is no time"
-            raise NoWaveform(path, f"{what}: times of pulses are expected, as t [s]")
+            what = "holds one column, '{title:s}', which is no time: times of pulses are expected, as t [s]"
+            raise NoWaveform(path, what, shorten(text))
         factors += [factor] if factor else []
     return factors[-1]
 
@@ -104,10 +104,10 @@ def _samples(head: Head, rate: float, blocks: Callable[[], Iterator[Block]]) -> 
         count += len(block.numbers)
         torn = torn or block.torn
     check_count(path, count)
-    check_step(path, 1 / rate, "the sampling interval")
+    check_step(path, 1 / rate)
 
     def read(_: int) -> Iterator[NDArray[np.float64]]:
         return (block.numbers[:, 0] for block in blocks() if block.numbers.size)
 
-    warnings = (f"{shorten(path.name)}, {torn}",) if torn else ()
+    warnings = (Text("{name:s}, {text}", shorten(path.name), torn),) if torn else ()
     return Waveform(path, "one column of samples", 0.0, 1 / rate, count, (Signal("CH1"),), read, warnings)

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 
 from analysis.arrays import Array
-from analysis.numbers import how_many
 from levilab.formats.columns import TableError, shorten
 from levilab.formats.dialect import MISSING, Dialect
 from levilab.formats.layout import EXPORT, HEAD, encoding_of, lines_of, refuse_other_kinds
+from levilab.formats.rows import EXPECTED, FIELDS, left_out
 from levilab.formats.waveforms.waveform import HIGHEST
+from levilab.texts.text import how_many
 
 #: Characters of a piece: small beside memory, large beside the cost of a call of pandas.
 PIECE = 1 << 20
@@ -71,7 +72,8 @@ def pieces(path: Path, encoding: str, first_line: int) -> Iterator[tuple[int, st
             rest += text.replace("\0", "")
             end = rest.rfind("\n") + 1 if following else len(rest)
             if end == 0 and len(rest) > LONGEST_LINE:
-                raise TableError(path, f"has a line of more than {LONGEST_LINE} characters; {EXPORT}", line=number)
+                what = "has a line of more than {most} characters; {export}"
+                raise TableError(path, what, LONGEST_LINE, EXPORT, line=number)
             ready, rest, text = rest[:end], rest[end:], following
             lines = ready.count("\n")
             for _ in range(min(max(first_line - number, 0), lines)):
@@ -160,15 +162,15 @@ def _line_by_line(path: Path, text: str, first: int, dialect: Dialect, used: Seq
         except TableError:
             if not (last and number == first + len(lines) - 1):
                 raise
-            torn = f"line {number}: '{shorten(line.strip())}' was cut off and is left out"
+            torn = left_out(number, line, "was cut off")
     return Block(np.array(rows, dtype=np.float64).reshape(len(rows), len(used)), first, text, torn)
 
 
 def _row(path: Path, text: str, line: int, dialect: Dialect, used: Sequence[int]) -> list[float]:
     fields = dialect.split(text)
     if max(used) >= len(fields):
-        what = f"'{shorten(text.strip())}' has {how_many(len(fields), 'field')}, {max(used) + 1} are "
-        raise TableError(path, f"{what}expected: complete or remove the line", line=line)
+        seen, number = shorten(text.strip()), how_many(len(fields), "field")
+        raise TableError(path, FIELDS, seen, number, max(used) + 1, "", line=line)
     return [_number(path, fields[index], line, dialect) for index in used]
 
 
@@ -177,10 +179,9 @@ def _number(path: Path, text: str, line: int, dialect: Dialect) -> float:
     try:
         value = float("nan") if missing else dialect.number(text)
     except ValueError:
-        mark = "comma" if dialect.decimal == "," else "point"
-        what = f"'{shorten(text)}' is no number with decimal {mark}: correct it, or remove the line"
-        raise TableError(path, what, line=line) from None
+        what = "'{cell:s}' stands where {expected} is expected: correct it, or remove the line"
+        raise TableError(path, what, shorten(text), EXPECTED[dialect.decimal], line=line) from None
     if not abs(value) < HIGHEST:
-        what = f"'{shorten(text)}' is a missing sample, but samples are evenly spaced: export the record again, or cut "
-        raise TableError(path, f"{what}the file there", line=line)
+        what = "'{cell:s}' is a missing sample, but samples are evenly spaced: export again, or cut the file there"
+        raise TableError(path, what, shorten(text), line=line)
     return value

@@ -136,7 +136,7 @@ def read_samples(
     try:
         survey = _look_over(head, header)
         times = _times(head, header, survey, rate)
-        check_step(path, times.step, "the sampling interval")
+        check_step(path, times.step)
         check_count(path, survey.count)
     except TableError as error:
         if certain:
@@ -154,8 +154,8 @@ def read_samples(
     if times.times is not None and (edges := _rising_edges(path, header, times.times, read)):
         return edges
     if not certain and times.step > LONGEST_DOUBTFUL_STEP_S:
-        text = f"its rows are {times.step:g} s apart, which is no sampling of a top that spins: say `rate` if it is"
-        raise NoWaveform(path, text)
+        text = "its rows are {s:g} s apart, which is no sampling of a top that spins: say `rate` if it is"
+        raise NoWaveform(path, text, times.step)
     warnings = (*times.warnings, *_about_count(path, header, survey))
     signals = tuple(Signal(column.name, column.unit) for column in header.columns)
     return Waveform(
@@ -186,7 +186,7 @@ def _rising_edges(
     chosen = int(np.argmax(counts >= FEWEST_PULSES))
     edges = times[1:][steps[chosen] > 0]
     if edges.size < FEWEST_PULSES:
-        raise NoWaveform(path, f"has {edges.size} rising edges, at least {FEWEST_PULSES} are needed")
+        raise NoWaveform(path, "has {n} rising edges, at least {fewest} are needed", edges.size, FEWEST_PULSES)
     others = [column.name for k, column in enumerate(header.columns) if counts[k] and k != chosen]
     cut = "; {names:s} change, too: cut the other columns off for them"
     more = Text(cut, names=quote_names(others)) if others else ""
@@ -198,9 +198,10 @@ def _rising_edges(
 def _about_count(path: Path, header: Header, survey: _Survey) -> Iterator[str]:
     """Yield warnings about the end of the file."""
     if survey.torn:
-        yield of_file("torn", f"{path.name}, {survey.torn}")
+        yield of_file("torn", Text("{name:s}, {text}", path.name, survey.torn))
     if header.count is not None and header.count != survey.count:
-        yield of_file("count", f"{path.name}: its header announces {header.count} samples, it holds {survey.count}")
+        said = "{name:s}: its header announces {said} samples, it holds {n}"
+        yield of_file("count", Text(said, path.name, header.count, survey.count))
 
 
 def _look_over(head: Head, header: Header) -> _Survey:
@@ -233,8 +234,8 @@ def _times(head: Head, header: Header, survey: _Survey, rate: float | None) -> _
 def _check_numbers(path: Path, clock: _Clock) -> None:
     for difference, line in (clock.shortest, clock.longest):
         if np.isfinite(difference) and difference != 1:
-            what = f"its samples are numbered, and {difference:g} lies from one to the next, 1 is expected: "
-            raise TableError(path, f"{what}export the record again", line=line)
+            what = "the number of a sample is {n:g} more than that before, 1 is expected: export the record again"
+            raise TableError(path, what, difference, line=line)
 
 
 def _printed_times(head: Head, header: Header, survey: _Survey, rate: float | None) -> _Times:
@@ -247,8 +248,8 @@ def _printed_times(head: Head, header: Header, survey: _Survey, rate: float | No
     if rate is not None:
         return _Times(first, 1 / rate, tuple(about_rate(path, header.step.value if header.step else mean, rate)))
     if not mean > 0:
-        what = f"its times do not increase, from {first:g} s to {last:g} s: sort the rows, or say `rate`"
-        raise TableError(path, what)
+        what = "its times do not increase, from {first:g} s to {last:g} s: sort the rows, or say `rate`"
+        raise TableError(path, what, first, last)
     largest = max(abs(first), abs(last))
     allowed = max(1.01 * clock.resolution * unit, min(SINGLE * largest, mean / 4)) + 1e-9 * mean
     if max(clock.longest[0] * unit - mean, mean - clock.shortest[0] * unit) > allowed:
@@ -295,22 +296,19 @@ def _uneven_times(head: Head, header: Header, survey: _Survey) -> _Times:
     """
     path, unit, (shortest, line) = head.path, header.time_factor, survey.clock.shortest
     if shortest < 0:
-        raise TableError(path, f"its time goes back by {-shortest * unit:g} s: sort the rows, or say `rate`", line=line)
+        what = "its time goes back by {s:g} s: sort the rows, or say `rate`"
+        raise TableError(path, what, -shortest * unit, line=line)
     if survey.count > MOST_UNEVEN:
-        raise TableError(path, f"holds {survey.count} samples with uneven times: say `rate`, or cut the file")
+        raise TableError(path, "holds {n} samples with uneven times: say `rate`, or cut the file", survey.count)
     blocks = read_blocks(path, head.encoding, header.dialect, header.first_line, header.used)
     times = np.concatenate([block.numbers[:, 0] for block in blocks])[: survey.count] * unit
     apart = np.diff(times)
     step, (longest, line) = float(np.median(apart)) or float(apart.mean()), survey.clock.longest
-    text = Text(
+    said = (
         "{name:s}: its times are {shortest:.4g} to {longest:.4g} s apart (line {line}), mostly {step:.4g} s: they are "
-        "used as printed",
-        name=path.name,
-        shortest=shortest * unit,
-        longest=longest * unit,
-        line=line,
-        step=step,
+        "used as printed"
     )
+    text = Text(said, path.name, shortest * unit, longest * unit, line, step)
     return _Times(float(times[0]), step, (of_file("uneven", text),), times=times)
 
 
@@ -319,8 +317,13 @@ def _times_by_header(path: Path, header: Header, first: float, mean: float) -> _
     step = header.step.value if header.step else mean
     factor = next((unit for unit in _UNITS if abs(mean / step / unit - 1) < 1e-3), None)
     if factor is None:
-        what = f"its header says a sampling interval of {step:.6g} s, its printed times {mean:.6g} s: say which holds, "
-        raise TableError(path, f"{what}`rate` = {1 / step:.6g} or {1 / mean:.6g}")
-    apart = f"its printed times are {mean:.6g} s apart where its header says {step:.6g} s"
-    text = f"{shorten(path.name, 200)}: {apart}: the times are taken to be in units of {1 / factor:g} s"
-    return _Times(first / factor, step, (text,))
+        what = (
+            "its header says a sampling interval of {step:.6g} s, its printed times {mean:.6g} s: say which holds, "
+            "`rate` = {header:.6g} or {printed:.6g}"
+        )
+        raise TableError(path, what, step, mean, 1 / step, 1 / mean)
+    said = (
+        "{name:s}: its printed times are {mean:.6g} s apart where its header says {step:.6g} s: the times are taken to "
+        "be in units of {unit:g} s"
+    )
+    return _Times(first / factor, step, (Text(said, shorten(path.name, 200), mean, step, 1 / factor),))

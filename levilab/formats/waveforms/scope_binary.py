@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 
 from analysis.arrays import Array
-from levilab.formats.columns import TableError, shorten
+from levilab.formats.columns import TableError
 from levilab.formats.waveforms.waveform import Signal, Waveform, check_count, check_step
 from levilab.software import how_to_install
 from levilab.texts.note import of_file
+from levilab.texts.text import Text
 
 #: How the names of such files end.
 SUFFIXES = frozenset({".wfm", ".bin", ".isf", ".trc", ".wvf"})
@@ -31,16 +32,15 @@ def read_scope_binary(path: Path) -> Waveform:
     try:
         from RigolWFM.wfm import Wfm  # with matplotlib and requests
     except ImportError as error:
-        what = "is a scope's binary file, which needs the extra scope (RigolWFM, which is not installed): "
-        raise TableError(path, f"{what}{how_to_install('scope')}, or export CSV") from error
+        what = "is a scope's binary file, which needs the extra scope (RigolWFM, not installed): {how}, or export CSV"
+        raise TableError(path, what, how_to_install("scope")) from error
     try:
         with warnings.catch_warnings(action="ignore"), contextlib.redirect_stdout(io.StringIO()) as _, \
                 contextlib.redirect_stderr(io.StringIO()):  # fmt: skip
             record = Wfm.from_file(str(path))
             channels = [(c, np.asarray(c.volts, np.float64)) for c in record.channels if c.volts is not None]
     except Exception as error:
-        what = shorten(str(error).strip().split("\n")[0], 80)
-        raise TableError(path, f"is not read by RigolWFM ({what}): export it as CSV") from error
+        raise TableError(path, "is not read by RigolWFM: export it as CSV") from error
     channels = [(c, volts) for c, volts in channels if volts.size]
     if not channels:
         raise TableError(path, "holds no channel that was on: export it as CSV")
@@ -48,9 +48,9 @@ def read_scope_binary(path: Path) -> Waveform:
     counts = {len(volts) for _, volts in channels}
     step = float(first.seconds_per_point)
     if len(counts) > 1:
-        raise TableError(path, f"has channels of {min(counts)} and {max(counts)} samples: export it as CSV")
+        raise TableError(path, "has channels of {a} and {b} samples: export it as CSV", min(counts), max(counts))
     check_count(path, len(volts))
-    check_step(path, step, "the sampling interval")
+    check_step(path, step)
     times = np.asarray(first.times, np.float64)
     start = float(times[0]) if times.size else 0.0
     samples = [volts for _, volts in channels]
@@ -70,14 +70,13 @@ def _about_times(path: Path, times: Array, step: float) -> list[str]:
     mean = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else step
     if abs(mean / step - 1) <= _EVEN:
         return []
-    text = f"RigolWFM says a sampling interval of {step:g} s and gives times {mean:g} s apart: compare with CSV"
-    return [of_file("interval", f"{path.name}: {text}")]
+    said = "{name:s}: RigolWFM says an interval of {step:g} s and gives times {mean:g} s apart: compare with CSV"
+    return [of_file("interval", Text(said, path.name, step, mean))]
 
 
 def _about_volts(path: Path, model: str) -> list[str]:
     """Return the fault found with the volts of a family of scopes."""
     if not any(name in model.casefold() for name in ("1000z", "1054z", "1074z", "1104z")):
         return []
-    wrong = "a level of 0.02 V came as -0.40 V, with a gain 11 % off"
-    text = f"RigolWFM's volts of a DS1000Z are wrong ({wrong}); times hold, for heights export CSV"
-    return [of_file("volts", f"{path.name}: {text}")]
+    said = "{name:s}: RigolWFM's volts of a DS1000Z are wrong (by 0.4 V, and 11 %); times hold, for heights export CSV"
+    return [of_file("volts", Text(said, path.name))]

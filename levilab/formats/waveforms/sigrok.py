@@ -56,23 +56,24 @@ def read_sigrok(path: Path) -> Waveform:
         with zipfile.ZipFile(path) as archive:
             sizes = {info.filename: info.file_size for info in archive.infolist()}
             if sizes["metadata"] > _LARGEST_METADATA:
-                raise TableError(path, f"its metadata has {sizes['metadata']} bytes: {_AGAIN}")
+                raise TableError(path, "its metadata has {n} bytes: {again}", sizes["metadata"], _AGAIN)
             device = _device(archive.read("metadata").decode("utf-8", errors="replace"))
         if sum(sizes.values()) > MOST_BYTES:
-            seen = f"unpacks to {sum(sizes.values()) / 1e9:.1f} GB, at most {MOST_BYTES / 1e9:.1f} GB are read"
-            raise TableError(path, f"{seen}: record at a lower sample rate; 20 kHz are plenty for a top")
+            what = "unpacks to {size:.1f} GB, at most {most:.1f} GB are read: record at 20 kHz, plenty for a top"
+            raise TableError(path, what, sum(sizes.values()) / 1e9, MOST_BYTES / 1e9)
         channels = _channels(device, sizes)
         rate = _RATE.fullmatch(device.get("samplerate", ""))
     except (zipfile.BadZipFile, zlib.error, configparser.Error, ValueError, NotImplementedError, RuntimeError) as error:
-        raise TableError(path, f"is no capture that can be read ({shorten(str(error), 80)}): {_AGAIN}") from error
+        raise TableError(path, "is no capture that can be read: {again}", _AGAIN) from error
     if not channels:
-        raise TableError(path, f"holds no channel with samples: {_AGAIN}")
+        raise TableError(path, "holds no channel with samples: {again}", _AGAIN)
     if rate is None:
-        raise TableError(path, f"says a sample rate of '{shorten(device.get('samplerate', ''))}': {_AGAIN}")
+        said = shorten(device.get("samplerate", ""))
+        raise TableError(path, "says a sample rate of '{rate:s}': {again}", said, _AGAIN)
     step = 1 / (max(float(rate[1]), 1e-99) * {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9}[rate[2]])
     count = min(sum(sizes[name] for name in channel.members) // channel.size for channel in channels)
     check_count(path, count)
-    check_step(path, step, "the sampling interval")
+    check_step(path, step)
 
     def read(signal: int) -> Iterator[Array]:
         left = count
@@ -127,7 +128,7 @@ def _unpack(path: Path, channel: _Channel) -> Iterator[Array]:
                         if whole:
                             yield _numbers(path, piece[:whole], channel)
     except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
-        raise TableError(path, f"is damaged ({shorten(str(error), 80)}): {_AGAIN}") from error
+        raise TableError(path, "is damaged: {again}", _AGAIN) from error
 
 
 def _numbers(path: Path, piece: bytes, channel: _Channel) -> Array:
@@ -136,5 +137,5 @@ def _numbers(path: Path, piece: bytes, channel: _Channel) -> Array:
         return (of_bit >> (channel.bit % 8) & 1).astype(np.float64)
     volts = np.frombuffer(piece, "<f4").astype(np.float64)
     if not bool(np.isfinite(volts).all()):
-        raise TableError(path, f"has samples of {channel.signal.name} that are no numbers: {_AGAIN}")
+        raise TableError(path, "has samples of {name:s} that are no numbers: {again}", channel.signal.name, _AGAIN)
     return volts

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
-from levilab.formats.columns import TableError, shorten
+from levilab.formats.columns import TableError
 from levilab.formats.waveforms.waveform import BLOCK, Signal, Waveform, check_count
 
 #: Samples of integers → (value of silence, full scale).
 _SCALES = {"u1": (128.0, 128.0), "i2": (0.0, 32768.0), "i4": (0.0, 2147483648.0)}
 UNIT = "full scale"
-_ADVICE = "export it again as PCM or float WAV"
+_UNREADABLE, _ADVICE = "is no WAV recording that can be read: {advice}", "export it again as PCM or float WAV"
 
 
 def read_wav(path: Path) -> Waveform:
@@ -42,17 +42,16 @@ def read_wav(path: Path) -> Waveform:
         ZeroDivisionError,
         UnboundLocalError,
     ) as error:
-        what = f"is no WAV recording that can be read ({shorten(str(error), 80)}): {_ADVICE}"
-        raise TableError(path, what) from error
+        raise TableError(path, _UNREADABLE, _ADVICE) from error
     return _waveform(path, rate, data)
 
 
 def _waveform(path: Path, rate: int, data: NDArray[Any]) -> Waveform:
     kind = data.dtype.str[1:]
     if kind not in {*_SCALES, "f4", "f8"}:
-        raise TableError(path, f"has samples of the kind {data.dtype}: {_ADVICE}")
+        raise TableError(path, "has samples of the kind {kind:s}: {advice}", str(data.dtype), _ADVICE)
     if rate <= 0:
-        raise TableError(path, f"says a rate of {rate} Hz: {_ADVICE}")
+        raise TableError(path, "says a rate of {rate} Hz: {advice}", rate, _ADVICE)
     check_count(path, len(data))
     zero, full = _SCALES.get(kind, (0.0, 1.0))
     columns = data.reshape(len(data), -1)
@@ -61,8 +60,8 @@ def _waveform(path: Path, rate: int, data: NDArray[Any]) -> Waveform:
         for k in range(0, len(columns), BLOCK):
             block = (columns[k : k + BLOCK, signal].astype(np.float64) - zero) / full
             if not bool(np.isfinite(block).all()):
-                what = f"has samples that are no numbers from sample {k} on: cut them off, or {_ADVICE}"
-                raise TableError(path, what)
+                what = "has samples that are no numbers from sample {k} on: cut them off, or {advice}"
+                raise TableError(path, what, k, _ADVICE)
             yield block
 
     return Waveform(path, "WAV", 0.0, 1 / rate, len(data), signals_of(columns.shape[1]), read)
@@ -97,7 +96,7 @@ def _read_three_bytes(path: Path) -> Waveform:
                 size -= 8
             stream.seek(size + size % 2, 1)
     if not (start and channels and rate):
-        raise TableError(path, f"is no WAV recording that can be read (without samples or a rate): {_ADVICE}")
+        raise TableError(path, _UNREADABLE, _ADVICE)
     count = min(size, path.stat().st_size - start) // (3 * channels)
     check_count(path, count)
     data = np.memmap(path, np.uint8, "r", start, (count, channels, 3))

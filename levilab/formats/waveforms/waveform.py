@@ -13,6 +13,7 @@ from analysis.arrays import Array
 from levilab.errors import UsageError
 from levilab.formats.columns import TableError, quote_names, shorten
 from levilab.texts.note import of_file
+from levilab.texts.text import Text
 
 #: Samples that a block holds at most, where the format leaves the choice.
 BLOCK = 1 << 17
@@ -128,8 +129,8 @@ class Waveform:
         if wanted.strip().isdecimal() and 1 <= int(wanted) <= len(names):
             return int(wanted) - 1
         has = quote_names(signal.name for signal in self.signals)
-        what = f"{shorten(str(self.path), 200)} has {has}: name one of them"
-        raise NoSuchSignal("channel", what, value=f"'{shorten(wanted)}'")
+        what = "{path:s} has {names:s}: name one of them"
+        raise NoSuchSignal("channel", what, shorten(str(self.path), 200), has, value=f"'{shorten(wanted)}'")
 
     def blocks(self, wanted: str | None = None) -> Iterator[Array]:
         """Return the samples of a channel in order, in blocks that fit into memory."""
@@ -173,24 +174,19 @@ def about_rate(path: Path, known: float | None, rate: float | None) -> list[str]
     """
     if rate is None or known is None or known <= 0 or abs(known * rate - 1) <= 1e-6:
         return []
-    return [
-        of_file("rate", f"{path.name}: the given rate of {rate:g} Hz takes the place of {1 / known:.9g} Hz in the file")
-    ]
+    said = "{name:s}: the given rate of {rate:g} Hz takes the place of {known:.9g} Hz in the file"
+    return [of_file("rate", Text(said, path.name, rate, 1 / known))]
 
 
-def check_step(path: Path, step: float, what: str) -> None:
-    """Raise TableError for a sampling interval that is none.
-
-    Args:
-        path: the file.
-        step: the interval [s].
-        what: where it comes from.
-    """
+def check_step(path: Path, step: float) -> None:
+    """Raise TableError for a sampling interval [s] that is none."""
     if not SHORTEST_STEP_S <= step <= LONGEST_STEP_S:
-        raise TableError(path, f"{what} is {step:g} s, above 0 is expected: say `rate` in Hz, or correct the file")
+        said = "the sampling interval is {step:g} s, above 0 is expected: say `rate` in Hz, or correct the file"
+        raise TableError(path, said, step)
 
 
 def check_count(path: Path, count: int) -> None:
     """Raise TableError for a record of too few samples."""
     if count < FEWEST_SAMPLES:
-        raise TableError(path, f"holds {count} samples, at least {FEWEST_SAMPLES} are needed: record longer")
+        said = "holds {n} samples, at least {fewest} are needed: record longer"
+        raise TableError(path, said, count, FEWEST_SAMPLES)

@@ -1,6 +1,5 @@
 """What a table of readings must fulfil before it is taken for a scan of a field."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -17,6 +16,7 @@ from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import Readings
 from levilab.runs.run import Run
 from levilab.texts.note import of_file
+from levilab.texts.text import Text, text_of
 
 #: A stand is no higher [m], and no probe measures more [T]: beyond, the unit is another one.
 _HIGHEST_M, _STRONGEST_T = 2.0, 35.0
@@ -59,7 +59,7 @@ def field_readings(table: Table) -> FieldReadings:
     heights = 1 + int(np.count_nonzero(np.diff(np.sort(height)) > SAME_HEIGHT_M))
     if heights < FEWEST_HEIGHTS:  # here and not in the fit alone: a scan broken off spoils no search of a folder
         span = {"lowest": float(height.min()), "highest": float(height.max())}
-        raise TableError(table.path, str(TooFewHeights(seen=heights, needed=FEWEST_HEIGHTS, **span)))
+        raise TableError(table.path, text_of(TooFewHeights(seen=heights, needed=FEWEST_HEIGHTS, **span)))
     columns = table.columns
     own = OWN_U in columns
     u_name = OWN_U if own else "flux_density_u_t"
@@ -67,24 +67,21 @@ def field_readings(table: Table) -> FieldReadings:
     u = table.column(u_name) if u_name in columns else None
     for values, what, lowest in ((height_u, "the uncertainty of a height", 0.0), (u, "an uncertainty", 1e-12)):
         if values is not None:
-            refuse(table, values < lowest, _not_positive(what, values))
+            refuse(table, values < lowest, "{what} is {value:g}, more than 0 is expected: correct it", what, values)
     strongest = float(np.abs(flux_density).max())
     doubts = []
     if strongest > _STRONGEST_MAGNET_T:
-        doubt = f"{digits(strongest, 3)} T is more than a permanent magnet makes; say the unit, as b=NAME [mT]"
-        doubts.append(of_file("strongest", f"{table.path.name}: {doubt}"))
+        said = "{name:s}: {tesla:n} T is more than a permanent magnet makes; say the unit, as b=NAME [mT]"
+        doubts.append(of_file("strongest", Text(said, table.path.name, digits(strongest, 3))))
     return FieldReadings(height, flux_density, height_u, u, own, (*table.warnings, *doubts))
 
 
-def _not_positive(what: str, values: Array) -> Callable[[int], str]:
-    return lambda i: f"{what} is {values[i]:g}, more than 0 is expected: correct it"
-
-
 def _must_be_in_range(table: Table, values: Array, most: float, what: str, *, unit: str, column: str) -> None:
-    refuse(table, np.abs(values) > most, lambda i: (
-        f"{what} of {values[i]:.6g} {unit} cannot be, up to {most:g} {unit} is expected: if the unit is another one, "
-        f"say so, as `columns` = {column}"
-    ))  # fmt: skip
+    said = (
+        "{what} of {value:.6g} {unit:s} cannot be, up to {most:g} {unit:s} is expected: if the unit is another one, "
+        "say so, as `columns` = {column:s}"
+    )
+    refuse(table, np.abs(values) > most, said, what, values, unit, most, column)
 
 
 #: Columns of a table that are looked at.

@@ -12,10 +12,9 @@ from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import Readings
-from levilab.present.numbers import how_many
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run
-from levilab.texts.text import Text
+from levilab.texts.text import Text, how_many
 
 
 @dataclass(frozen=True, eq=False)

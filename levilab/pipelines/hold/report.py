@@ -12,9 +12,9 @@ from levilab.pipelines.row import cells_of
 from levilab.pipelines.sources import Source
 from levilab.pipelines.spindown.words import SYMBOLS
 from levilab.present.document.blocks import Paragraph, Tabular
-from levilab.present.numbers import how_many, plain, short_name, with_uncertainty, without_unit
+from levilab.present.numbers import plain, short_name, with_uncertainty, without_unit
 from levilab.present.tables import Table, table
-from levilab.texts.text import Sentences, Text
+from levilab.texts.text import Sentences, Text, how_many
 
 
 def hold_tables(analysis: HoldAnalysis) -> tuple[Table, ...]:

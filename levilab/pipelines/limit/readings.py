@@ -23,6 +23,7 @@ from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run
 from levilab.texts.note import of_file
+from levilab.texts.text import Text
 
 #: Columns that an analysis of limits looks at.
 QUANTITIES = ("spin_frequency_hz", "spin_frequency_u_hz")
@@ -79,17 +80,17 @@ def _must_be_of_several(path: Path, time: Array, limit: Array) -> None:
     """Raise DoesNotSuit for the spins of one top, or what may be meant for them."""
     no_times = "of limits one row a repetition is expected (leave out the column of times if these are limits)"
     if np.any(np.diff(time) <= 0):
-        raise DoesNotSuit(f"{path}: its times do not increase from row to row; {no_times}")
+        raise DoesNotSuit("{path:s}: its times do not increase from row to row; {do}", path, no_times)
     if len(limit) < _FEWEST:
         return
     if not np.ptp(limit):
-        raise DoesNotSuit(f"{path}: the spin does not change with time: is the drive on? {no_times}")
+        raise DoesNotSuit("{path:s}: the spin does not change with time: is the drive on? {do}", path, no_times)
     ordered = np.sort(limit)
     ranks = np.searchsorted(ordered, limit) + np.searchsorted(ordered, limit, "right")  # equal limits share one
     trend = float(np.corrcoef(np.arange(len(limit)), ranks)[0, 1])
     if abs(trend) > _TREND:
         way = "falls" if trend < 0 else "rises"
-        raise DoesNotSuit(f"{path}: the spin {way} with time, as that of one top does; {no_times}")
+        raise DoesNotSuit("{path:s}: the spin {way} with time, as that of one top does; {do}", path, way, no_times)
 
 
 def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> LimitReadings:
@@ -103,7 +104,7 @@ def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> Limi
     try:
         track = track_of_field(record.times, record.field, near=near)
     except AnalysisError as error:
-        raise DoesNotSuit(f"{path}: {error}") from error
+        raise DoesNotSuit("{path:s}: {error}", path, error) from error
     falls = []
     for one in track.flights:
         part = slice(one.first, one.last)
@@ -113,11 +114,9 @@ def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> Limi
             u = float(np.median(track.u[part]))
             falls.append(spin_at_fall(track.time[part], track.frequency[part], u, (one.end - reach, one.end + reach)))
     if not falls:
-        raise DoesNotSuit(f"{path}: no top falls in it after {FEWEST} windows whose spin is certain")
-    notes = (
-        *record.warnings,
-        of_file("falls", f"{path.name}: {len(falls)} of {len(track.flights)} tops fall in this record"),
-    )
+        raise DoesNotSuit("{path:s}: no top falls in it after {n} windows whose spin is certain", path, FEWEST)
+    seen = Text("{name:s}: {n} of {tops} tops fall in this record", path.name, len(falls), len(track.flights))
+    notes = (*record.warnings, of_file("falls", seen))
     return LimitReadings(np.array([one.value for one in falls]), np.array([one.u for one in falls]), notes)
 
 
@@ -162,10 +161,11 @@ def read_limit_run(run: Run, _: InputOptions) -> LimitReadings:
     if levels.all():
         return replace(found, common=U_OF_WAY * (found.limit - table.column("spin_seen_hz")))
     left_out = ", ".join(f"{spin:.2f} Hz" for spin in found.limit[levels])
-    note = (
-        f"{levels.sum()} of {levels.size} tops got no faster than {left_out}, where the pull of the drive equals the "
-        "drag: these are no limits, and left out"
+    said = (
+        "{n} of {tops} tops got no faster than {spins:n}, where the pull of the drive equals the drag: these are no "
+        "limits, and left out"
     )
+    note = Text(said, levels.sum(), levels.size, left_out)
     u = None if found.u is None else found.u[~levels]
     return LimitReadings(found.limit[~levels], u, (*found.warnings, note))
 
@@ -193,8 +193,9 @@ def limit_readings(table: Table) -> LimitReadings:
         must_be_positive(table, u, "the uncertainty", "Hz, but must be above 0: correct it or remove the column")
     spread = float(np.ptp(limit) / limit.mean())
     if spread > _MOST_SPREAD:
-        raise DoesNotSuit(
-            f"{table.path}: its spins differ by {100 * spread:.0f} % of their mean, so they are no limits of one top: "
-            "one row a repetition is expected"
+        said = (
+            "{path:s}: its spins differ by {percent:.0f} % of their mean, so they are no limits of one top: one row a "
+            "repetition is expected"
         )
+        raise DoesNotSuit(said, table.path, 100 * spread)
     return LimitReadings(limit, u, table.warnings)

@@ -23,10 +23,10 @@ from levilab.pipelines.part import (
 )
 from levilab.pipelines.sources import Source
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
-from levilab.present.numbers import how_many, off, reading, share, short_name, with_uncertainty, without_unit
+from levilab.present.numbers import off, reading, share, short_name, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table
 from levilab.stability.thesis import ISLANDS_HZ, MEASURED_HZ, MEASURED_U_HZ
-from levilab.texts.text import Sentences, Text
+from levilab.texts.text import Sentences, Text, how_many
 
 HEADS = ("limits", "tops", "mean [Hz]", "scatter [Hz]", "trend [Hz/top]", "outliers")
 

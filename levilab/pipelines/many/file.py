@@ -34,9 +34,8 @@ def check_name(table: Path) -> None:
     if kind not in {CSV, PARQUET}:
         raise UsageError("table", "a name that ends in .csv or .parquet is expected", value=table)
     if kind == PARQUET and find_spec("pyarrow") is None:
-        needs = "Parquet needs the extra parquet (pyarrow, which is not installed)"
-        what = f"{needs}: {how_to_install('parquet')}, or name a table that ends in .csv"
-        raise UsageError("table", what, value=table)
+        what = "Parquet needs the extra parquet (pyarrow, not installed): {how}, or name a table that ends in .csv"
+        raise UsageError("table", what, how_to_install("parquet"), value=table)
     if table.is_dir():
         raise UsageError("table", "is a folder; the name of a file is expected", value=table)
 
@@ -95,8 +94,8 @@ class TableFile:
                 self._file = self.part.open("r+b")
                 self._find_rows()
             else:
-                left = f"{self.part} holds runs of an analysis that was interrupted"
-                raise UsageError("table", f"{left}: go on with it (`resume`), or remove it", value=self.table)
+                left = "{file:s} holds runs of an analysis that was interrupted: go on with it (`resume`), or remove it"
+                raise UsageError("table", left, self.part, value=self.table)
             self._lock = until_failure.pop_all()
         return self
 
@@ -110,8 +109,7 @@ class TableFile:
         except (ValueError, csv.Error) as error:  # those of Arrow are ValueErrors, too
             self._file.close()
             self._remove_part()
-            what = f"{self.table}: is damaged ({error}): start anew, without `resume`"
-            raise DataError(what) from error
+            raise DataError("{file:s}: is damaged: begin again, without `resume`", self.table) from error
 
     def add(self, cells: Sequence[Cell]) -> None:
         """Append a row and hand it to the operating system.  Raises CannotWrite."""
@@ -197,13 +195,13 @@ class TableFile:
         try:
             theirs = parse_json(about.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
-            what = f"{about} says what {rows} was made with, and cannot be read ({error}): start anew, without it"
-            raise UsageError("resume", what) from error
+            what = "{file:s} says what {rows:s} was made with, and cannot be read: begin again, without `resume`"
+            raise UsageError("resume", what, about, rows) from error
         ours = parse_json(self._description())
         other = [key for key in ours if not isinstance(theirs, dict) or theirs.get(key) != ours[key]]
         if other:
-            what = f"{rows} was made with other {' and '.join(other)}: give the same, or another `table`"
-            raise UsageError("resume", what)
+            what = "{rows:s} was made with other {names:s}: give the same, or another `table`"
+            raise UsageError("resume", what, rows, ", ".join(other))
 
     def _cut_torn_line(self) -> None:
         """Remove an incomplete last row, which a killed process left."""
@@ -223,7 +221,7 @@ class TableFile:
             try:
                 values = self._values(line)
             except (ValueError, csv.Error, StopIteration) as error:
-                raise DataError(f"{self.part}: a row is damaged ({error}): remove the file and start anew") from error
+                raise DataError("{file:s}: a row is damaged: remove the file, and begin again", self.part) from error
             if self._stands(values):
                 self._places[str(values[0])] = place
             place += len(line)

@@ -169,7 +169,7 @@ def _analyze(task: Task, analysis: Analysis[Any], about: dict[str, Any]) -> dict
         options = replace(options, columns=None)  # they are those of the files beside it
     found = analysis.analyze([task.path], options)
     if len(found.sources) > 1:
-        raise DataError(f"{task.path}: holds several runs: name each, as {found.sources[0].path}")
+        raise DataError("{path:s}: holds several runs: name each, as {one:s}", task.path, found.sources[0].path)
     about["readings_sha256"] = found.sources[0].sha256
     document = analysis.document(found, task.path.parent)
     about["warnings"] = len(document["warnings"])
@@ -265,7 +265,8 @@ def write_table(
     folder = table.parent
     found = {name_of(Path(path), folder): (path, is_run, searched) for path, is_run, searched in inputs(paths)}
     if not found:
-        raise NoneUsable(f"{paths[0]}: holds no run and no data file; name run folders, or a folder with some of them")
+        said = "{path:s}: holds no run and no data file; name run folders, or a folder with some of them"
+        raise NoneUsable(said, paths[0])
     made_with = {
         "analysis": analysis.name,
         "settings": analysis.settings(options).model_dump(mode="json", by_alias=True),

@@ -8,16 +8,17 @@ from typing import ClassVar
 import numpy as np
 
 from analysis.arrays import Array
-from analysis.numbers import digits
 from analysis.precession.gates import Gates, Rate, rates_at_point, shared_scatter
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, Table, read_table, refuse
+from levilab.formats.titles import companion
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import SAME, Readings
-from levilab.present.numbers import how_many, pulses_too_many
+from levilab.present.numbers import pulses_too_many
 from levilab.runs.gates import gates_of
 from levilab.runs.run import Run
 from levilab.texts.note import of_file
+from levilab.texts.text import Text, how_many
 
 #: Columns that an analysis of sweeps looks at.
 QUANTITIES = (
@@ -32,9 +33,9 @@ _SAME_RATE = 1e-6
 SLOWEST_HZ, HIGHEST_HZ = 1e-9, 1e12
 #: No sweep has more points; a recording of all counts has.
 MOST_POINTS = 10_000
-#: The columns that hold uncertainties, and what of.
-_OF_U = {"precession_frequency_u_hz": "precession", "drive_frequency_u_hz": "drive", "spin_frequency_u_hz": "spin"}
-_OF = {"precession_frequency_hz": "precession", "drive_frequency_hz": "drive", "spin_frequency_hz": "spin"}
+#: The columns that hold frequencies, with their names, and those that hold their uncertainties.
+_OF = {f"{name}_frequency_hz": f"{name} frequency" for name in ("precession", "drive", "spin")}
+_OF_U = {companion(name): what for name, what in _OF.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,27 +125,23 @@ def sweep_readings(table: Table) -> SweepReadings:
     """
     drive, precession = table.column("drive_frequency_hz"), table.column("precession_frequency_hz")
     if drive.size < FEWEST:
-        raise TableError(
-            table.path, f"holds {how_many(drive.size, 'point')}, at least {FEWEST} are needed: sweep further"
-        )
+        few = "holds {points}, at least {fewest} are needed: sweep further"
+        raise TableError(table.path, few, how_many(drive.size, "point"), FEWEST)
     if drive.size > MOST_POINTS:
-        raise TableError(
-            table.path,
-            f"holds {drive.size} points, up to {MOST_POINTS} are expected: give one mean for each drive frequency",
-        )
+        many = "holds {n} points, up to {most} are expected: give one mean for each drive frequency"
+        raise TableError(table.path, many, drive.size, MOST_POINTS)
     for name, what in _OF.items():
         if name in table.columns:
-            _check(table, table.column(name), f"the {what} frequency")
+            _check(table, table.column(name), what)
     if np.ptp(drive) <= SAME * drive.max():
-        raise TableError(
-            table.path, f"all {drive.size} points are at a drive frequency of {drive[0]:g} Hz: sweep the drive"
-        )
+        one = "all {n} points are at a drive frequency of {hz:g} Hz: sweep the drive"
+        raise TableError(table.path, one, drive.size, drive[0])
     u = {name: table.column(name) for name in _OF_U if name in table.columns}
     warnings = list(table.warnings)
     if "spin_frequency_u_hz" in u and "spin_frequency_hz" not in table.columns and "precession_frequency_u_hz" not in u:
         u["precession_frequency_u_hz"] = u.pop("spin_frequency_u_hz")
-        text = f"{table.path.name}: the column of uncertainties is taken for that of the precession"
-        warnings.append(of_file("of the precession", text))
+        text = "{name:s}: the column of uncertainties is taken for that of the precession"
+        warnings.append(of_file("of the precession", Text(text, table.path.name)))
     for name, values in u.items():
         _check_u(table, values, _OF_U[name], precession)
     has_spin = "spin_frequency_hz" in table.columns
@@ -161,13 +158,11 @@ def sweep_readings(table: Table) -> SweepReadings:
 
 
 def _check(table: Table, values: Array, what: str) -> None:
-    refuse(table, (values < SLOWEST_HZ) | (values > HIGHEST_HZ), lambda i: (
-        f"{what} is {values[i]:.9g} Hz, a number above 0 and up to {HIGHEST_HZ:g} is expected: remove the point"
-    ))  # fmt: skip
+    said = "the {quantity} is {hz:.9g} Hz, a number above 0 and up to {most:g} is expected: remove the point"
+    refuse(table, (values < SLOWEST_HZ) | (values > HIGHEST_HZ), said, what, values, HIGHEST_HZ)
 
 
 def _check_u(table: Table, values: Array, of: str, size: Array) -> None:
     """Refuse an uncertainty that is not above 0, or below the rounding of the number itself, is a mistake."""
-    refuse(table, ~((values > 1e-15 * size) & (values < 1e15 * size)), lambda i: (
-        f"the uncertainty of the {of} frequency is {digits(float(values[i]), 3)} Hz: correct it or remove the column"
-    ))  # fmt: skip
+    said = "the uncertainty of the {quantity} is {hz:.3g} Hz: correct it or remove the column"
+    refuse(table, ~((values > 1e-15 * size) & (values < 1e15 * size)), said, of, values)

@@ -29,7 +29,6 @@ from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Block, Note, Paragraph, Tabular
 from levilab.present.numbers import (
     column,
-    how_many,
     off,
     plain,
     short_name,
@@ -40,7 +39,7 @@ from levilab.present.numbers import (
 )
 from levilab.present.tables import Row, Table, table
 from levilab.simulator.published.printed import published
-from levilab.texts.text import Sentences, Text
+from levilab.texts.text import Sentences, Text, how_many
 
 #: Points that a terminal shows; more stand in result.json.
 MOST_IN_TERMINAL = 60

@@ -17,12 +17,11 @@ from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
-from levilab.present.numbers import how_many
 from levilab.runs.run import Run
 from levilab.runs.traces import INDEX, undescribed_codes
 from levilab.runs.waveforms import run_waveforms
 from levilab.texts.note import Note, of_file
-from levilab.texts.text import Text
+from levilab.texts.text import Text, how_many
 
 #: Channels whose frequency is no spin, as experiments call them, with what it is.
 NO_SPIN = {"laser": "how often the stem cuts the laser: its precession", "drive": "that of the drive"}

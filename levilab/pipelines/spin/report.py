@@ -14,9 +14,9 @@ from levilab.pipelines.spin.analysis import MOST_DRAWN, OF_A_RUN, SpinAnalysis, 
 from levilab.pipelines.spin.readings import Records
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Block, Listing, Paragraph, Points, Tabular
-from levilab.present.numbers import column, enumeration, how_many, plain, short_name, with_decimals, with_uncertainty
+from levilab.present.numbers import column, enumeration, plain, short_name, with_decimals, with_uncertainty
 from levilab.present.tables import Table, table
-from levilab.texts.text import Sentences, Text
+from levilab.texts.text import Sentences, Text, how_many
 
 #: A slope, or a scatter of records, is seen beyond this multiple of u.
 _SEEN = 3.0

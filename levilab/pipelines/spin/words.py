@@ -5,8 +5,8 @@ from types import MappingProxyType
 
 from analysis.numbers import digits
 from analysis.pulses import Finding
-from levilab.present.numbers import enumeration, filled, how_many
-from levilab.texts.text import Text
+from levilab.present.numbers import enumeration, filled
+from levilab.texts.text import Text, how_many
 
 
 def finding_text(found: Finding, part: str = "window") -> str:

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -31,11 +30,10 @@ from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, findings_of, read_field_record
 from levilab.pipelines.spin.readings import track_of_record
 from levilab.pipelines.spin.words import finding_text
-from levilab.present.numbers import how_many
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run
 from levilab.texts.note import Note, of_file
-from levilab.texts.text import Text
+from levilab.texts.text import Text, how_many, text_of
 
 #: Columns of a table that are looked at.
 QUANTITIES = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
@@ -107,18 +105,20 @@ def _between(readings: SpinReadings, options: "InputOptions", path: "Path") -> S
         return readings
     low, high = ends
     inside = np.flatnonzero((readings.frequency >= low) & (readings.frequency <= high))
-    span = f"between {low:g} Hz and {high:g} Hz"
     if inside.size < FEWEST:
-        seen = f"{inside.size} of {how_many(len(readings), 'reading')} {span} are too few, at least {FEWEST} are needed"
-        spins = f"{readings.frequency[0]:.4g} Hz to {readings.frequency[-1]:.4g} Hz"
-        raise DataError(
-            "{path:s}: {seen}: the spin goes from {spins}, choose `between` in it", path=path, seen=seen, spins=spins
+        said = (
+            "{path:s}: {n} of {readings} between {low:g} Hz and {high:g} Hz are too few, at least {fewest} are needed: "
+            "the spin goes from {first:.4g} Hz to {last:.4g} Hz, choose `between` in it"
         )
+        first, last = readings.frequency[[0, -1]]
+        all_of_them = how_many(len(readings), "reading")
+        raise DataError(said, path, inside.size, all_of_them, low, high, FEWEST, first, last)
     part = slice(inside[0], inside[-1] + 1)
     u = None if readings.u is None else readings.u[part]
     kept = replace(readings, time=readings.time[part], frequency=readings.frequency[part], u=u)
-    note = f"only the {len(kept)} of {len(readings)} readings {span} are fitted, as asked; the others are left out"
-    return replace(kept, warnings=(*readings.warnings, Note("between", note)))
+    said = "only the {n} of {all} readings between {low:g} Hz and {high:g} Hz are fitted, as asked; the others are not"
+    note = Note("between", Text(said, len(kept), len(readings), low, high))
+    return replace(kept, warnings=(*readings.warnings, note))
 
 
 def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings:
@@ -126,14 +126,14 @@ def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings
         record = read_record(path, columns=options.columns, rate=options.rate, guess=options.guess)
     except NoRate as error:
         if not options.guess:
-            raise DoesNotSuit(str(error)) from error
+            raise DoesNotSuit(text_of(error)) from error
         if path.suffix.casefold() == ".npy":
             raise
     except NoWaveform:
         pass
     except DataError as error:
         if not options.guess:  # a damaged record that was found in a folder
-            raise DoesNotSuit(str(error)) from error
+            raise DoesNotSuit(text_of(error)) from error
         raise
     else:
         return record_readings(record, options)
@@ -143,8 +143,8 @@ def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings
 def _read_spin_table(path: "Path", options: "InputOptions") -> Table:
     table = read_table(path, quantities=QUANTITIES, needed=QUANTITIES[:2], **options.of_tables)
     if options.channel is not None:
-        note = f"{path.name}: is a table of readings and has no channels: `columns` chooses its columns"
-        table = replace(table, warnings=(of_file("no channels", note), *table.warnings))
+        said = "{name:s}: is a table of readings and has no channels: `columns` chooses its columns"
+        table = replace(table, warnings=(of_file("no channels", Text(said, path.name)), *table.warnings))
     return table
 
 
@@ -165,7 +165,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
         else:
             track = track_of_record(record, options.channel, WINDOW_S, "auto")
     except AnalysisError as error:
-        raise (DataError if options.guess else DoesNotSuit)(f"{path}: {error}") from error
+        raise (DataError if options.guess else DoesNotSuit)("{path:s}: {error}", path, error) from error
     notes = [of_file(note.name, Text(_NAMED, name=path.name, text=finding_text(note))) for note in track.notes]
     what = Text(
         "a list of pulse times of {s:n} s" if times is not None else "a record of {s:n} s", s=digits(duration, 3)
@@ -179,7 +179,7 @@ def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions")
     try:
         track = track_of_field(record.times, record.field, near=options.near)
     except AnalysisError as error:
-        raise (DataError if options.guess else DoesNotSuit)(f"{path}: {error}") from error
+        raise (DataError if options.guess else DoesNotSuit)("{path:s}: {error}", path, error) from error
     found = findings_of(track.spins)
     notes = [of_file(note.name, Text(_NAMED, name=path.name, text=finding_text(note))) for note in found]
     what = Text("a magnetometer's record of {s:n} s", s=digits(record.duration, 3))
@@ -191,7 +191,7 @@ def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions")
 def _must_last(path: "Path", duration: float, window: float) -> None:
     if duration < FEWEST * window:
         short = "{path:s}: lasts {s:n} s, a spin-down needs {fewest} windows of {window:g} s at least"
-        raise DoesNotSuit(Text(short, path=path, s=digits(duration, 3), fewest=FEWEST, window=window))
+        raise DoesNotSuit(short, path, digits(duration, 3), FEWEST, window)
 
 
 def _of_track(
@@ -325,16 +325,13 @@ LONGEST_S, SLOWEST_HZ, HIGHEST_HZ = 1e11, 1e-9, 1e12
 def _must_be_ordinary(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:
     size = np.abs(frequency)
     for wrong, values, what, allowed in (
-        (np.abs(time) > LONGEST_S, time, "time", f"up to {LONGEST_S:g} s"),
-        (size > HIGHEST_HZ, frequency, "frequency", f"up to {HIGHEST_HZ:g} Hz"),
-        ((size > 0) & (size < SLOWEST_HZ), frequency, "frequency", f"from {SLOWEST_HZ:g} Hz"),
+        (np.abs(time) > LONGEST_S, time, "a time", Text("up to {most:g} s", LONGEST_S)),
+        (size > HIGHEST_HZ, frequency, "a frequency", Text("up to {most:g} Hz", HIGHEST_HZ)),
+        ((size > 0) & (size < SLOWEST_HZ), frequency, "a frequency", Text("from {least:g} Hz", SLOWEST_HZ)),
     ):
-        refuse(table, wrong, partial(_no_measurement, what, values, allowed))
-
-
-def _no_measurement(what: str, values: "NDArray[np.float64]", allowed: str, i: int) -> str:
-    unit = ", and say it: t=NAME [ms]" if what == "time" else ""
-    return f"a {what} of {values[i]:.9g} is no measurement, {allowed}: check the unit{unit}"
+        unit = Text(", and say it: t=NAME [ms]" if values is time else "")
+        said = "{what} of {value:.9g} is no measurement, {allowed}: check the unit{unit}"
+        refuse(table, wrong, said, what, values, allowed, unit)
 
 
 def _in_the_file(table: Table, error: AnalysisError) -> TableError:
@@ -351,15 +348,14 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
             if turned
             else "sort the readings, or correct one"
         )
-        values = {"now": error.after, "what": what, "then": error.before, "line": before, "advice": advice}
-        return TableError(table.path, Text(text, **values), line=after)
+        return TableError(table.path, text, error.after, what, error.before, before, advice, line=after)
     if isinstance(error, NotPositive):
         what, advice = _ABOVE_0[error.quantity]
         if error.quantity == "spin frequency" and error.value == 0:
             advice = "Hz, as after a fall or without a pulse: delete such rows"
-        text = Text("{what} is {value:.9g} {advice}", what=what, value=error.value, advice=advice)
-        return TableError(table.path, text, line=int(table.lines[error.index]))
-    return TableError(table.path, str(error))
+        line = int(table.lines[error.index])
+        return TableError(table.path, "{what} is {value:.9g} {advice}", what, error.value, advice, line=line)
+    return TableError(table.path, text_of(error))
 
 
 #: What the analysis calls a column, in the words of a file, and what to do.
@@ -372,7 +368,5 @@ _ABOVE_0 = {
 def _must_be_possible(table: Table, u: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:
     """Refuse an uncertainty below the rounding of the number itself, or one that is not above 0."""
     above_0 = (u > 0) & (frequency > 0)
-    refuse(table, above_0 & ((u < 1e-15 * frequency) | (u > 1e15 * frequency)), lambda i: (
-        f"an uncertainty of {digits(float(u[i]), 3)} Hz for {frequency[i]:.9g} Hz cannot be meant: correct it or drop "
-        "the column"
-    ))  # fmt: skip
+    said = "an uncertainty of {u:.3g} Hz for {hz:.9g} Hz cannot be meant: correct it or drop the column"
+    refuse(table, above_0 & ((u < 1e-15 * frequency) | (u > 1e15 * frequency)), said, u, frequency)

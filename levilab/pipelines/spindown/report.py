@@ -49,7 +49,6 @@ from levilab.present.document.blocks import Block, Details, Listing, Note, Parag
 from levilab.present.numbers import (
     column,
     enumeration,
-    how_many,
     off,
     plain,
     reading,
@@ -62,7 +61,7 @@ from levilab.present.numbers import (
 from levilab.present.tables import Row, Table, table
 from levilab.present.units import unit as unit_row
 from levilab.runs.events import RunEvent
-from levilab.texts.text import Sentences, Text, text_from
+from levilab.texts.text import Sentences, Text, how_many, text_from
 
 #: Laws of one power, and the power, in its order.
 _POWERS: Mapping[str, float] = MappingProxyType(

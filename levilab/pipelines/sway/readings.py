@@ -96,7 +96,7 @@ def _of_field(path: Path, options: InputOptions) -> SwayReadings | None:
     table = read_table(path, quantities=_FIELD, needed=_FIELD[:3], **options.of_tables | {"guess": False})
     time, x, y = (table.column(name) for name in _FIELD[:3])
     if time.size < _FEWEST or np.any(np.diff(time) <= 0):
-        raise DataError(f"{path}: {_FEWEST} samples or more, at times that increase, are expected")
+        raise DataError("{path:s}: {n} samples or more, at times that increase, are expected", path, _FEWEST)
     z, spin = (table.columns.get(name) for name in _FIELD[3:])
     device = (options.device if isinstance(options, SwayOptions) else None) or Device()
     moment, u = THESIS["moment"][0], _MOMENT_U
@@ -145,12 +145,14 @@ def _with_heights(path: Path, readings: SwayReadings, options: InputOptions) -> 
     of_side = read_table(side, quantities=_SIDE, needed=_SIDE)
     time, height, spin = (of_side.column(name) for name in _SIDE)
     if readings.spin is None or not np.ptp(readings.spin) > _FALLS_HZ:
-        raise DataError(f"{path}: a spin that falls is expected, by which the clock of {side.name} is compared")
+        said = "{path:s}: a spin that falls is expected, by which the clock of {side:s} is compared"
+        raise DataError(said, path, side.name)
     falls = np.polynomial.Polynomial.fit(readings.time, readings.spin, _BENDS)
     even = np.linspace(readings.time[0], readings.time[-1], readings.time.size)
     met = (spin < falls(even[0])) & (spin > falls(even[-1]))
     if met.sum() < _FEWEST:
-        raise DataError(f"{side}: its spins are others than those of {path.name}: films of the same time are expected")
+        said = "{side:s}: its spins are others than those of {path:s}: films of the same time are expected"
+        raise DataError(said, side, path.name)
     late = float(np.median(np.interp(-spin[met], -falls(even), even) - time[met]))
     both = (readings.time >= time[0] + late) & (readings.time <= time[-1] + late)
     part = {name: getattr(readings, name)[both] for name in ("time", "x", "y", "spin")}
@@ -179,11 +181,13 @@ def read_motion_run(run: Run, options: InputOptions) -> SwayReadings:
 def _readings(table: Table) -> SwayReadings:
     time, x, y = (table.column(name) for name in NEEDED)
     if not time.size:
-        raise TableError(table.path, Text("holds no place of a top: it was not seen, or had fallen"))
-    refuse(table, np.hypot(x - np.median(x), y - np.median(y)) > _FARTHEST_M, lambda i: (
-        f"the top is {np.hypot(x, y)[i]:.3g} m off, less than {_FARTHEST_M:g} m is expected: if the unit is another "
-        "one, say so, as `columns` = x=NAME [mm],y=NAME [mm]"
-    ))  # fmt: skip
+        raise TableError(table.path, "holds no place of a top: it was not seen, or had fallen")
+    said = (
+        "the top is {m:.3g} m off, less than {most:g} m is expected: if the unit is another one, say so, as "
+        "`columns` = x=NAME [mm],y=NAME [mm]"
+    )
+    far = np.hypot(x - np.median(x), y - np.median(y)) > _FARTHEST_M
+    refuse(table, far, said, np.hypot(x, y), _FARTHEST_M)
     height, spin = table.columns.get("height_m"), table.columns.get("spin_frequency_hz")
     if height is not None and not np.isfinite(height).all():
         height = None

@@ -14,9 +14,9 @@ from levilab.pipelines.sources import Source
 from levilab.pipelines.sway.analysis import QUANTITIES, SwayAnalysis, SwayRun
 from levilab.pipelines.sway.readings import SwayReadings
 from levilab.present.document.blocks import Listing, Paragraph, Tabular
-from levilab.present.numbers import how_many, short_name, with_decimals, with_uncertainty, without_unit
+from levilab.present.numbers import short_name, with_decimals, with_uncertainty, without_unit
 from levilab.present.tables import Table, table
-from levilab.texts.text import Sentences, Text
+from levilab.texts.text import Sentences, Text, how_many
 
 
 def sway_tables(analysis: SwayAnalysis) -> tuple[Table, ...]:

@@ -27,7 +27,7 @@ from levilab.present.document.blocks import (
     Warnings,
     in_language_of_reader,
 )
-from levilab.present.numbers import column, enumeration, how_many, plain, with_sign, without_unit
+from levilab.present.numbers import column, enumeration, plain, with_sign, without_unit
 from levilab.present.tables import Row, table
 from levilab.report.beside import (
     FAR,
@@ -48,7 +48,7 @@ from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, write_content, writing_report
 from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
-from levilab.texts.text import Sentences, Text, in_language, spoken
+from levilab.texts.text import Sentences, Text, how_many, in_language, spoken
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence

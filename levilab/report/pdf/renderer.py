@@ -36,11 +36,10 @@ from levilab.present.document.blocks import (
     Warnings,
 )
 from levilab.present.document.typesetting import typeset
-from levilab.present.numbers import how_many
 from levilab.present.tables import Row, Table
 from levilab.software import how_to_install
 from levilab.texts.text import Text as Said
-from levilab.texts.text import in_language
+from levilab.texts.text import how_many, in_language
 
 TEMPLATE = "report.typ"
 #: Letters of a word that is never divided; a longer one is divided behind what stands between its parts, as in a path.

@@ -22,14 +22,14 @@ from levilab.present.document.blocks import (
     Tabular,
     in_language_of_reader,
 )
-from levilab.present.numbers import column, how_many
+from levilab.present.numbers import column
 from levilab.present.progress import Display
 from levilab.present.tables import table
 from levilab.report.beside import Class, class_of
 from levilab.report.groups.document import truth_text
 from levilab.report.page import FORMATS
 from levilab.report.worksheets.sheets import SHEETS, TOPS, Sheet
-from levilab.texts.text import ENGLISH, Text, in_language
+from levilab.texts.text import ENGLISH, Text, how_many, in_language
 
 _TEXTS = Path(__file__).parent / "texts.toml"
 

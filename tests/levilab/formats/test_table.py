@@ -3,6 +3,7 @@
 import codecs
 import math
 import os
+import re
 from pathlib import Path
 from unittest.mock import Mock
 
@@ -21,11 +22,13 @@ from levilab.formats.rows import FEW, _read_at_once, _read_lines
 from levilab.formats.table import ColumnsError, parse_columns, read_run_readings, read_table
 from levilab.formats.texts import Text
 from levilab.formats.titles import read_title, unit_factor
+from levilab.texts.text import in_language
 
 T, F, U = "time_s", "spin_frequency_hz", "spin_frequency_u_hz"
 PLAIN = {T: [0, 0.5, 1], F: [61.5, 61.25, 61]}
 SECONDS = PLAIN | {T: [0, 1, 2]}
 WITH_U = PLAIN | {U: [0.25, 0.5, 0.125]}
+ENGLISH = re.compile(r"\b(the|of|is|are|and|to|with|not|it|or|at|say|holds|column)\b")
 SLOW = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
@@ -331,6 +334,7 @@ def test_an_error_is_one_line_that_names_file_and_place(name, table_file):
     assert message.isprintable()
     assert len(message) < len(str(path)) + 330
     assert all(word in message for word in words), message
+    assert not ENGLISH.search(in_language(caught.value.message, "de"))
     if any(word.startswith("line ") for word in words):
         assert f"line {caught.value.line}" in words
 
@@ -385,6 +389,7 @@ def test_what_is_nearly_a_reading_is_reported_with_what_to_do(text, columns, say
     with pytest.raises(TableError) as error:
         read_table(table_file(text), columns=columns, needed=[F])
     assert says in str(error.value)
+    assert not ENGLISH.search(in_language(error.value.message, "de"))
 
 
 @pytest.mark.parametrize(

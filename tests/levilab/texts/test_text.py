@@ -51,6 +51,8 @@ SAYING = {
     "ExperimentFailed": 0, "DidNotFollow": 0, "NoLight": 0, "_unfit": 0,
 }  # fmt: skip
 ROOMS = ("levilab.live.", "levilab.acquisition.")
+#: Rooms in which every text of an error is looked for, also an f-string, which no table can have.
+OF_FILES = ("levilab.formats", "levilab.pipelines")
 #: Arguments of errors that are not values of a sentence.
 NO_VALUES = {"line", "value", "kind", "doubt", "reasons", "left_out"}
 _LITERAL = r'"((?:[^"\\]|\\.)*)"'
@@ -59,8 +61,8 @@ _PHRASE = re.compile(rf"phrase\((?:[^()\"]*\?)?\s*{_LITERAL}(?:\s*:\s*{_LITERAL}
 
 
 def is_worded(text):
-    """Whether there is a word beside the values: units and letters are the same in all languages."""
-    return bool(re.search(r"[A-Za-z]{3,}", re.sub(r"\{[^}]*\}", "", text)))
+    """Whether there is a word beside the values: units, letters and names, as x_m, are the same in all languages."""
+    return bool(re.search(r"[A-Za-z]{3,}", re.sub(r"\{[^}]*\}|\w+[_/]\w+", "", text)))
 
 
 def fields(text):
@@ -68,11 +70,11 @@ def fields(text):
 
 
 def strings(node):
-    """The strings that an argument may be; an f-string, which no table can have, as its beginning."""
+    """The strings that an argument may be; an f-string, which no table can have, as it stands in the program."""
     if isinstance(node, ast.Constant) and isinstance(node.value, str):
         yield node.value
     elif isinstance(node, ast.JoinedStr):
-        yield f"f-string: {ast.unparse(node)}"
+        yield ast.unparse(node)
     elif isinstance(node, ast.IfExp):
         yield from strings(node.body)
         yield from strings(node.orelse)
@@ -133,38 +135,38 @@ def of_tables():
     return said.union(settings, *(table.values() for table in tables))
 
 
+def assigned(module):
+    """Name → the strings that a module assigns to it."""
+    named = {}
+    for node in nodes(ast.Assign)[module]:
+        if isinstance(node.targets[0], ast.Name):
+            named.setdefault(node.targets[0].id, set()).update(strings(node.value))
+    return named
+
+
 def of_program():
-    """What the program says in sentences: each `Text`, and what the functions of SAYING are given."""
+    """What the program says in sentences: each `Text`, errors of files, and what the functions of SAYING are given."""
     found = of_analyses() | of_tables()
-    refusals = errors(LevilabError)
-    for name, calls in nodes(ast.Call).items():
-        named = {}
-        for node in nodes(ast.Assign)[name]:
-            if isinstance(node.targets[0], ast.Name):
-                known = (text for text in strings(node.value) if not text.startswith("f-string"))
-                named.setdefault(node.targets[0].id, set()).update(known)
+    refusals, usage = {*errors(LevilabError), "refuse"}, errors(UsageError)
+    for name, calls in ((name, calls) for name, calls in nodes(ast.Call).items() if name.startswith("levilab.")):
+        named = assigned(name)
         for call in calls:
             called = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
-            has_values = called in refusals and {word.arg for word in call.keywords} - NO_VALUES
-            said = call.args if has_values else call.args[: called in {"Text", "title_of"}]
-            if said and name.startswith("levilab."):
-                found |= {text for one in said for text in (*strings(one), *named.get(ast.unparse(one), ()))}
-            elif called in SAYING and name.startswith(ROOMS) and len(call.args) > SAYING[called]:
-                found |= {*strings(call.args[SAYING[called]])}
+            said = call.args[: called in {"Text", "Said", "title_of"}]
+            if called in refusals and (name.startswith(OF_FILES) or {word.arg for word in call.keywords} - NO_VALUES):
+                said = call.args[called in usage :]
+            elif called in SAYING and name.startswith(ROOMS):
+                said = call.args[SAYING[called] :][:1]
+            found |= {text for one in said for text in (*strings(one), *named.get(ast.unparse(one), ()))}
     return found
 
 
 @pytest.mark.parametrize("code", LANGUAGES)
 def test_a_language_has_every_text(code):
-    assert sorted(text for text in of_pages() if is_worded(text) and text not in language_of(code).page) == []
-    assert (
-        sorted(
-            text
-            for text in of_program() | of_worksheets() | of_files()
-            if is_worded(text) and text not in language_of(code).texts
-        )
-        == []
-    )
+    page, texts = language_of(code).page, language_of(code).texts
+    said = of_program() | of_worksheets() | of_files()
+    assert sorted(text for text in of_pages() if is_worded(text) and text not in page) == []
+    assert sorted(text for text in said if is_worded(text) and text not in texts) == []
 
 
 @pytest.mark.parametrize("code", LANGUAGES)
@@ -189,12 +191,8 @@ def settings_fields():
 def test_no_text_is_of_a_sentence_that_is_said_no_more(code):
     samples = ast.walk(ast.parse((SAMPLE_DATA / "make.py").read_text("utf-8")))
     constants = (node for found in (*nodes(ast.Constant).values(), samples) for node in found)
-    said = (
-        of_pages()
-        | of_worksheets()
-        | of_files()
-        | {node.value for node in constants if isinstance(getattr(node, "value", None), str)}
-    )
+    said = of_pages() | of_worksheets() | of_files()
+    said |= {node.value for node in constants if isinstance(getattr(node, "value", None), str)}
     said |= {re.sub(r"(_frequency)?_(hz|v|t|m|s)$", "", text).replace("_", " ") for text in said}  # heads of columns
     said |= {split(name)[0].replace("_", " ") for name in settings_fields()}
     said |= {re.sub(r"\s+\[[^]]+\]$", "", text) for text in said}  # heads of columns without the unit
