@@ -109,13 +109,17 @@ def as_text(study: Study, symbols: Mapping[str, str] | None = None) -> str:
             Text("Values and uncertainties of this analysis are right for readings such as these{so_far}.", so_far)
         )
     else:
-        wrong = tuple(_name(one.quantity, {}) for one in study.spreads if one.verdict is Verdict.WRONG)
-        texts.append(
-            Text("For readings such as these the analysis is not right in {wrong}: trust its u the less.", wrong=wrong)
-        )
+        texts.append(not_right_as_text(study, symbols or {}))
     texts += [*_about_laws(study), *_about_student(study, symbols or {})]
     texts += study.more
     return Sentences(*texts, *failures_as_text(study))
+
+
+def not_right_as_text(study: Study, symbols: Mapping[str, str]) -> str:
+    """Return in which quantities the pulls find the analysis wrong; empty where they do not."""
+    wrong = [_name(one.quantity, symbols) for one in study.spreads if one.verdict is Verdict.WRONG]
+    said = "For readings such as these the analysis is not right in {wrong}: trust the stated u of {wrong} less."
+    return Text(said, wrong=enumeration(wrong)) if wrong else ""
 
 
 def _about_laws(study: Study) -> Iterator[str]:

@@ -8,7 +8,8 @@ from typing import Any, Literal
 
 from levilab.crosscheck.own.study import OWN, quick_study
 from levilab.crosscheck.stored import read_study
-from levilab.crosscheck.table import blocks_of
+from levilab.crosscheck.study import Study
+from levilab.crosscheck.table import blocks_of, not_right_as_text
 from levilab.errors import unquote
 from levilab.pipelines.analyzed import A, Analyzed
 from levilab.pipelines.document import Analysis
@@ -103,6 +104,9 @@ def blocks_of_part(
         )
         for doubtful in (True, False)
     )
+    study = _study(analysis, found, made=asked.crosscheck)
+    not_right = not_right_as_text(study, analysis.symbols) if study else ""
+    grave = (*([(not_right,)] if not_right else []), *grave)
     doubts = [Warnings(grave)] if grave else []
     of = class_of(analysis, found) if len({source.group for source in found.sources if source.group}) > 1 else None
     why = ["levilab class says why."] if of and any(one.word != GOOD for one in of.marks) else []
@@ -118,7 +122,7 @@ def blocks_of_part(
         blocks += [section("Notes and conditions" if under else "Notes", "notes", *both)] if both else []
     else:
         blocks += [section("Notes", "notes", Warnings(notes))] if notes else []
-        blocks += [_budget(analysis, found), *_trials(analysis, found, made=asked.crosscheck)]
+        blocks += [_budget(analysis, found), *_trials(analysis, found, study, made=asked.crosscheck)]
         blocks += [section(part.runs_title, "runs", *part.runs)] if part.runs else []
     return with_marks(blocks, mark_of(found.sources))
 
@@ -129,22 +133,27 @@ def _budget(analysis: Analysis[A], found: A) -> Section:
     return Section("Uncertainty budget", analysis.budgets(found), anchor="budget", lead=lead)
 
 
-def _trials(analysis: Analysis[Any], found: Any, *, made: bool) -> Iterable[Section]:
-    """Yield the cross-check that `levilab crosscheck --like` made of this result.
+def _study(analysis: Analysis[Any], found: Any, *, made: bool) -> Study | None:
+    """Return the cross-check that `levilab crosscheck --like` made of this result.
 
     made: where there is none, whether one is made of as many trials as a report has time for.
     """
     settings = analysis.settings_of(found)
     study = read_study(found.place, analysis.name, [source.sha256 for source in found.sources], settings)
-    made = made and study is None and analysis.name in OWN
-    if made:
-        study = quick_study(analysis.name, found, settings)
+    return quick_study(analysis.name, found, settings) if made and study is None and analysis.name in OWN else study
+
+
+def _trials(analysis: Analysis[Any], found: Any, study: Study | None, *, made: bool) -> Iterable[Section]:
+    """Yield the cross-check of this result; made: where there is none, how it is made."""
     named = " ".join(paths_in_commands(found.sources))
     why = Paragraph("Not made: it takes longer than a report. This makes and keeps it:")
-    advice = (why, Code(f"levilab crosscheck {analysis.name} --like {named}")) if made else ()
+    advice = (why, Code(f"levilab crosscheck {analysis.name} --like {named}")) if made and analysis.name in OWN else ()
     blocks = blocks_of(study, analysis.symbols) if study else advice
     if blocks:
-        lead = "Readings drawn with these values, times and scatters, through the same analysis: is it right here?"
+        lead = (
+            "Synthetic readings with the values, times and scatter of this result went through the same analysis: does "
+            "it find these values, and are its u right?"
+        )
         yield Section("Cross-check with these parameters", tuple(blocks), anchor="crosscheck", lead=lead)
 
 

@@ -16,6 +16,9 @@ from levilab.crosscheck.subject import Trial
 from levilab.crosscheck.table import as_text, crosscheck_table
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.present.document.blocks import Warnings
+from levilab.report.document import document_of
+from levilab.report.reproduction import Asked
 from support.paths import ROOT
 
 CHEAP = (
@@ -148,17 +151,24 @@ def test_the_table_says_what_is_wanted_of_each_row(runs):
     assert "not judged" not in as_text(many)
 
 
-def test_a_wrong_analysis_is_named(monkeypatch, sample_data):
+def test_a_wrong_analysis_is_named_and_begins_each_report(monkeypatch, sample_data, tmp_path):
     def off(random):
         trial = real.trial(random)
         return Trial([replace(one, u=one.u / 2) for one in trial.pulls])
 
-    found = result("limit", sample_data / "lower-limits")
+    shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
+    found = result("limit", tmp_path / "run")
     real = OWN["limit"](found)
     monkeypatch.setattr("levilab.crosscheck.own.study.OWN", {"limit": lambda _: Own("wrong", off, 0.001)})
-    checked = study_result("limit", found, {}, 100)
+    checked = study_result("limit", found, (row := ANALYSES["limit"]).settings_of(found), 100)
     assert not checked.holds
-    assert "not right in mean" in as_text(checked)
+    said = "For readings such as these the analysis is not right in mean: trust the stated u of mean less."
+    assert said in as_text(checked)
+    for stored in (False, True):
+        for short in (False, True):
+            result_first, *_ = document_of([(row, found)], (), Asked(short=short, crosscheck=False)).blocks
+            assert (result_first.blocks[0] == Warnings(((said,),))) is stored
+        store([checked], found.place)
     assert crosscheck_table([checked]).rows[0].cells[-1] == "NO"
 
 
