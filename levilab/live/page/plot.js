@@ -336,7 +336,7 @@ export function drawRecords(paper, records, source) {
     const more = Math.max(0, (LEAST_SPAN_V - (to - from)) / 2);  // noise alone does not fill the screen
     const [lowest, highest] = [from - more, to + more];
     const floor = (channel + 1) * band - Math.min(7, band / 8);  // above the signal stands what it is, on a low screen across it
-    const ceiling = channel * band + Math.min(24, band / 4);
+    const ceiling = channel * band + (band < 36 ? band / 4 : Math.min(24, band / 2));
     const toX = (k) => (one.start_s + (k + 0.5) * one.step_s - begin) / (end - begin) * width;
     const toY = (value) => floor - (value - lowest) / (highest - lowest) * (floor - ceiling);
     const old = one.said ? `, ${one.said}` : "";
@@ -353,7 +353,7 @@ export function drawRecords(paper, records, source) {
     c.fillStyle = c.strokeStyle;
     c.textAlign = "left";
     c.textBaseline = "top";
-    c.fillText(`${phrase(one.channel)}  ${short(from, 2)} … ${short(to, 2)} V${old}`, 8, channel * band + 6);
+    c.fillText(`${phrase(one.channel)}  ${short(from, 2)} … ${short(to, 2)} V${old}`, 8, channel * band + Math.min(6, band / 12));
     said.push(phrase("{channel} from {low} to {high} volts", {channel: phrase(one.channel), low: short(from, 2), high: short(to, 2)}) + old);
   });
   c.fillStyle = paint.dim;

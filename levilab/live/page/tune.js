@@ -22,6 +22,7 @@ export function openTune(token) {
     write("tune-why", found.why);
     put(by("tune-did"), {hidden: false});
     by("tune-trials").replaceChildren(...trials.map((text) => make("li", text.replace(/[a-z]+$/, (name) => document.querySelector(`#tune-did [value=${name}]`).textContent))));
+    for (const id of ["tune-trials", "tune-text"]) by(id).scrollIntoView({block: "nearest"});  // at once: no motion
   }
 
   by("tune-ask").addEventListener("click", advise);

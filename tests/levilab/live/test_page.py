@@ -446,14 +446,14 @@ TRIGGERED = """async (source) => {
 }"""
 
 
-#: How far a pulse of light rises above the lowest point on a screen of a height.
+#: How far a pulse of light rises above the lowest point on a screen of a height, and how far it stays below the edge.
 RISE = """async (height) => {
   const {drawRecords} = await import("/page/plot.js"), drawn = [];
   const context = new Proxy({}, {get: (_, name) => (x, y) => name === "lineTo" && drawn.push(y), set: () => true});
   const low = Float32Array.from({length: 9}, (_, k) => k === 4 ? 1.2 : 0.1);
   const records = ["drive", "laser", "tape"].map((channel) => ({channel, low, high: low, start_s: 0, step_s: 0.01}));
   drawRecords({context, fit: () => [240, height]}, records, "tape");
-  return (drawn.at(-1) - drawn.at(-5)) / height;
+  return [(drawn.at(-1) - drawn.at(-5)) / height, drawn.at(-5) - height * 2 / 3];
 }"""
 
 
@@ -465,7 +465,8 @@ def test_the_page_triggers_what_a_virtual_bench_draws(shown):
         assert min(abs(drive - k / 30) for k in range(3)) < 5e-6
         assert said == "triggered by the drive"
     assert [said for *_, said in shown.evaluate(TRIGGERED, "off")] == 3 * ["triggered by the tape"]
-    assert all(shown.evaluate(RISE, height) > 0.6 / 3 for height in (60, 90, 400))  # of the lane, the last of three
+    assert all(shown.evaluate(RISE, height)[0] > 0.6 / 3 for height in (60, 90, 400))  # of the lane, the last of three
+    assert all(shown.evaluate(RISE, height)[1] >= 18 for height in (108, 132, 400))  # a line of 12 px, below 6 px
 
 
 def test_a_million_readings_are_drawn_from_a_few_thousand_numbers(served, page, tmp_path):
