@@ -156,9 +156,9 @@ def test_a_loop_on_the_amplitude_holds_the_spin_in_both_simulators():
 
     peer = Peer(MOTOR)
     peer.loop = loop
-    other = peer.spin(peer.run(start_of(MOTOR), 3.0))
+    other = peer.spin(peer.run(start_of(MOTOR), 2.0))
     scene, state, memory, spins = MOTOR, None, None, []
-    for _ in range(3):
+    for _ in range(2):
         motion = simulate(scene, 1.0, rate=None, start=state, memory=memory, tolerance=1e-9)
         state, memory = motion.states[-1], motion.memory
         spins.append(motion.spin_hz[-1])

@@ -66,6 +66,7 @@ def test_results_that_lack_numbers_are_recalled_too(tmp_path, fitted, n):
     before = analyzed(spin_down_csv(tmp_path / "my.csv", n=n, u=n != 4))
     after = recall_spindowns([tmp_path / "my.csv"], SpinDownOptions())
     assert fitted == []
+    assert before.all_warnings  # of what they cannot tell
     assert SPINDOWN.document(after, tmp_path) == SPINDOWN.document(before, tmp_path)
 
 

@@ -66,6 +66,11 @@ def test_the_sample_has_the_geometric_magnetism_of_its_top(found):
     assert "excluded" in found.text
     assert found.all_warnings == []
     assert [one.frequency.size for one in found.runs[0].swings[:3]] == [3, 3, 3]
+    joint = geometry.joint
+    assert abs(joint.ratio.value - 1) < 3 * joint.ratio.u
+    # its height is that at which a top floats lower by its swings, as B′/2B of the base is
+    assert joint.gradient.value == pytest.approx(geometry.of_base.value, rel=2e-3)
+    assert joint.chi_square < joint.freedom + 4 * np.sqrt(2 * joint.freedom)  # 4 standard deviations of χ²
 
 
 def test_a_view_from_below_gives_the_same_with_a_note(window, tmp_path):
@@ -123,14 +128,6 @@ def test_two_probes_beside_the_top_show_the_split_but_not_the_sense(window, tmp_
     assert abs(ran.geometry.measured.value - TRUE_HZ) < 3 * ran.geometry.measured.u
     assert "sense of the spin" in " ".join(probes.all_warnings)
     assert ran.swings[0].amplitude[:2] == pytest.approx(film.swings[0].amplitude[:2], rel=0.15)
-
-
-def test_all_lines_together_agree_with_the_split(found):
-    joint = found.runs[0].geometry.joint
-    assert abs(joint.ratio.value - 1) < 3 * joint.ratio.u
-    # its height is that at which a top floats lower by its swings, as B′/2B of the base is
-    assert joint.gradient.value == pytest.approx(found.runs[0].geometry.of_base.value, rel=2e-3)
-    assert joint.chi_square < joint.freedom + 4 * np.sqrt(2 * joint.freedom)  # 4 standard deviations of χ²
 
 
 def test_a_mark_on_the_end_of_the_stem_is_noticed(tmp_path):
