@@ -17,8 +17,8 @@ from hypothesis import settings
 
 from support.one_compiler import compile_each_kernel_once
 
-#: The fixtures of tests of pages.
-pytest_plugins = ["support.browser"]
+#: The fixtures of tests of pages, and a hook for all folders.
+pytest_plugins = ["support.browser", "support.doctests"]
 
 #: Makes the golden data, with a package that the tests do not need.
 collect_ignore = ["golden/make_trajectories.py"]
@@ -81,11 +81,13 @@ def pytest_collection_modifyitems(items):
         [(tests / name).resolve() for name in names.split()] for names in (SLOW, VERSIONED, LONGEST)
     )
     assert all(path.exists() for path in slow + versioned + longest), "tests/conftest.py names a file that is gone"
-    is_slow = functools.cache(lambda file: any(file.is_relative_to(path) for path in slow))
+    is_slow, is_versioned = (
+        functools.cache(lambda file, paths=paths: any(map(file.is_relative_to, paths))) for paths in (slow, versioned)
+    )
     for item in items:
         if is_slow(item.path):
             item.add_marker(pytest.mark.slow)
-        if item.get_closest_marker("slow") and not any(item.path.is_relative_to(room) for room in versioned):
+        if item.get_closest_marker("slow") and not is_versioned(item.path):
             item.add_marker(pytest.mark.any_python)
     items.sort(key=lambda item: (item.path not in longest, item.get_closest_marker("slow") is None))
 
