@@ -3,7 +3,7 @@
 import {command, connect, load, read, takeToken} from "./connection.js";
 import {takeDrops} from "./drop.js";
 import {drawHistory, openHistory} from "./history.js";
-import {drawReadings, drawRecords, saidOf, sheet, tableOf} from "./plot.js";
+import {drawReadings, drawRecords, saidOf, sheet, tableOf, titled} from "./plot.js";
 import {openPractice, watchPractice} from "./practice.js";
 import {openTune} from "./tune.js";
 import {openSound} from "./sound.js";
@@ -529,8 +529,14 @@ by("strobe").addEventListener("change", strobe);
 by("replay").addEventListener("click", () => space?.replay?.());
 if (matchMedia("(prefers-reduced-motion: reduce)").matches) by("motion").value = "0";
 by("sound").addEventListener("change", () => sound.play(by("sound").checked));
-by("csv").addEventListener("click", () => save(new Blob([isOfMinutes() ? history.table() : tableOf(data.readings)], {type: "text/csv"}), "csv"));
-by("png").addEventListener("click", () => by("plot").toBlob((picture) => save(picture, "png")));
+const isMadeUp = () => !by("synthetic").hidden;
+by("csv").addEventListener("click", () => save(new Blob([isMadeUp() ? "# SYNTHETIC\n" : "", isOfMinutes() ? history.table() : tableOf(data.readings)], {type: "text/csv"}), "csv"));
+by("png").addEventListener("click", () => {
+  const [title, found] = isOfMinutes() ? [phrase("The last minutes"), {}] : [[data.about?.group, seen.run].filter(Boolean).join(", "), !data.hidden && data.found || {}];
+  const drawn = [isOfMinutes() ? "" : `○ ${phrase("Readings")}`, found.head && `${data.fit ? "― " : ""}${found.head}`].filter(Boolean).join("     ");
+  const texts = [title + (isMadeUp() ? ` (${by("synthetic").textContent})` : ""), drawn, ...found.lines ?? []];
+  titled(by("plot"), texts.filter(Boolean)).toBlob((picture) => save(picture, "png"));
+});
 by("netcdf").addEventListener("click", async () => {
   put(by("netcdf"), {disabled: true});
   const answer = await load(`run/${encodeURIComponent(seen.run)}/export`, token);

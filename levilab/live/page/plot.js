@@ -26,6 +26,23 @@ export function sheet(canvas) {
   };
 }
 
+/** A picture of a canvas on its ground, below a title and other lines. */
+export function titled(canvas, [title, ...lines]) {
+  const copy = document.createElement("canvas"), c = copy.getContext("2d"), ratio = canvas.width / canvas.clientWidth, paint = colours();
+  const above = 18 * (lines.length + 1) + 8;
+  [copy.width, copy.height] = [canvas.width, canvas.height + Math.round(above * ratio)];
+  c.fillStyle = paint.panel;
+  c.fillRect(0, 0, copy.width, copy.height);
+  c.drawImage(canvas, 0, copy.height - canvas.height);
+  c.scale(ratio, ratio);
+  c.fillStyle = paint.ink;
+  for (const [k, text] of [title, ...lines].entries()) {
+    c.font = k ? FONT : `bold ${FONT}`;
+    c.fillText(text, 12, 18 * (k + 1));
+  }
+  return copy;
+}
+
 /** Return about `count` round numbers from low to high, and no fewer than two. */
 export function ticks(low, high, count) {
   if (!(high > low)) return [low];
@@ -212,7 +229,7 @@ export function saidOf(data, drawn, k) {
 /** What is drawn of readings as a table of text, in the units of the axes; of many readings the lowest and the highest. */
 export function tableOf({x, low, high, u, single, xAxis, yAxis}) {
   const name = ([label, unit]) => `${label}${unit ? ` [${unit}]` : ""}`.replaceAll(",", "");
-  const heads = single ? [name(xAxis), name(yAxis), ...u ? [`u of ${name(yAxis)}`] : []] : [name(xAxis), `lowest ${name(yAxis)}`, `highest ${name(yAxis)}`];
+  const heads = single ? [name(xAxis), name(yAxis), ...u ? [`u ${name(yAxis)}`] : []] : [name(xAxis), `lowest ${name(yAxis)}`, `highest ${name(yAxis)}`];
   const rows = Array.from(x, (value, k) => {
     const values = single ? [low[k] * yAxis[2], ...u ? [u[k] * yAxis[2]] : []] : [low[k] * yAxis[2], high[k] * yAxis[2]];
     return [value * xAxis[2], ...values].map((one) => Number(one.toPrecision(8))).join(",");

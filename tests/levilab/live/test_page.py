@@ -7,6 +7,8 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 import pytest
 
+from levilab.formats.table import read_table
+from levilab.formats.understanding import SPIN
 from levilab.telemetry.messages import Count, Counting, Drive, Poses, Record, State
 from support.browser import DESK, PHONE, watch
 from support.live_pages import GrowingRun, address, publish, serving, spin_down, until
@@ -329,6 +331,36 @@ def test_a_count_that_is_old_is_marked_as_old(served, page, tmp_path):
         assert page.inner_text("#lock") == "not counted now"
 
 
+#: Keep the texts that canvases get.
+KEEP_TEXTS = """() => {
+  const draw = CanvasRenderingContext2D.prototype.fillText;
+  window.written = [];
+  CanvasRenderingContext2D.prototype.fillText = function (text, ...where) {
+    window.written.push(text);
+    draw.call(this, text, ...where);
+  };
+}"""
+
+
+def save_what_is_drawn(page, run, folder):
+    """What is synthetic says so in a table, which is read like any other, and in a picture."""
+    with page.expect_download() as saved:
+        page.click("#csv")
+    assert saved.value.suggested_filename == f"{run.folder.name}.csv"
+    saved.value.save_as(folder / "saved.csv")
+    assert (folder / "saved.csv").read_text().startswith("# SYNTHETIC\ntime [s],spin [Hz],u spin [Hz]\n")
+    read = read_table(folder / "saved.csv", quantities=SPIN).columns
+    table = np.column_stack([read[name] for name in SPIN])
+    np.testing.assert_allclose(table, spin_down(3), rtol=1e-6)  # single precision on the way to the page
+    page.evaluate(KEEP_TEXTS)
+    with page.expect_download() as saved:
+        page.click("#png")
+    picture = saved.value.path().read_bytes()
+    assert picture.startswith(b"\x89PNG")
+    assert int.from_bytes(picture[20:24]) >= page.evaluate("document.getElementById('plot').height") + 3 * 18
+    assert {f"{run.folder.name} (SYNTHETIC)", "○ Readings     no fit"} <= set(page.evaluate("window.written"))
+
+
 def test_a_fall_is_replayed_and_what_is_drawn_is_saved(served, watched, tmp_path):
     """Where less motion is wanted the page shows a picture a second, a replay too."""
     run = GrowingRun(tmp_path)
@@ -356,18 +388,11 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(served, watched, tmp_path
     with page.expect_download() as saved:
         page.click("#csv")
     rows = saved.value.path().read_text().splitlines()
-    assert rows[0] == "bench_time_s,spin_frequency_hz,drive_frequency_hz"
-    assert rows[1:] == ["0.75,22.6,", "1,,", "2,,"]  # the count at the middle of its gate, and when it was looked
+    assert rows[:2] == ["# SYNTHETIC", "bench_time_s,spin_frequency_hz,drive_frequency_hz"]
+    assert rows[2:] == ["0.75,22.6,", "1,,", "2,,"]  # the count at the middle of its gate, and when it was looked
     run.readings(spin_down(3))
     until(page, "levilab.data.count === 3")
-    with page.expect_download() as saved:
-        page.click("#csv")
-    assert saved.value.suggested_filename == f"{run.folder.name}.csv"
-    table = np.loadtxt(saved.value.path(), delimiter=",", skiprows=1)
-    np.testing.assert_allclose(table, spin_down(3), rtol=1e-6)  # single precision on the way to the page
-    with page.expect_download() as saved:
-        page.click("#png")
-    assert saved.value.path().read_bytes().startswith(b"\x89PNG")
+    save_what_is_drawn(page, run, tmp_path)
     assert page.evaluate("levilab.space.replays")
     later = GrowingRun(tmp_path, "20261122T110000Z-spin-0000")
     watch.turn_to(later.folder)
