@@ -98,6 +98,10 @@ class Ambiguous(TableError):
         super().__init__(path, message)
 
 
+class DoubtfulRows(TableError):
+    """A table with rows that are no readings, which `skip_doubtful` leaves out."""
+
+
 @dataclass(frozen=True)
 class Column:
     """A column that is used.
@@ -146,14 +150,15 @@ class Doubt:
     """A question about a table.
 
     Attributes:
-        kind: "unit" (of a column), "column" (which one holds a quantity), "titles" (the table has none that is known).
+        kind: "unit" (of a column), "column" (which one holds a quantity), "titles" (the table has none that is known),
+            "rows" (some are no readings; the answer is `skip_doubtful`).
         text: for people, with the values that were seen.
         column: 0-based index of the column that it is about; None where it is about several.
         choices: the answers, the likeliest first.
         open: whether more than the first answer is likely.
     """
 
-    kind: Literal["unit", "column", "titles"]
+    kind: Literal["unit", "column", "titles", "rows"]
     text: str
     column: int | None
     choices: tuple[Choice, ...]

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.formats.columns import Column, TableError, shorten
+from levilab.formats.columns import Column, DoubtfulRows, TableError, shorten
 from levilab.formats.dialect import (
     CLOCK,
     MISSING,
@@ -240,7 +240,7 @@ def _notes_on_refused(
         may_skip: whether they could be.
 
     Raises:
-        TableError: of the first line, where they are not.
+        TableError: of the first line, where they are not; DoubtfulRows, if they could be.
     """
     numbers = [str(error.line) for error, _ in doubtful]
     places = ", ".join([*numbers[:_MOST_NAMED], *["…"] * (len(numbers) > _MOST_NAMED)])
@@ -248,7 +248,8 @@ def _notes_on_refused(
         error, _ = doubtful[0]
         also = Said(" (also in {lines})", how_many(len(numbers) - 1, "other line")) if len(numbers) > 1 else ""
         do = "; `skip_doubtful` leaves such rows out" if may_skip and len(doubtful) < read else ""
-        raise TableError(error.path, "{wrong}{also}{do}", error.message, also, do, line=error.line)
+        kind = DoubtfulRows if do else TableError
+        raise kind(error.path, "{wrong}{also}{do}", error.message, also, do, line=error.line)
     if doubtful:
         many = "{n} doubtful rows are left out, as asked: lines {places:s}"
         one = "{n} doubtful row is left out, as asked: line {places:s}"

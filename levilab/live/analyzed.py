@@ -85,7 +85,8 @@ class Analyses:
                 self.running[path] = words[0]
                 status, err = self.carry_out(words)
                 if status:
-                    self.failed[path] = err.strip()[-600:] or f"levilab {words[0]} failed"
+                    said = err.strip().removeprefix("levilab: ").replace(str(path), path.name)[-600:]
+                    self.failed[path] = said or f"levilab {words[0]} failed"
                     return
         except subprocess.TimeoutExpired:
             self.failed[path] = Text(

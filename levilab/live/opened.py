@@ -68,8 +68,9 @@ class OpenedFile:
     def words(self) -> list[str]:
         """The options on the command line."""
         columns = ",".join(f"{key}={to}" for key, to in (self.options.get("columns") or {}).items())
-        given = {**self.options, "columns": columns or None}
-        return [word for key, value in given.items() if value is not None for word in (f"--{key}", str(value))]
+        given = {**self.options, "columns": columns or None, "skip_doubtful": None}
+        words = [word for key, value in given.items() if value is not None for word in (f"--{key}", str(value))]
+        return [*words, *["--skip-doubtful"] * bool(self.options.get("skip_doubtful"))]
 
     @property
     def words_of_film(self) -> list[str]:

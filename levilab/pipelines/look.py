@@ -11,6 +11,7 @@ import numpy as np
 
 from analysis.numbers import digits
 from levilab.errors import LevilabError
+from levilab.formats.columns import Choice, Doubt, DoubtfulRows
 from levilab.formats.table import read_table
 from levilab.formats.texts import locate
 from levilab.formats.titles import COMPONENTS, MAGNITUDE
@@ -113,16 +114,16 @@ def look_at(path: Path, options: Mapping[str, Any], *, plots: bool = True) -> Lo
 
     Args:
         path: the file, or a sheet or run in it.
-        options: columns, channel and rate by their names.
+        options: columns, skip_doubtful, channel and rate by their names.
         plots: whether small plots are made, for which a table is read.
     """
     columns = options.get("columns")
     try:
         record = read_record(path, columns=columns, rate=options.get("rate"))
     except NoWaveform:
-        return _look_at_table(path, columns, plots=plots)
+        return _look_at_table(path, options, plots=plots)
     except LevilabError as error:
-        look = _look_at_table(path, columns, plots=plots)
+        look = _look_at_table(path, options, plots=plots)
         return look if not look.problem else Look(path, "", look.runs, text_of(error))
     try:
         return _look_at_record(path, record, options.get("channel"))
@@ -150,15 +151,26 @@ def look_as_kept(path: Path, options: Mapping[str, Any], *, plots: bool = True) 
     return Look(path, _count_tables(runs), runs, problem, plots={k: plot for k, plot in enumerate(drawn) if plot})
 
 
-def _look_at_table(path: Path, columns: Mapping[str, str] | None, *, plots: bool) -> Look:
+def _look_at_table(path: Path, options: Mapping[str, Any], *, plots: bool) -> Look:
+    columns = options.get("columns")
     seen = [(wanted, understand(path, columns=columns, quantities=wanted[0], needed=wanted[1])) for wanted in _TABLES]
     wanted, found = next(((wanted, one) for wanted, one in seen if not one.problem), (_SPIN_DOWN, seen[2][1]))
     if found.problem:
         return Look(path, Text("a table"), _with_known_columns(path, found.runs, columns), found.problem)
     if not plots:
         return Look(path, _count_tables(found.runs), found.runs)
-    drawn = {k: plot for k, run in enumerate(found.runs) if (plot := _plot_of_table(run, columns, wanted))}
-    return Look(path, _count_tables(found.runs), found.runs, plots=drawn)
+    given = {name: options[name] for name in ("columns", "skip_doubtful") if options.get(name)}
+    runs, drawn = list(found.runs), dict[int, Plot | None]()
+    for k, run in enumerate(runs):
+        try:
+            drawn[k] = _plot_of_table(run, given, wanted)
+        except DoubtfulRows as error:
+            doubt = Doubt("rows", text_of(error), None, (Choice(Text("Leave such rows out"), {}),))
+            runs[k] = replace(run, doubts=(doubt,), problem=doubt.text)
+        except LevilabError:
+            continue
+    problem = "" if any(not run.problem for run in runs) else runs[0].problem
+    return Look(path, _count_tables(runs), tuple(runs), problem, plots={k: plot for k, plot in drawn.items() if plot})
 
 
 def _count_tables(runs: Sequence[UnderstoodRun]) -> str:
@@ -174,14 +186,11 @@ def _with_known_columns(
     return tuple(replace(run, columns=found.get(run.path, run.columns)) for run in runs)
 
 
-def _plot_of_table(run: UnderstoodRun, columns: Mapping[str, str] | None, wanted: tuple[Any, Any]) -> Plot | None:
-    """Return the first two quantities of a table, one against the other; None where it is not read, or too large."""
+def _plot_of_table(run: UnderstoodRun, given: Mapping[str, Any], wanted: tuple[Any, Any]) -> Plot | None:
+    """Return the first two quantities of a table, one against the other; None: too large.  Raises LevilabError."""
     if run.problem or _size_of(run.path) > _LARGEST:
         return None
-    try:
-        table = read_table(run.path, columns=columns, quantities=wanted[0], needed=wanted[1])
-    except LevilabError:
-        return None
+    table = read_table(run.path, quantities=wanted[0], needed=wanted[1], **given)
     names = [name for name in wanted[0] if name in table.columns and name in QUANTITIES]
     if "drive_frequency_hz" in wanted[1]:
         names = list(wanted[1])

@@ -61,7 +61,7 @@ const correct = (options) => lookAt({do: "look at a file", file: look.file, opti
 // --- what is shown ---
 
 /** A message of the server: the file by its name, and options as they stand here. */
-const inWords = (text) => text.replaceAll(look.path, look.name).replaceAll(/`(\w+)`( =)?/g, "$1");
+const inWords = (text) => text.replaceAll(look.path, look.name).replaceAll("`skip_doubtful`", phrase("the button below")).replaceAll(/`(\w+)`( =)?/g, "$1");
 
 function show() {
   by("file").hidden = false;
@@ -102,8 +102,8 @@ const wordsOf = (quantity) => phrase(quantities[quantity]?.words || quantity);
 function doubtOf({kind, text, choices}) {
   const box = make("div", "", "doubt");
   box.setAttribute("role", "group");
-  box.setAttribute("aria-label", text);
-  box.append(make("p", text));
+  box.setAttribute("aria-label", inWords(text));
+  box.append(make("p", inWords(text)));
   if (kind === "titles") {  // each column could be each of them: the table below has the choice
     box.append(make("p", phrase("Choose below what the columns are.")));
     return box;
@@ -111,7 +111,7 @@ function doubtOf({kind, text, choices}) {
   const row = make("div", "", "row");
   for (const choice of choices) {
     const button = make("button", choice.text);
-    button.addEventListener("click", () => correct({...optionsNow(), columns: {...columnsNow(), ...canonical(choice.columns)}}));
+    button.addEventListener("click", () => correct({...optionsNow(), ...kind === "rows" ? {skip_doubtful: true} : {columns: {...columnsNow(), ...canonical(choice.columns)}}}));
     row.append(button);
   }
   box.append(row);

@@ -29,8 +29,7 @@ export function sheet(canvas) {
 /** A picture of a canvas on its ground, below a title and other lines. */
 export function titled(canvas, [title, ...lines]) {
   const copy = document.createElement("canvas"), c = copy.getContext("2d"), ratio = canvas.width / canvas.clientWidth, paint = colours();
-  const above = 18 * (lines.length + 1) + 8;
-  [copy.width, copy.height] = [canvas.width, canvas.height + Math.round(above * ratio)];
+  [copy.width, copy.height] = [canvas.width, canvas.height + Math.round((18 * lines.length + 26) * ratio)];
   c.fillStyle = paint.panel;
   c.fillRect(0, 0, copy.width, copy.height);
   c.drawImage(canvas, 0, copy.height - canvas.height);

@@ -140,7 +140,7 @@ def test_a_choice_in_the_table_changes_how_it_is_read(hall, watched):
     page = watched(viewport=PHONE, color_scheme="dark")
     file = hall.root.parent / "three.csv"
     rows = (f"{t},{60 * f:.3f},{k}\n" for k, (t, f) in enumerate(zip(TIME, SPIN, strict=True)))
-    file.write_text("A,B,C\n" + "".join(rows))
+    file.write_text("A,B,C\n" + "".join(rows).replace("\n30.0,", "\n30.0,2l34,2\n30.0,"))
     key = hall.opened.add(file)
     page.goto(f"{address(hall)}open?file={key}#{hall.doors.token}")
     until(page, "window.levilab?.look")
@@ -149,7 +149,11 @@ def test_a_choice_in_the_table_changes_how_it_is_read(hall, watched):
     page.get_by_label("what B is").select_option("spin frequency")
     until(page, "levilab.look.options.columns?.f === '2'")
     page.get_by_label("unit of B").select_option("rpm")
+    until(page, "document.querySelector('.doubt')?.textContent.startsWith('three.csv, line 5: ')")
+    assert page.get_by_role("button", name="Analyze").is_disabled()
+    page.get_by_role("button", name="Leave such rows out").click()
     until(page, "levilab.look.plots['0']?.y[0] < 40")
+    assert page.inner_text("#command").endswith(" --skip-doubtful")
     assert page.evaluate("levilab.look.plots['0'].y[0]") == pytest.approx(38, abs=0.01)
     assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     page.get_by_role("button", name="Undo corrections").click()
@@ -299,5 +303,5 @@ def test_a_film_is_followed_in_its_pictures_once_its_scale_is_known(hall, watche
 
 
 def test_the_words_of_a_file_are_options_of_the_command_line(tmp_path):
-    one = OpenedFile(tmp_path, {"columns": {"t": "1", "f": "2 [rpm]"}, "rate": 100.0})
-    assert one.words == ["--columns", "t=1,f=2 [rpm]", "--rate", "100.0"]
+    one = OpenedFile(tmp_path, {"columns": {"t": "1", "f": "2 [rpm]"}, "skip_doubtful": True, "rate": 100.0})
+    assert one.words == ["--columns", "t=1,f=2 [rpm]", "--rate", "100.0", "--skip-doubtful"]
