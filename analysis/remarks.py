@@ -15,6 +15,7 @@ SpinDownKind = Literal[
     "factor",  # the constant; the factor to which it is known
     # of a spin-down
     "outlier",  # time [s], frequency [Hz], distance [Hz] from the law, the same in units; stated, kept, falling: 0 or 1
+    "falling",  # the same, of a last reading that is left out
     "calculated",  # rms residual [Hz]
     "no u",
     "understated",  # scatter in units of the stated u

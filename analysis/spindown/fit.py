@@ -302,7 +302,7 @@ def _about_outliers(readings: Readings, outliers: NDArray[np.intp], best: LawFit
     falling, stated = _last_ones(outliers, len(readings)), readings.u is not None
     return [
         Remark(
-            "outlier",
+            "falling" if i in falling and not kept else "outlier",
             best.name,
             values=(
                 float(readings.time[i]), float(readings.frequency[i]), float(away), float(away / max(size, 1e-300)),

@@ -251,8 +251,8 @@ def _notes_on_refused(
         kind = DoubtfulRows if do else TableError
         raise kind(error.path, "{wrong}{also}{do}", error.message, also, do, line=error.line)
     if doubtful:
-        many = "{n} doubtful rows are left out, as asked: lines {places:s}"
-        one = "{n} doubtful row is left out, as asked: line {places:s}"
+        many = "{n} doubtful rows are left out, as `skip_doubtful` says: lines {places:s}"
+        one = "{n} doubtful row is left out, as `skip_doubtful` says: line {places:s}"
         yield Note("doubtful", Said(one if len(numbers) == 1 else many, len(numbers), places))
 
 

@@ -60,7 +60,7 @@ def note_of(of: Remark, table: Mapping[str, str | Callable[..., str] | Doubting]
         text = said(*values, **named)
     else:
         text = filled(said, of.values, name=of.name, law=of.law) if "{" in said else said
-    return Note(f"{of.kind} {of.law} {of.name}", text, is_doubt=isinstance(row, Doubting))
+    return Note(f"{of.kind}:{of.law} {of.name}", text, is_doubt=isinstance(row, Doubting))
 
 
 class Readings:

@@ -21,7 +21,7 @@ from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import unquote
 from levilab.present.numbers import enumeration, plain, with_sign, with_uncertainty
 from levilab.present.units import unit
-from levilab.texts.note import is_doubt
+from levilab.texts.note import is_advice, is_doubt
 from levilab.texts.text import Sentences, Text, how_many, in_language
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ class Group:
         source: with its name and note.
         statistics: of the model; empty where the analysis has none.
         best_model: the law that describes its readings best; empty where no laws compete.
-        warnings: about it.
+        warnings: about it, without advice.
         doubts: those of them that make its numbers worthless where they are right.
     """
 
@@ -157,7 +157,10 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
     laws = Counter(one.model for one in truths if one.model)
     model = max(laws, key=lambda law: laws[law], default="") or document.get("best_model", "")
     parts = document["runs"]
-    said = [(*source.warnings, *found.about_run(run)) for source, run in zip(found.sources, found.runs, strict=True)]
+    said = [
+        [text for text in (*source.warnings, *found.about_run(run)) if not is_advice(text)]
+        for source, run in zip(found.sources, found.runs, strict=True)
+    ]
     groups = tuple(
         Group(
             source,
@@ -279,34 +282,32 @@ def _mark(of: Class, k: int) -> Mark:
         if one.estimates[k] is None:
             wrong.append(Text("{symbol}: no value with u", symbol=one.symbol))
         elif truth is not None and abs(truth) > FAR:
-            cause = "of another seed, cut short, or changed?"
-            wrong.append(
-                Text(
-                    "{symbol}: {times:n} u from its truth: are the readings {cause}",
-                    symbol=one.symbol,
-                    times=with_sign(truth, 1),
-                    cause=cause,
-                )
+            said = (
+                "{symbol}: {times:n} u from its truth: look at the residuals; a disturbed run, laws that fit as well "
+                "or another seed can be the cause"
             )
+            wrong.append(Text(said, symbol=one.symbol, times=with_sign(truth, 1)))
         elif truth is None and others is not None and abs(others) > FAR:
             odd.append(Text("{symbol}: {times:n} u from the others", symbol=one.symbol, times=with_sign(others, 1)))
     wrong += group.doubts
     remarks = tuple(text for text in group.warnings if text not in group.doubts)
-    if few := _few_readings(of, k):
-        return Mark(REPEAT if wrong else LOOK, (few, *wrong, *odd), remarks)
+    if short := _too_short(of, k):
+        return Mark(REPEAT if wrong else LOOK, (short, *wrong, *odd), remarks)
     odd += remarks
     return Mark(REPEAT if wrong else LOOK if odd else GOOD, (*wrong, *odd))
 
 
-def _few_readings(of: Class, k: int) -> str:
-    """Return that a group has less than half as many readings as the others have; else an empty text."""
-    counts = [count_readings(group) for group in of.groups]
-    usual = statistics.median(counts[:k] + counts[k + 1 :] or [0])
-    return (
-        Text("{readings} instead of {usual:.0f}: measure longer", readings=how_many(counts[k], "reading"), usual=usual)
-        if counts[k] < usual / 2
-        else ""
-    )
+def _too_short(of: Class, k: int) -> str:
+    """Return that a group measured for less than half of the time of the others, or half as often; else an empty text.
+
+    A run that has a clock may have few readings: who types reads every 10 s, who clicks every 2 s.
+    """
+    times = [getattr(group.source.readings, "time", None) for group in of.groups]
+    lasts = [count_readings(of.groups[k]) if time is None else float(np.ptp(time)) for k, time in enumerate(times)]
+    usual = statistics.median(lasts[:k] + lasts[k + 1 :] or [0])
+    said = "{n:.0f} readings instead of {usual:.0f}: measure longer"
+    said = said if times[k] is None else "{n:.0f} s of readings instead of {usual:.0f} s: measure longer"
+    return Text(said, n=lasts[k], usual=usual) if lasts[k] < usual / 2 else ""
 
 
 def count_readings(group: Group) -> int:

@@ -46,6 +46,18 @@ def kind_of(text: str) -> str:
     return text.template if isinstance(text, Text) else text
 
 
+#: Kinds that say how something was read or counted, or advise, and put no number in doubt.
+_ADVICE = frozenset({
+    "no u", "overstated", "correlated", "mixed u", "scan overstated", "sweep overstated", "between", "coasts",
+    "correction", "falling", "falls", "missed", "rest", "windows", "±",
+})  # fmt: skip
+
+
+def is_advice(text: str) -> bool:
+    """Return whether a text is of a kind that puts no number in doubt."""
+    return kind_of(text).partition(":")[0] in _ADVICE
+
+
 def is_doubt(text: str) -> bool:
     """Return whether a text is a doubt."""
     return isinstance(text, Note) and text.is_doubt

@@ -386,6 +386,7 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyT
         "undetermined": "{name} is not determined, as it depends exponentially on the exponent",
         "factor": "{name} is known only to a factor of about {times:n}, as it depends exponentially on the exponent",
         "outlier": _outlier,
+        "falling": _outlier,
         "calculated": Doubting(
             lambda of: Text(
                 "the readings lie on the {law} law to {hz:n} Hz, too good to be measured: were they "
@@ -406,7 +407,7 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyT
         ),
         "overstated": (
             "the readings scatter only {times:n} times as much about the best law as their stated uncertainties say: "
-            "are these too large?"
+            "these are upper bounds, and so is u of the constants"
         ),
         "few readings": lambda of: Text(
             "{n:.0f} readings are too few for AICc: BIC compares the laws, as sure as the stated uncertainties are"

@@ -132,7 +132,7 @@ def _marks(of: Class) -> Iterator[Tabular]:
     ]
     note = Text(
         "repeat: no value, or one more than {far:.0f} u from its truth, or a doubt about the "
-        "readings; look: a remark, or, where no truth is known, more than {far:.0f} u from the "
+        "readings; look: a warning, or, where no truth is known, more than {far:.0f} u from the "
         "others.",
         far=FAR,
     )

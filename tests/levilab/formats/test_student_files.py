@@ -193,8 +193,8 @@ def test_rows_that_a_person_doubts_are_left_out_on_request_and_named(tmp_path):
         read_table(path)
     table = read_table(path, skip_doubtful=True)
     assert table.column("time_s").tolist() == [0, 10, 40, 50]
-    assert "2 doubtful rows are left out, as asked: lines 4, 5" in " ".join(table.warnings)
-    assert "2 zweifelhafte Zeilen sind wie verlangt ausgelassen: Zeilen 4, 5" in in_german(table.warnings)
+    assert "2 doubtful rows are left out, as `skip_doubtful` says: lines 4, 5" in " ".join(table.warnings)
+    assert "2 zweifelhafte Zeilen sind ausgelassen, wie `skip_doubtful` sagt: Zeilen 4, 5" in in_german(table.warnings)
     path.write_text("t,f\n" + "".join(f"{t},40\n{t},40?\n" for t in range(1002)), encoding="utf-8")
     assert len(read_table(path, skip_doubtful=True)) == 1002  # beyond the lines after which an error ends the reading
 
