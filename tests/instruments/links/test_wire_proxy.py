@@ -15,16 +15,20 @@ def clients():
         yield
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def pair_over():
-    pairs = []
+    """The pair of the test before, where it is of this way and model: each test leaves it sound."""
+    last = {}
 
     def made(way, name):
-        pairs.append(Pair(way, name))
-        return pairs[-1]
+        if (way, name) not in last:
+            while last:
+                last.popitem()[1].close()
+            last[way, name] = Pair(way, name)
+        return last[way, name]
 
     yield made
-    for pair in pairs:
+    for pair in last.values():
         pair.close()
 
 

@@ -10,9 +10,8 @@ from analysis.pulses import track_of_blocks
 from levilab.formats.waveforms.record import read_record
 
 RATE = 20_000
-#: Windows of 2 s in the shorter record, which is four blocks of 131072 samples, and in the longer one.
-SHORT, LONG = 13, 39
-
+#: Windows of 2 s in the shorter record, which is two blocks of 131072 samples, and in the longer one.
+SHORT, LONG = 7, 21
 
 TURNS = 30 * np.arange(2 * RATE) / RATE
 #: Two seconds of light pulses at 30 Hz, with noise; a record repeats them.
