@@ -186,8 +186,8 @@ def _readings(table: Table) -> SwayReadings:
         "the top is {m:.3g} m off, less than {most:g} m is expected: if the unit is another one, say so, as "
         "`columns` = x=NAME [mm],y=NAME [mm]"
     )
-    far = np.hypot(x - np.median(x), y - np.median(y)) > _FARTHEST_M
-    refuse(table, far, said, np.hypot(x, y), _FARTHEST_M)
+    off = np.hypot(x - np.median(x), y - np.median(y))
+    refuse(table, off > _FARTHEST_M, said, off, _FARTHEST_M)
     height, spin = table.columns.get("height_m"), table.columns.get("spin_frequency_hz")
     if height is not None and not np.isfinite(height).all():
         height = None
