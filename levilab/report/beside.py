@@ -44,7 +44,7 @@ class Group:
     Attributes:
         source: with its name and note.
         statistics: of the model; empty where the analysis has none.
-        best_model: the law that describes its readings best; empty where no laws compete.
+        best_model: the law that describes its readings best, or "undecided"; empty where no laws compete.
         warnings: about it, without advice.
         doubts: those of them that make its numbers worthless where they are right.
     """
@@ -165,7 +165,7 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
         Group(
             source,
             _model(part, model).get("statistics", {}),
-            part.get("best_model", ""),
+            part.get("best_model", "") if part.get("decided", True) else "undecided",
             tuple(map(_plain, texts)),
             tuple(_plain(text) for text in texts if is_doubt(text)),
         )
@@ -340,7 +340,9 @@ _WITHIN_2_U = 0.954
 def finding(of: Class) -> str:
     """Return the mean of the class, in one line."""
     if not of.quantities:
-        return Text("{groups}: no quantity has a value with u", groups=how_many(len(of.groups), "group"))
+        return Text(
+            "{groups}: no quantity has a value with u", groups=count_sources([group.source for group in of.groups])
+        )
     first = of.quantities[0]
     return Text("{mean}, mean of {groups}", mean=_mean(first), groups=_count(of, first))
 
@@ -408,9 +410,15 @@ def _mean(of: Compared) -> str:
 def _count(of: Class, one: Compared) -> str:
     """Return the number of groups in the mean, and that of their runs where it is another one."""
     found = [group.source for group, use in zip(of.groups, one.used, strict=True) if use]
-    n = len({source.group or source.name for source in found})
-    groups = how_many(n, "group")
-    return groups if len(found) == n else Text("{runs} of {groups}", runs=how_many(len(found), "run"), groups=groups)
+    groups, runs = count_sources(found), how_many(len(found), "run")
+    several = len({source.group or source.name for source in found}) < len(found)
+    return Text("{runs} of {groups}", runs=runs, groups=groups) if several else groups
+
+
+def count_sources(sources: Sequence[Source[Any]]) -> str:
+    """Return the number of groups, or of runs where no run names its group."""
+    named = any(source.group for source in sources)
+    return how_many(len({source.group or source.name for source in sources}), "group" if named else "run")
 
 
 def _agreement(of: Compared) -> str:

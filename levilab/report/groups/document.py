@@ -39,6 +39,7 @@ from levilab.report.beside import (
     agreement,
     class_of,
     count_readings,
+    count_sources,
     finding,
     statistics_of_agreement,
     verdict,
@@ -48,7 +49,7 @@ from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, write_content, writing_report
 from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
-from levilab.texts.text import Sentences, Text, how_many, in_language, spoken
+from levilab.texts.text import Sentences, Text, in_language, spoken
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -81,9 +82,8 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str) -
     for k, of in enumerate(classes):
         own = tuple(_blocks(of, deeper=not alone))
         chapters += own if alone else [Section(_subject(of), own, anchor=of.analysis.name, new_page=k > 0)]
-    names = {source.group or source.name for source in sources}
     return Document(
-        title=Text("Class of {groups}", groups=how_many(len(names), "group")),
+        title=Text("Class of {groups}", groups=count_sources(sources)),
         lead=Text("{inputs}: {subjects}", inputs=count_inputs(sources), subjects=tuple(map(_subject, classes))),
         blocks=(*of_all, *chapters, _made_by(paths, name)),
         banner=banner_of(sources),
@@ -93,7 +93,10 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str) -
 
 def _unread(classes: Sequence[Class]) -> list[str]:
     """Return the tables of which no analysis could make a result; other files are no matter of a class."""
-    said = "{file}: a table that could not be read: `levilab open` shows its columns, and keeps what you correct"
+    said = (
+        "{file}: a table whose columns are not certain, which no search reads: name the file itself, or keep its "
+        "columns with `levilab open`"
+    )
     return [
         Text(said, file=one.path)
         for one in remarks([of.found.remarks for of in classes])

@@ -167,7 +167,7 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
     assert of.quantities[0].mean.value == pytest.approx(2.4e-4, rel=0.03)  # the halved spins have 3.3e-4
     assert [line.get_marker() for axes in class_figure(of).axes for line in axes.lines].count(">") == 1
     page = Page(write_class([root], tmp_path / "class.html", tell=(told := []).append).read_text("utf-8")).text
-    assert "Group 5.csv: a table that could not be read: levilab open shows its columns" in page
+    assert "Group 5.csv: a table whose columns are not certain, which no search reads: name the file itself" in page
     assert any("Group 5.csv" in text for text in told)
     assert re.search(r"skipped \S*Group 4.csv, line 1: holds 2 readings.* line 3: '10,abc' is no reading", page)
     assert re.search(r"Group 2 repeat C₃/₂: \+\d+\.\d u from its truth", page)
@@ -181,6 +181,10 @@ def test_tables_without_u_and_with_fewer_readings_in_the_same_time_are_good(tmp_
     of = compared(tmp_path)
     assert any("no uncertainties" in text for text in of.found.all_warnings)
     assert [one.why for one in of.marks if one.word != GOOD] == []
+    assert finding(of).endswith("mean of 2 runs")
+    assert [group.best_model for group in of.groups] == [
+        run.best if run.verdict.decided else "undecided" for run in of.found.runs
+    ]
 
 
 def test_a_run_of_few_readings_is_named_before_what_the_analysis_says(of_three, tmp_path):

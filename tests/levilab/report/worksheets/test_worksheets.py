@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from levilab.acquisition.experiments.spin import SpinSettings
 from levilab.errors import UsageError
+from levilab.live.practice.experiments import PRACTICE
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.report.beside import class_of
 from levilab.report.worksheets.document import key as key_of
@@ -26,6 +28,16 @@ TRIED = [name for name in SHEETS if name != "precession"]
 @pytest.mark.parametrize("code", LANGUAGES)
 def test_each_question_has_an_answer(code):
     assert all(len(texts.tasks) == len(texts.answers) for texts in read_language(code).sheets.values())
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_the_key_of_the_spin_knows_both_ways_to_measure(code):
+    clicked = dict(one.removeprefix("spin.").split("=") for one in PRACTICE["spin"].settings)
+    typed = vars(SpinSettings())
+    how = [(float(one["interval_s"]), float(one["drive_frequency_hz"])) for one in (typed, clicked)]
+    for answer, (every, start) in zip(read_language(code).sheets["spin"].answers[0].split(";"), how, strict=True):
+        assert f"{every:.0f} s, " in answer
+        assert f" {start:.0f} Hz " in answer
 
 
 @pytest.mark.parametrize("code", LANGUAGES)
