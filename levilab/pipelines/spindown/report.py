@@ -341,7 +341,7 @@ def count_table(analysis: SpinDownAnalysis, *, symbols: bool = False) -> Table |
     tilted = any(run.has_tilt for run in analysis.runs)
     title = "What the counter sees of the wobble, by the best law"
     if tilted and symbols:
-        title = Sentences(f"{title}.", _WOBBLE_SYMBOLS, _NUTATION if len(analysis.runs) == 1 else "")
+        title = Sentences(Text("{title}.", title), _WOBBLE_SYMBOLS, _NUTATION if len(analysis.runs) == 1 else "")
     return table(title, heads, rows)
 
 

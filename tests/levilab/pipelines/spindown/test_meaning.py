@@ -17,6 +17,7 @@ from levilab.present.document.blocks import Verdict
 from levilab.present.numbers import with_uncertainty
 from levilab.report.document import blocks_of_part
 from levilab.report.reproduction import Asked
+from levilab.texts.text import in_language
 
 U = 0.027
 
@@ -38,7 +39,9 @@ def test_note_and_table_have_one_number_of_independent_readings(tmp_path):
     correlation = toeplitz(analysis.runs[0].correlation.value ** np.arange(12.0))
     worth = f"{12**2 / correlation.sum():.2g}"  # the variance of a reading over that of the mean
     assert f"12 readings are worth as much as {worth} independent ones" in " ".join(analysis.all_warnings)
-    assert f"{worth} of 12" in count_table(analysis).rows[0].cells[-1]
+    shown = count_table(analysis, symbols=True)
+    assert f"{worth} of 12" in shown.rows[0].cells[-1]
+    assert in_language(shown.title, "de").startswith("Was der Zähler vom Taumeln sieht, nach dem besten Gesetz. δ: ")
 
 
 def test_text_figure_and_tables_have_one_verdict(tmp_path):
