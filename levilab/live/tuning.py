@@ -23,13 +23,18 @@ def advice_on(wanted: Mapping[str, Any]) -> dict[str, Any]:
         UsageError: one of them is no mass, temperature or trial.
     """
     trials = wanted.get("trials")
+    name = "top"
     try:
-        owner = Owner(read_mass(str(wanted.get("top", "")))).with_washers(read_masses(str(wanted.get("washers", ""))))
+        owner = Owner(read_mass(str(wanted.get(name, ""))))
+        name = "washers"
+        owner = owner.with_washers(read_masses(str(wanted.get(name, ""))))
+        name = "trials"
         for text in trials[:_MOST_TRIALS] if isinstance(trials, list) else ():
             owner = owner.with_trial(str(text))
-        found = advise(owner, read_temperature(str(wanted.get("temperature", ""))))
+        name = "temperature"
+        found = advise(owner, read_temperature(str(wanted.get(name, ""))))
     except ValueError as error:
-        raise UsageError("washers", text_of(error)) from error
+        raise UsageError(name, text_of(error)) from error
     return {
         "text": found.text,
         "why": Sentences(found.why, found.window, *found.warnings),

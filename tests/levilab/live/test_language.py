@@ -132,7 +132,7 @@ def test_the_server_answers_in_the_language_of_the_page_that_asks(hall):
     assert said.startswith("Nimm keine Scheiben: Der Kreisel wiegt dann 24,1 g und schwebt mit")
     head, asked = {"Content-Type": "application/json"}, b'{"do": "say which washers", "top": "x"}'
     wrong = request(address(hall), "/do?language=de", asked, headers=head | {"X-Levilab-Token": hall.doors.token})[1]
-    assert json.loads(wrong)["error"].endswith("erwartet wird eine Masse, etwa 24.98 g")
+    assert json.loads(wrong)["error"] == "Kreisel: erwartet wird eine Masse, etwa 24.98 g"
     said = [request(address(hall), f"/do?language={code}", b"{}", headers=head)[1] for code in ("en", "de", "zz")]
     english, german, other = (json.loads(one)["error"] for one in said)
     assert english == other == "this page may only look: open the address that the terminal shows"
