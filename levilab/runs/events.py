@@ -35,6 +35,7 @@ class RunEvent(StrEnum):
     # the drive
     DRIVE_ON = "drive on"
     DRIVE_OFF = "drive off"
+    DRIVEN_BEFORE = "driven before"  # the top, before the run began
     LOCKED = "locked"
     NOT_HELD = "not held"
     LOCK_LOST = "lock lost"

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +29,8 @@ from levilab.live.practice.fall import cause_of_fall
 from levilab.live.practice.seeds import keys_of_seed, seed_of_group
 from levilab.live.practice.tasks import TASKS, Look, Tasks
 from levilab.live.practice.top import PracticeTop
+from levilab.pipelines.spindown.readings import release_of
+from levilab.runs.events import RunEvent
 from levilab.simulator.scene import Scene, read_scene
 from levilab.telemetry.messages import Count, State
 from levilab.telemetry.publisher import Publisher
@@ -193,6 +195,8 @@ class PracticeProcess:
         self._spin = spin = bench.counter.frequency()
         self._count = last_count(bench, spin)
         self.top.spin_hz = self.top.spin_hz if spin is None else spin
+        if spin is not None and (self.drive.yields or self.drive.follows):
+            self.top.take_drive(spin)
         self._look_at_top()
         self._look_at_task()
         self.drive.take_count(spin)
@@ -393,6 +397,7 @@ class PracticeProcess:
         try:
             with self.top.lent_to(plan):
                 run = acquire(self._request(plan, command), self._voice, self._watching)
+                self.top.release = release_of(run.events())
         except (LevilabError, InstrumentError) as error:
             text, status, folder = text_of(error), "failed", self._folder
         else:
@@ -412,6 +417,10 @@ class PracticeProcess:
             session.stop.by = self._stopped
         scene, name = self.top.scene.as_table(), session.writer.record.experiment
         self._voice.report("recording", name, self._number, folder=self._folder, scene=scene)
+        if (before := self.top.release) and name in NEED_A_TOP:
+            said = Text("the drive has held this top before, from {spin:.2f} Hz on, for {time:.0f} s", *astuple(before))
+            numbers = {"frequency_hz": before.spin_hz, "driven_s": round(before.driven_s, 1)}
+            session.event(RunEvent.DRIVEN_BEFORE, said, **numbers)
         try:
             yield self.look
         except ExperimentFailed as failed:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from typing import TYPE_CHECKING, Any
 
+from analysis.spindown.tilt import Release
 from levilab.bench.config import Limits
 from levilab.live.practice.drive import GATE_S
 from levilab.live.practice.seeds import keys_of_seed
@@ -44,6 +45,7 @@ class PracticeTop:
         up_since: when the top that floats was put there, bench time [s]; None: it is down.
         spin_hz: of that top, as it was counted last [Hz]; of one that leans the counter sees no light.
         looked: when `look` was called last, bench time [s].
+        release: from which spin on a drive has held that top, and how long; None: none has.
 
     Args:
         name: of the usual scene.
@@ -61,6 +63,7 @@ class PracticeTop:
         self.up_since: float | None = 0.0
         self.spin_hz: float | None = None
         self.looked = 0.0
+        self.release: Release | None = None
         world.place_probe(None)  # in the top's place it would be hit
 
     def floats(self) -> bool:
@@ -74,6 +77,12 @@ class PracticeTop:
         self.world.take_top()
         self.world.float_top(self._tops)
         self.up_since, self.spin_hz, self._voice.text = self.world.clock.now(), None, ""
+        self.release = None
+
+    def take_drive(self, spin: float) -> None:
+        """Take note that a drive has held the top since the last look, at this spin [Hz]."""
+        before = self.release or Release(spin)
+        self.release = Release(min(spin, before.spin_hz), before.driven_s + self.world.clock.now() - self.looked)
 
     def look(self) -> float | None:
         """Return how long a top was up that has fallen since the last look [s]; None where none has."""
@@ -119,7 +128,7 @@ class PracticeTop:
         takes_off = plan.experiment in MOVE_THE_PROBE
         if takes_off:
             self.world.take_top()
-            self.up_since = None
+            self.up_since = self.release = None
             self._voice.message("the top is taken off: the probe goes where it floats")
         usual = self.world, self.scene, self.wiring
         if plan.scene:
@@ -127,7 +136,7 @@ class PracticeTop:
             self.scene = self.scene_for(plan)
             self.world = scene_world(self.scene, lambda: clock, self._voice.message, seed=self.seed)
             self.wiring = virtual_wiring(self.world, Limits())
-            self.up_since = clock.now()
+            self.up_since, self.release = clock.now(), None
         try:
             yield
         finally:

@@ -73,13 +73,12 @@ def read_run_readings(run: "Run", options: "InputOptions") -> SpinReadings:
 
 
 def release_of(events: "Iterable[Mapping[str, Any]]") -> Release | None:
-    """Return the slowest spin at which a drive took hold of the top, by the events of a run; None: no drive did."""
+    """Return the slowest spin at which a drive held the top, by the events of a run; None: no drive did."""
     spins, driven_s = [], 0.0
     for event in events:
-        if event["kind"] == RunEvent.DRIVE_ON and event.get("frequency_hz"):
+        if event["kind"] in {RunEvent.DRIVE_ON, RunEvent.DRIVEN_BEFORE} and event.get("frequency_hz"):
             spins.append(event["frequency_hz"])
-        elif event["kind"] == RunEvent.DRIVE_OFF:
-            driven_s = event.get("driven_s") or 0.0
+        driven_s += event.get("driven_s") or 0.0
     return Release(min(spins), driven_s) if spins else None
 
 

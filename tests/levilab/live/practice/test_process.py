@@ -32,6 +32,7 @@ from levilab.live.practice.fall import cause_of_fall
 from levilab.live.practice.process import PracticeOptions, PracticeProcess
 from levilab.live.practice.seeds import keys_of_seed
 from levilab.live.practice.tasks import TASKS, Look, Tasks, exponent_of
+from levilab.pipelines.spindown.readings import release_of
 from levilab.runs.run import Run
 from levilab.simulator.scene import read_scene
 from levilab.telemetry.publisher import Publisher
@@ -243,6 +244,8 @@ def session(tmp_path_factory):
         (93.0, SwitchDrive(on=True)),
         (93.0, RecordRun(experiment="field")),
         (154.0, StopRun()),
+        (157.0, RecordRun(experiment="spin", settings=QUICK)),
+        (158.0, StopRun()),
         (160.0, RecordRun(experiment="field")),
         (165.0, None),
     )
@@ -282,6 +285,9 @@ def test_a_drive_that_was_matched_takes_hold_also_later(tmp_path):
     before, after = (script.spins(a, a + 1.0)[-1] for a in (24.0, 49.0))
     assert script.states[-1].took_hold
     assert after[1] == pytest.approx(before[2], abs=0.3)  # 27.5 Hz, and not the 29.7 Hz of the match
+    release = script.process.top.release
+    assert release.spin_hz == pytest.approx(before[2], abs=0.2)
+    assert 17 < release.driven_s < 25  # of 25 s, less 6 s until the top is seen to follow
 
 
 def test_a_drive_far_from_the_spin_says_why_it_holds_nothing(tmp_path):
@@ -525,9 +531,9 @@ def test_a_top_that_still_floats_is_spun_anew(session):
 
 
 def test_a_run_that_is_stopped_is_kept_and_the_bench_goes_on(session):
-    first, second = (event for event in session.events if event["kind"] == "recorded")
+    first, again, second = (event for event in session.events if event["kind"] == "recorded")
     recorded = [event["number"] for event in session.events if event["kind"] in {"recording", "recorded"}]
-    assert recorded == [12, 12, 16, 16]  # those of the two commands that were not refused
+    assert recorded == [12, 12, 16, 16, 18, 18]  # those of the three commands that were not refused
     run = Run.load(Path(first["folder"]))
     assert (run.status, run.record.synthetic, run.record.note) == ("interrupted", True, "<b>first</b>")
     assert run.record.group == "Group 7"
@@ -535,8 +541,14 @@ def test_a_run_that_is_stopped_is_kept_and_the_bench_goes_on(session):
     assert run.record.configuration["scene"]["name"] == "practice"
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
     assert [event["text"] for event in run.events()][-1] == "interrupted by the stop button, outputs are off"
-    assert session.spins(156.0, 160.0)[-1][2] > 20
-    # the program that held the bench ended in the middle of the second one
+    assert session.spins(156.0, 157.0)[-1][2] > 20
+    # a drive feeds the nutation of a top, which the next run has to know; this one began with a top that was put back
+    assert not [event for event in run.events() if event["kind"] == "driven before"]
+    release = release_of(run.events())
+    (before,) = (event for event in Run.load(Path(again["folder"])).events() if event["kind"] == "driven before")
+    assert (before["frequency_hz"], before["driven_s"]) == (release.spin_hz, release.driven_s)
+    assert release_of([before, {"kind": "drive off", "driven_s": 20.0}]).driven_s == release.driven_s + 20
+    # the program that held the bench ended in the middle of the third one
     assert (second["status"], Run.load(Path(second["folder"])).status) == ("interrupted", "interrupted")
 
 
