@@ -284,7 +284,8 @@ def _wobble(tilt: Estimate | None) -> str:
         seen = "The counter sees the wobble of the top: its moment is tilted against its axis by {tilt:n} rad."
         return Text(seen, tilt=_value(tilt))
     return Text(
-        "The readings show no wobble of the top: its moment is tilted against its axis by less than {most:n} rad.",
+        "The readings do not make certain that the moment of the top is tilted against its axis: it is by less than "
+        "{most:n} rad.",
         most=digits(max(tilt.value, 0.0) + 2 * tilt.u, 2),
     )
 

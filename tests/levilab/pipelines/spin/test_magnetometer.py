@@ -80,7 +80,7 @@ def test_a_spin_that_is_held_is_compared_with_the_drive(tmp_path):
 
 def test_a_tilt_that_the_readings_do_not_show_is_given_as_a_bound(long):
     text = ANALYSES["spindown"].analyze([long], SpinDownOptions()).text
-    assert "no wobble of the top: its moment is tilted against its axis by less than" in text
+    assert "do not make certain that the moment of the top is tilted against its axis: it is by less than" in text
 
 
 @pytest.mark.parametrize(("name", "options"), [("spindown", SpinDownOptions), ("limit", LimitOptions)])
