@@ -3,6 +3,7 @@
 import dataclasses
 import itertools
 import json
+import shutil
 import signal
 from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
@@ -493,9 +494,12 @@ def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion):
 
 def test_a_run_in_full_motion_is_repeated_by_its_seed_and_resumed_in_its_scene(in_full_motion, tmp_path):
     whole = in_full_motion.readings().frame
-    half = acquire(mock(tmp_path, 5, scene="spindown"), Impatient(3))
-    assert half.status == "interrupted"
-    run = acquire(mock(tmp_path, None, resume=half.folder), Impatient(3))
+    half, record = tmp_path / "half", in_full_motion.record.model_copy(update={"status": "interrupted"})
+    shutil.copytree(in_full_motion.folder, half)
+    (half / "run.json").write_text(record.as_json(), encoding="utf-8")
+    rows = (half / "readings.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    (half / "readings.csv").write_text("".join(rows[:4]), encoding="utf-8")
+    run = acquire(mock(tmp_path, None, resume=half), Impatient(3))
     spins = run.readings().frame["spin_frequency_hz"]
     assert len(spins) == 6
     assert np.allclose(spins, whole["spin_frequency_hz"][:6], rtol=0, atol=0.02)

@@ -4,8 +4,6 @@ import base64
 import hashlib
 import json
 import shutil
-import subprocess
-import sys
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -29,7 +27,6 @@ from support.figures import with_drawing, without_figures
 from support.pages import Page
 from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
-from support.waiting import HANG_GUARD_S
 
 
 def render(found):
@@ -257,14 +254,6 @@ def test_the_report_says_what_it_had_to_analyze(run, tmp_path):
     (run / "readings.csv").write_text(spin_down_csv(tmp_path / "other.csv").read_text("utf-8"), encoding="utf-8")
     text = reported(run, output=tmp_path / "report.html")
     assert f"analyzed for this page: the readings are others than in {run / 'result.json'}" in text
-
-
-def test_the_page_needs_nothing_of_the_terminal_and_no_random_numbers():
-    code = "import sys, levilab.report.page; print(bool({'rich', 'numpy.random'} & set(sys.modules)))"
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=HANG_GUARD_S
-    )
-    assert done.stdout == "False\n"
 
 
 @pytest.mark.usefixtures("undrawn_figures")
