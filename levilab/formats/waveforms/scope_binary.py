@@ -32,7 +32,7 @@ def read_scope_binary(path: Path) -> Waveform:
     try:
         from RigolWFM.wfm import Wfm  # with matplotlib and requests
     except ImportError as error:
-        what = "is a scope's binary file, which needs the extra scope (RigolWFM, not installed): {how}, or export CSV"
+        what = "is a scope's file, and needs the extra scope (RigolWFM, which is not installed): {how}, or export CSV"
         raise TableError(path, what, how_to_install("scope")) from error
     try:
         with warnings.catch_warnings(action="ignore"), contextlib.redirect_stdout(io.StringIO()) as _, \

@@ -34,7 +34,7 @@ def check_name(table: Path) -> None:
     if kind not in {CSV, PARQUET}:
         raise UsageError("table", "a name that ends in .csv or .parquet is expected", value=table)
     if kind == PARQUET and find_spec("pyarrow") is None:
-        what = "Parquet needs the extra parquet (pyarrow, not installed): {how}, or name a table that ends in .csv"
+        what = "Parquet needs the extra parquet (pyarrow, which is not installed): {how}, or name a table in .csv"
         raise UsageError("table", what, how_to_install("parquet"), value=table)
     if table.is_dir():
         raise UsageError("table", "is a folder; the name of a file is expected", value=table)
