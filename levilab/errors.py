@@ -1,8 +1,9 @@
 """Failures that a user can mend: each is one line, never a traceback."""
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from difflib import get_close_matches
+from types import MappingProxyType
 from typing import Any
 
 from levilab.texts.text import Text, languages
@@ -100,10 +101,10 @@ class NoneUsable(DataError):
     """A folder without anything that an analysis can use.
 
     Attributes:
-        reasons: why each of what is there cannot be used.
+        reasons: path → why it cannot be used.
     """
 
-    def __init__(self, text: str, *in_order: Any, reasons: tuple[str, ...] = ()) -> None:
+    def __init__(self, text: str, *in_order: Any, reasons: Mapping[Any, str] = MappingProxyType({})) -> None:
         self.reasons = reasons
         super().__init__(text, *in_order)
 

@@ -214,7 +214,7 @@ def sentences_of(budget: Budget, shown: Mapping[str, str] | None = None) -> list
                 "{percent} of u² of {name} comes from: {source}.", _percent(budget.share(largest)), name, largest.source
             )
         )
-        texts += [Text("It gets smaller with {remedy}.", remedy=largest.remedy)] if largest.remedy else []
+        texts += [Text("u gets smaller with {remedy}.", remedy=largest.remedy)] if largest.remedy else []
     known = [one for one in budget.left_out if one.contribution]
     if known and not budget.misses_nothing:
         whole = _number(budget.u_with_all, budget.unit)
@@ -226,7 +226,7 @@ def sentences_of(budget: Budget, shown: Mapping[str, str] | None = None) -> list
             )
         )
     elif known:
-        texts.append(Text("Not in u, and negligible: {sources}.", sources=enumeration([one.source for one in known])))
+        texts.append(Text("Not in u, as negligible: {sources}.", sources=enumeration([one.source for one in known])))
     unknown = [one for one in budget.left_out if one.u is None and one.sensitivity]
     clocks = [one for one in unknown if one.unit == _NO_UNIT]
     if clocks:

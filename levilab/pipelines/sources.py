@@ -215,10 +215,12 @@ class Skipped:
     Attributes:
         reason: why, with its path.
         kind: skipped ones of one kind are alike.
+        path: of what cannot be used.
     """
 
     reason: str
     kind: str = ""
+    path: Path | None = None
 
     def __str__(self) -> str:
         return Text("skipped {things}", things=self.reason)
@@ -514,7 +516,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
             else:
                 others[run.record.experiment] += 1
         except DataError as error:
-            broken.append(Skipped(text_of(error), type(error).__name__))
+            broken.append(Skipped(text_of(error), type(error).__name__, folder))
     found.sort(key=_begun)
     files = data_files(root)
     remarks += [LeftOut(file, _kind(file)) for file in other_files(root)]
@@ -527,7 +529,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
         text = Text("{path:s}: {why}", path=str(root), why=_nothing_found(needs, kinds, broken, left_out))
         if not broken:
             raise NothingSuits(text, left_out)
-        raise NoneUsable(text, reasons=tuple(map(str, broken)))
+        raise NoneUsable(text, reasons={one.path: str(one) for one in broken})
     notes = tuple(of_file(f"skipped {one.kind}", str(one)) for one in broken)
     return Found(tuple(found), notes, (*kinds, *remarks))
 
@@ -542,7 +544,7 @@ def _skipping(file: Path, broken: list[Skipped], remarks: list[NotTaken]) -> Ite
     except DoesNotSuit as error:
         remarks.append(LeftOut(file, OTHER_COLUMNS if isinstance(error, NoSuchColumn) else _kind(file)))
     except DataError as error:
-        broken.append(Skipped(text_of(error), type(error).__name__))
+        broken.append(Skipped(text_of(error), type(error).__name__, file))
 
 
 def _kind(file: Path) -> Kind:

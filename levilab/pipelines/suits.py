@@ -36,7 +36,7 @@ from levilab.pipelines.sources import (
 )
 from levilab.runs.find import RECORD, find_run, find_runs
 from levilab.runs.run import Run
-from levilab.texts.text import Text, how_many, text_of
+from levilab.texts.text import Text, how_many
 
 Tell = Callable[[str], None]
 
@@ -62,7 +62,7 @@ def suiting(paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None =
     Args:
         paths: run folders, data files, folders to search.
         given: options by their names, of any analysis.
-        tell: called with the reason why an analysis found nothing usable in a folder.
+        tell: called with the reason why no analysis can use a file or a run in a folder.
 
     Raises:
         DoesNotSuit: no analysis suits one of the paths.
@@ -98,7 +98,7 @@ def recall_suiting(
         paths: run folders, data files, folders to search, and results that lie elsewhere: their files, or a folder with
             nothing to analyze in it.
         given: options by their names, of any analysis.
-        tell: called with the reason why an analysis found nothing usable in a folder.
+        tell: called with the reason why no analysis can use a file or a run in a folder.
     """
     places, written = _split(paths)
     own = {name: [one for one in written if one.analysis == name] for name in catalogue.ANALYSES}
@@ -193,9 +193,10 @@ def _suiting(
         if those
     ]
     said = {text for one in done for text in one.found.warnings}
-    for error in unusable:
-        if tell and not said.issuperset(error.reasons):
-            tell(text_of(error))
+    used = {source.path for one in done for source in one.found.sources}
+    for file, reason in {pair: None for error in unusable for pair in error.reasons.items()}:
+        if tell and file not in used and reason not in said:
+            tell(reason)
     return done
 
 

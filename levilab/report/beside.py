@@ -470,7 +470,7 @@ def _truth(of: Class) -> str:
     distances = [one for quantity in of.quantities for one in quantity.from_truth if one is not None]
     near = sum(abs(one) <= 2 for one in distances)
     return Text(
-        "On the virtual bench the truth is known: within 2 u of it are {near} of {values}, {percent:.0f} % are "
+        "On the virtual bench the truth is known: {near} of {values} lie within 2 u of it, where {percent:.0f} % are "
         "expected.",
         near=near,
         values=how_many(len(distances), "value"),

@@ -514,7 +514,7 @@ def _count(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
     """Return tilt, wobble and correlation in the count beside the spin."""
     found = count_table(analysis)
     if found is None:
-        return (Note("The top is taken to turn upright: what a tilt of its moment would change is in no uncertainty."),)
+        return (Note("The moment of the top is taken to lie along its axis: no u here allows for a tilt of it."),)
     explained = (
         "A counter counts turns about the vertical. A moment that points off the axis by δ makes the top wobble with "
         "its spin, the more the nearer the spin is to the resonance ν_r, and the count is higher than the spin by what "

@@ -158,7 +158,7 @@ def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab,
     assert {f"{file}.csv.{kind}" for file in "ab" for kind in ("result.json", "spindown.png")} <= names
     levilab("report", "b.csv", "--no-crosscheck")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "is taken to turn upright" in page
+    assert "is taken to lie along its axis" in page
     assert "as levilab analyze found it: b.csv.result.json" in page
     levilab("report", "b.csv", "--keep-outliers", "--no-crosscheck")
     page = (tmp_path / "report.html").read_text(encoding="utf-8")

@@ -16,6 +16,7 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.crosscheck.truth import Truth
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.suits import save
 from levilab.report.beside import DIFFER, GOOD, REPEAT, _quantity, _width, class_of, finding, verdict
 from levilab.report.groups.document import write_class
 from levilab.report.groups.figure import class_figure
@@ -135,7 +136,7 @@ def test_page_and_pdf_begin_with_the_result(of_three, tmp_path):
     assert places == sorted(places)
     assert "SYNTHETIC." in page
     assert "rms residual [Hz]" in page
-    assert "within 2 u of it are 3 of 3 values" in page
+    assert "3 of 3 values lie within 2 u of it" in page
     assert HOSTILE not in page
     assert write_class([of_three], tmp_path / "class.pdf").read_bytes().startswith(b"%PDF")
 
@@ -185,6 +186,14 @@ def test_tables_without_u_and_with_fewer_readings_in_the_same_time_are_good(tmp_
     assert [group.best_model for group in of.groups] == [
         run.best if run.verdict.decided else "undecided" for run in of.found.runs
     ]
+
+
+def test_a_table_that_was_analyzed_without_doubtful_rows_is_not_called_unusable(tmp_path):
+    table = tmp_path / "a.csv"
+    table.write_text("t in s,f in Hz\n" + "".join(f"{10 * k},{40 - k}\n" for k in range(12)) + "130,2l\n", "utf-8")
+    save(row := ANALYSES["spindown"], row.analyze([table], row.options_from({"skip_doubtful": True})))
+    write_class([tmp_path], tmp_path / "class.html", tell=(told := []).append)
+    assert told == ["groups or runs side by side: spin-down (1)"]
 
 
 def test_a_run_of_few_readings_is_named_before_what_the_analysis_says(of_three, tmp_path):
