@@ -3,12 +3,12 @@
 import {by, fixed, local, numberIn, phrase, write} from "./words.js";
 
 /**
- * @param id of the field; its data have min, max, step, and whole where no fraction is taken.  "id-wrong" says what is wrong.
+ * @param id of the field; its data have min, max, step, unit, and whole where no fraction is taken.  "id-wrong" says what is wrong.
  * @param {(value: number) => void} take gets each number that is allowed, NaN for an empty field that may be empty.
  * @param {boolean} mayBeEmpty whether an empty field is taken; else it waits.
  */
 export function numberField(id, take, mayBeEmpty = false) {
-  const field = by(id), {min, max, step, whole} = field.dataset;
+  const field = by(id), {min, max, step, whole, unit} = field.dataset, most = local(max) + (unit ? ` ${phrase(unit)}` : "");
 
   /** Say what is wrong; "" where nothing is. */
   function refuse(why) {
@@ -22,8 +22,8 @@ export function numberField(id, take, mayBeEmpty = false) {
       refuse("");
       if (mayBeEmpty) take(NaN);
     } else if (!Number.isFinite(value) || (whole !== undefined && !Number.isInteger(value))) {
-      refuse(phrase(whole === undefined ? "a number from {min} to {max}, not {seen}" : "a whole number from {min} to {max}, not {seen}", {min: local(min), max: local(max), seen}));
-    } else if (value < Number(min) || value > Number(max)) refuse(phrase("from {min} to {max}, not {seen}", {min: local(min), max: local(max), seen}));
+      refuse(phrase(whole === undefined ? "a number from {min} to {max}, not {seen}" : "a whole number from {min} to {max}, not {seen}", {min: local(min), max: most, seen}));
+    } else if (value < Number(min) || value > Number(max)) refuse(phrase("from {min} to {max}, not {seen}", {min: local(min), max: most, seen}));
     else {
       refuse("");
       field.value = local(String(value));

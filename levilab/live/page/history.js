@@ -144,7 +144,7 @@ export function drawHistory(paper, {drives, counts, marks, latest}) {
   c.textAlign = "right";
   for (const mark of yMarks) c.fillText(fixed(mark, decimals(yMarks)), LEFT - 7, toY(mark));
   c.textAlign = "center";
-  for (const time of times) c.fillText(time ? lapse(time).replace(" min", "") : phrase("now"), toX(now + time), bottom + 11);
+  for (const time of times) c.fillText(time ? `${fixed(time, 0)} s` : phrase("now"), toX(now + time), bottom + 11);
   c.fillText(phrase("bench time before now"), (LEFT + width - right) / 2, height - 8);
   upright(c, phrase("frequency [Hz]"), 11, (TOP + split) / 2);
   c.strokeStyle = paint.line;

@@ -34,7 +34,7 @@ const SLIP_HZ = 0.2, SWINGS_HZ = 0.5;  // a top that follows is counted this nea
 
 const token = takeToken();
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, source: null, records: {}};
-const data = {readings: null, found: null, hidden: null, fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
+const data = {readings: null, found: null, hidden: null, shown: {}, said: [], fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
 const history = openHistory(), sound = openSound();
 let fellAt = NaN;  // a fall whose poses are not kept yet
@@ -116,12 +116,13 @@ function takeFit(about) {
 
 /** Draw the running fit, unless a task asks for its numbers. */
 function showFit() {
-  const hidden = Boolean(practice?.hidesFit?.()), about = hidden ? {} : data.found ?? {};
-  if (data.hidden === hidden) return;
-  data.hidden = hidden;
+  const hidden = Boolean(practice?.hidesFit?.()), said = practice?.verdict ?? [];
+  if (data.hidden === hidden && data.said.length === said.length) return;
+  const about = data.shown = hidden ? {} : said.length ? {...data.found, lines: said} : data.found ?? {};
+  Object.assign(data, {hidden, said});
   data.fit = about.curve ? {...about, ...about.curve, solid_to: about.curve.solid_to ?? Infinity} : null;
   typeset(by("fit-head"), hidden ? phrase("The fit is shown once the run is analyzed: the task asks for it.") : about.head || "");
-  typeset(by("fit-lines"), (about.lines || []).join(" · "));
+  typeset(by("fit-lines"), (about.lines || []).join(said.length ? " " : " · "));
   data.end = about.end_s || null;
   dirty.plot = true;
 }
@@ -140,7 +141,7 @@ function takeEvents(events) {
 function listEvent({time_s, utc}, text, loud) {
   const list = by("event-list"), item = make("li", "", loud), moment = new Date(utc || NaN);
   if (Date.now() - moment < NEWS_MS) news.push(text);
-  const ofRun = typeof time_s === "number" ? `(${lapse(time_s).replace(" min", "")})` : "";
+  const ofRun = typeof time_s === "number" ? `(${lapse(time_s, 0).replace(" min", "")})` : "";
   const clock = Number.isNaN(moment.valueOf()) ? "" : moment.toLocaleTimeString("en-GB");
   const when = make("time", [clock, ofRun].filter(Boolean).join(" "));
   if (clock) when.dateTime = utc;
@@ -513,9 +514,7 @@ by("drawn").addEventListener("change", () => {
   seen.readings = seen.tick = pointed = -1;
   dirty.plot = true;
 });
-function lookAtTop() {
-  space?.show?.(Object.fromEntries(["path", "spin", "height"].map((name) => [name, by(`show-${name}`).checked])));
-}
+const lookAtTop = () => space?.show?.(Object.fromEntries(["path", "spin", "height"].map((name) => [name, by(`show-${name}`).checked])));
 const leanTop = () => space?.setLean?.(by("lean").checked ? 5 : 1);
 /** A lamp that flashes with the drive; a drive that is off leaves the light steady. */
 const strobe = () => space?.setStrobe?.(by("strobe").checked ? (time) => history.flash(time) : null);
@@ -532,10 +531,10 @@ by("sound").addEventListener("change", () => sound.play(by("sound").checked));
 const isMadeUp = () => !by("synthetic").hidden;
 by("csv").addEventListener("click", () => save(new Blob([isMadeUp() ? "# SYNTHETIC\n" : "", isOfMinutes() ? history.table() : tableOf(data.readings)], {type: "text/csv"}), "csv"));
 by("png").addEventListener("click", () => {
-  const [title, found] = isOfMinutes() ? [phrase("The last minutes"), {}] : [[data.about?.group, seen.run].filter(Boolean).join(", "), !data.hidden && data.found || {}];
+  const [title, found] = isOfMinutes() ? [phrase("The last minutes"), {}] : [[data.about?.group, seen.run].filter(Boolean).join(", "), data.shown];
   const drawn = [isOfMinutes() ? "" : `○ ${phrase("Readings")}`, found.head && `${data.fit ? "― " : ""}${found.head}`].filter(Boolean).join("     ");
-  const texts = [title + (isMadeUp() ? ` (${by("synthetic").textContent})` : ""), drawn, ...found.lines ?? []];
-  titled(by("plot"), texts.filter(Boolean)).toBlob((picture) => save(picture, "png"));
+  const whole = title + (isMadeUp() ? ` (${by("synthetic").textContent})` : "");
+  titled(by("plot"), [whole, drawn, ...found.lines ?? []].filter(Boolean)).toBlob((picture) => save(picture, "png"));
 });
 by("netcdf").addEventListener("click", async () => {
   put(by("netcdf"), {disabled: true});

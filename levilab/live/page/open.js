@@ -7,8 +7,6 @@ import {drawReadings, sheet} from "./plot.js";
 import {showResult} from "./result.js";
 import {by, make, option, phrase, turnLanguage, write} from "./words.js";
 
-/** Least height of a small plot [px]. */
-const PLOT_PX = 240;
 const HEADS = [phrase("Column"), phrase("Understood as"), phrase("Unit"), phrase("First values")];
 const token = takeToken();
 let quantities = {}, look = null;
@@ -111,7 +109,7 @@ function doubtOf({kind, text, choices}) {
   const row = make("div", "", "row");
   for (const choice of choices) {
     const button = make("button", choice.text);
-    button.addEventListener("click", () => correct({...optionsNow(), ...kind === "rows" ? {skip_doubtful: true} : {columns: {...columnsNow(), ...canonical(choice.columns)}}}));
+    button.addEventListener("click", () => correct({...look.options, ...kind === "rows" ? {skip_doubtful: true} : {columns: {...columnsNow(), ...canonical(choice.columns)}}}));
     row.append(button);
   }
   box.append(row);
@@ -188,20 +186,18 @@ function columnsNow(run = look.runs.find(({problem}) => !problem) || look.runs[0
   }));
 }
 
-const optionsNow = () => ({...look.options});
-
 /** Take a column for something else, or in another unit; what was taken for it so far is left. */
 function change(column, run, {quantity, unit}) {
   const columns = columnsNow(run);
   if (column.quantity) delete columns[column.quantity];
   if (quantity) columns[quantity] = `${column.index + 1}${unit ? ` [${unit}]` : ""}`;
-  const {columns: _, ...others} = optionsNow();
+  const {columns: _, ...others} = look.options;
   return correct(Object.keys(columns).length ? {...others, columns} : others);
 }
 
-by("channel").addEventListener("change", () => correct({...optionsNow(), channel: by("channel").value}));
-const rim = numberField("rim", (value) => correct({...optionsNow(), rim_mm: Number.isNaN(value) ? null : value}), true);
-const rate = numberField("rate", (value) => correct({...optionsNow(), rate: value}));
+by("channel").addEventListener("change", () => correct({...look.options, channel: by("channel").value}));
+const rim = numberField("rim", (value) => correct({...look.options, rim_mm: Number.isNaN(value) ? null : value}), true);
+const rate = numberField("rate", (value) => correct({...look.options, rate: value}));
 by("again").addEventListener("click", () => correct({}));
 by("keep").addEventListener("click", async () => {
   const {kept, error} = await ask({do: "keep", file: look.file}, token);
@@ -233,7 +229,6 @@ by("samples").addEventListener("click", async ({target: {value: name}}) => {
 function draw(number) {
   const canvas = by(`plot-${number}`), plot = look.plots[number];
   if (!canvas) return;
-  canvas.style.height = `${PLOT_PX}px`;
   const values = Float64Array.from(plot.y);
   drawReadings(sheet(canvas), {
     x: Float64Array.from(plot.x), low: values, high: values, u: null, fit: null, single: true, xAxis: [...plot.x_axis, 1], yAxis: [...plot.y_axis, 1],

@@ -37,7 +37,7 @@ export function titled(canvas, [title, ...lines]) {
   c.fillStyle = paint.ink;
   for (const [k, text] of [title, ...lines].entries()) {
     c.font = k ? FONT : `bold ${FONT}`;
-    c.fillText(text, 12, 18 * (k + 1));
+    c.fillText(text, 12, 18 * (k + 1), canvas.clientWidth - 24);
   }
   return copy;
 }
@@ -152,7 +152,7 @@ export function drawReadings(paper, data, pointed) {
     const apart = toLeft(0) - toLeft(one / fy) >= 15;  // else the zero would lie on its neighbours
     for (const mark of apart ? [-one, 0, one] : [-one, one]) c.fillText(short(mark, 2), edge - 7, toLeft(mark / fy));
     c.textAlign = "left";
-    c.fillText(phrase("readings − fit"), edge, bottom - below - 10);
+    c.fillText(named(["readings − fit", data.yAxis[1]]), edge, bottom - below - 10);
     c.strokeStyle = paint.line;
     c.strokeRect(edge + 0.5, bottom - below + 0.5, width - edge - RIGHT - 1, below - 1);
   }

@@ -25,7 +25,7 @@ export function watchPractice() {
 export function openPractice(about, command, run, isOwn, allowed) {
   document.body.classList.add("practice");
   by("practice").hidden = false;
-  for (const {name, title} of about.experiments) by("experiment").append(option(phrase(title), name));
+  for (const {name, title} of about.experiments) by("experiment").append(Object.assign(option(phrase(title), name), {selected: name === sessionStorage.getItem("experiment")}));
   const now = {drive: false, busy: false, paused: false, analyzed: "", ended: false, elsewhere: null, bench: null};
 
   put(by("controls"), {disabled: true});  // until the bench is there
@@ -223,6 +223,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     const speed = Number(by("speed").value), length = lapse(length_s);
     const soon = speed === 1 ? phrase("About {length} of the bench.", {length}) : phrase("About {length} of the bench, {time} at {speed} ×.", {length, time: lapse(length_s / speed), speed: short(speed)});
     write("asks", `${phrase(asks)} ${soon}`);
+    sessionStorage.setItem("experiment", by("experiment").value);  // another language loads the page again
   }
   for (const id of ["experiment", "speed"]) by(id).addEventListener("change", sayWhatItAsks);
   sayWhatItAsks();
@@ -251,7 +252,6 @@ export function openPractice(about, command, run, isOwn, allowed) {
     if (elsewhere) return;
     const {drive} = bench;
     Object.assign(now, {drive: Boolean(drive?.output), busy: bench.busy, paused: bench.paused});
-    by("back").classList.toggle("main", down);
     press("drive", now.drive, now.drive ? phrase("Drive off") : phrase("Drive on"));
     press("hold", now.paused, now.paused ? phrase("Let time go on") : phrase("Stop time"));
     write("record", now.busy ? phrase("End run") : phrase("Record"));
@@ -261,7 +261,9 @@ export function openPractice(about, command, run, isOwn, allowed) {
     if (bench.seed !== now.seed) seed.set(String(now.seed = bench.seed));  // else a person may be typing
     names.forEach((name, k) => knobs[k].show(bench.what_if[name]));
     showTask(bench, Boolean(steps));
-    need(now.busy ? "" : tasks[bench.task]?.needs ?? (down && steps && steps !== "analyze" ? "back" : steps), Boolean(bench.task));
+    const next = now.busy ? "" : tasks[bench.task]?.needs ?? (down && steps && steps !== "analyze" ? "back" : steps);
+    need(next, Boolean(bench.task));
+    for (const id of ["match", "back", "record", "analyze"]) by(id).classList.toggle("main", id === (next || (down ? "back" : "record")));  // one at most
     for (const part of ["what-if", "tasks", "offer"]) put(by(part), {inert: now.busy || !allowed});
     put(by("analyze"), {disabled: now.busy || !readings || about_run?.status === "running"});
     if (drive) {
@@ -284,7 +286,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     };
     if (recorded && now.looked !== name) {  // another page may have analyzed it
       now.looked = name;
-      read(`run/${encodeURIComponent(name)}/analysis?language=${LANGUAGE}`).then((found) => { if (found?.verdict?.length) now.analyzed = name; });
+      read(`run/${encodeURIComponent(name)}/analysis?language=${LANGUAGE}`).then((found) => { if (found?.verdict?.length) take(found.verdict, name); });
     }
     const items = [...by("guide").children], last = items.map((item) => Boolean(done[item.dataset.step])).lastIndexOf(true);
     items.forEach((item, k) => {  // a run drives the top itself: it has done the steps before it
@@ -306,15 +308,18 @@ export function openPractice(about, command, run, isOwn, allowed) {
     now.asked = name;
     const is = () => now.asked === name;
     const isThere = await showResult(
-      () => command({do: "analyze", run: name}), `run/${encodeURIComponent(name)}`, is, () => { now.analyzed = name; });
+      () => command({do: "analyze", run: name}), `run/${encodeURIComponent(name)}`, is, (verdict) => take(verdict, name));
     if (is() && !isThere) now.asked = "";
   }
 
+  const take = (verdict, name) => Object.assign(now, {analyzed: name, verdict: verdict.slice(0, 2)});
   /** Whether the running fit would give away what the task under way asks for: until the run is analyzed. */
   const hidesFit = () => now.analyzed !== run() && Object.keys(tasks[now.bench?.task]?.answers ?? {}).length > 0;
 
   return {
     show, step, hear, hidesFit, get ended() { return now.ended; },
+    /** What the analysis of the run that is shown says; nothing before. */
+    get verdict() { return now.analyzed === run() ? now.verdict : []; },
     act: (id) => by(id).click(),
   };
 }

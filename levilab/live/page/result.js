@@ -18,7 +18,7 @@ const STEPS = {
  * @param {() => Promise<string>} begin asks for it; what is wrong, or "".
  * @param {string} at address of the input on the server.
  * @param {() => boolean} wanted whether its answer is still looked at.
- * @param {() => void} analyzed is called once there is an answer.
+ * @param {(verdict: string[]) => void} analyzed is called once there is an answer.
  * @returns whether the report was written, too.
  */
 export async function showResult(begin, at, wanted, analyzed) {
@@ -54,7 +54,7 @@ export async function showResult(begin, at, wanted, analyzed) {
     }
     if (found.step !== "analyze" && !isShown) {
       isShown = true;
-      analyzed();
+      analyzed(found.verdict);
       clear(found.verdict, found.step, found);
       by("figures").append(...found.figures.map((figure) => Object.assign(make("img"), {
         src: `${at}/${figure}?${Date.now()}`, alt: phrase("figure of the {analysis} analysis", {analysis: found.analysis}),

@@ -35,11 +35,11 @@ export const fixed = (value, decimals) =>
 export const short = (value, digits = 4) =>
   Number.isFinite(value) ? local(String(Number(value.toPrecision(digits)))).replace("-", "−") : "–";
 
-/** Seconds as 34 s, 2:05 min or 1:02:05. */
-export function lapse(seconds) {
+/** Seconds as 34 s, 2:05 min or 1:02:05; in minutes from so many seconds on. */
+export function lapse(seconds, least = 100) {
   if (!Number.isFinite(seconds)) return "";
   const whole = Math.round(Math.abs(seconds)), sign = seconds < -0.5 ? "−" : "";
-  if (whole < 100) return `${sign}${whole} s`;
+  if (whole < least) return `${sign}${whole} s`;
   const two = (n) => String(n).padStart(2, "0");
   const [h, m, s] = [Math.floor(whole / 3600), Math.floor(whole / 60) % 60, whole % 60];
   return sign + (h ? `${h}:${two(m)}:${two(s)}` : `${m}:${two(s)} min`);

@@ -267,7 +267,7 @@ class PracticeDrive:
             say(Text("the drive has lost the top: {again}", again=_AGAIN[int(np.sign(self._set.frequency_hz - drive))]))
         elif off <= _SWINGS_HZ and drive >= hold.at_hz + _TUNED_UP_HZ and not self.tuned_up:
             self.tuned_up = True
-            say("the top follows the drive up")
+            say("the top follows the drive up", "the top follows the drive")
 
     def _give_up(self) -> None:
         self._switch_off()

@@ -120,7 +120,7 @@ TASKS: dict[str, Task] = {
     ),
     "mass": Task(
         "Find the mass that floats", "This top is too heavy by some tenths of a gram. Take washers off (What if), and "
-        "put it back, until it floats for 20 s.",
+        "put the top back, until it floats for 20 s.",
         "of 25 g only some tenths are free: field and weight balance at a height at which the field also holds the top",
         "washers_g", lambda look: look.floats, for_s=20.0, found=_say_mass, hidden=_mass,
     ),

@@ -92,7 +92,7 @@ def test_a_language_that_is_a_new_file_says_everything_of_a_page(hall, watched):
     assert page.inner_text("#spin-value") == "30·5000"
     page.fill("#frequency", "abc")
     page.press("#frequency", "Enter")
-    assert page.inner_text("#frequency-wrong") == "⟦a number from 1 to 100, not abc⟧"
+    assert page.inner_text("#frequency-wrong") == "⟦a number from 1 to 100 Hz, not abc⟧"
     page.select_option("#run", NAME)
     until(page, "levilab.drawn > 0 && levilab.data.fit")
     assert re.match("⟦the top follows the drive (up|at 30·50 Hz)⟧$", page.inner_text("#event-list li:last-child span"))

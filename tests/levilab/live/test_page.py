@@ -391,7 +391,7 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(served, watched, tmp_path
     assert rows[:2] == ["# SYNTHETIC", "bench_time_s,spin_frequency_hz,drive_frequency_hz"]
     assert rows[2:] == ["0.75,22.6,", "1,,", "2,,"]  # the count at the middle of its gate, and when it was looked
     run.readings(spin_down(3))
-    until(page, "levilab.data.count === 3")
+    until(page, "levilab.data.count === 3 && levilab.data.shown.head")
     save_what_is_drawn(page, run, tmp_path)
     assert page.evaluate("levilab.space.replays")
     later = GrowingRun(tmp_path, "20261122T110000Z-spin-0000")

@@ -43,9 +43,11 @@ QUICK = ("spin.drive_frequency_hz=31", "spin.drive_waveform=SQU", "spin.ramp_hz_
          "spin.interval_s=2")  # fmt: skip
 #: A top that another program's bench publishes.
 POSE = Poses(7.0, 1 / 400, np.full((1, 3), 0.1), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ones(1, dtype=bool))
-#: The steps of the guide that are ticked.
-#: The control that the page marks as the next one to use.
+#: The control that the page marks as the next one to use, buttons that are drawn as it, and whether Analyze is one.
 NEEDED = "document.querySelector('.needed')?.id"
+SOLID = "[...document.querySelectorAll('#controls .main')].map((one) => one.id).join()"
+CAN_BE_ANALYZED = "!document.getElementById('analyze').disabled"
+#: The steps of the guide that are ticked.
 DONE = "[...document.querySelectorAll('#guide .done')].map((one) => one.dataset.step).join()"
 
 
@@ -105,8 +107,8 @@ def record_some_readings(page):
 def type_into_the_fields(page):
     """Numbers with a comma and with a point are taken; what is no number, or none that is allowed, is refused."""
     for field, typed, said in (
-        ("frequency", "333", "from 1 to 100, not 333"),
-        ("frequency", "3o,5", "a number from 1 to 100, not 3o,5"),
+        ("frequency", "333", "from 1 to 100 Hz, not 333"),
+        ("frequency", "3o,5", "a number from 1 to 100 Hz, not 3o,5"),
         ("seed", "1.5", "a whole number from 0 to 999999999, not 1.5"),
     ):
         page.fill(f"#{field}", typed)
@@ -183,6 +185,15 @@ def record_quickly(route):
     route.continue_(post_data=json.dumps(wanted | more))
 
 
+def load_again(page, name):
+    """As for another language: the run, and the experiment that was chosen, are there; one button is the next step."""
+    page.select_option("#experiment", "hold")
+    page.reload()
+    until(page, f"levilab.seen.run === '{name}' && levilab.data.count >= 3 && {CAN_BE_ANALYZED}")
+    assert page.input_value("#experiment") == "hold"
+    until(page, f"{SOLID} === 'analyze'")
+
+
 def test_a_student_drives_records_and_analyzes(served, older, watched, monkeypatch):
     page = watched(device_scale_factor=0.5)  # fewer pixels to draw for a minute
     page.route("**/do?*", record_quickly)
@@ -207,9 +218,8 @@ def test_a_student_drives_records_and_analyzes(served, older, watched, monkeypat
     type_into_the_fields(page)
     change_what_if(page)
     assert page.evaluate("[levilab.seen.run, document.getElementById('run').value, levilab.data.count]") == ["", ".", 0]
-    can_be_analyzed = "!document.getElementById('analyze').disabled"
     page.select_option("#run", OLDER)  # of another bench, and it is there like one of this
-    until(page, f"levilab.data.count === 19 && levilab.data.bench && {can_be_analyzed}")
+    until(page, f"levilab.data.count === 19 && levilab.data.bench && {CAN_BE_ANALYZED}")
     with monkeypatch.context() as quick:
         quick.setattr(served.analyses, "carry_out", lambda _: (0, ""))
         page.click("#analyze")
@@ -224,14 +234,14 @@ def test_a_student_drives_records_and_analyzes(served, older, watched, monkeypat
     until(page, "document.body.dataset.state === 'interrupted'")
     assert page.input_value("#speed") == "10"  # as it was chosen
     name = page.input_value("#run")
-    page.reload()
-    until(page, f"levilab.seen.run === '{name}' && levilab.data.count >= 3 && {can_be_analyzed}")
+    load_again(page, name)
     page.click("#hold")
     until(page, "levilab.data.bench.paused")
     monkeypatch.setattr(served.analyses, "carry_out", carry_out_here)
     page.click("#analyze")
     until(page, "document.querySelectorAll('#figures img').length && document.getElementById('verdict').innerText")
     until(page, f"{DONE} === 'drive,tune,record,analyze'")  # the run tuned the drive up
+    assert page.text_content("#fit-lines").startswith(page.text_content("#verdict p >> nth=0"))
     assert sorted(path.name for path in served.root.iterdir()) == [OLDER, name]
     assert (served.root / name / "result.json").exists()
 

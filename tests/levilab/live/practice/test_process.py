@@ -268,6 +268,7 @@ def test_the_bench_says_what_becomes_of_the_top_and_how_far_a_person_has_come(se
     )
     assert [text.startswith(begin) for text, begin in zip(said, begins, strict=False)] == [True] * 4
     since = [min(s.time_s for s in session.states if getattr(s, name)) for name in ("took_hold", "tuned_up")]
+    assert {s.text for s in session.states if since[1] < s.time_s < 70.0} == {"the top follows the drive"}
     assert 15.0 < since[0] < since[1] < 40.0
 
 
