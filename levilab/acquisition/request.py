@@ -42,7 +42,7 @@ _BASE = (
     "thickness {thickness_m:.6f} m, its middle at {origin_m:+.6f} m, in a background of {background_t:+.3e} T, all "
     "drawn by the seed"
 )
-_IN_MOTION = "the top of the scene {name}, simulated in full motion"
+_IN_MOTION = "the top that of the scene {name}, simulated in full motion"
 
 
 #: Kind of instrument → the option that names another one than the bench's.
