@@ -377,7 +377,8 @@ def _fit(
         # its own slopes would move the swings by 1e-6 Hz
         expected = known.value + follows * (vertical_swing(frequency[0], frequency[1]) - of_field)
         off = np.append(slope / _SLOPES_U[:count], (rise - expected) * prior[-1, -1])
-        information, gradient = information + prior.T @ prior, gradient - prior.T @ off
+        information += prior.T @ prior
+        gradient -= prior.T @ off
         scale = np.sqrt(np.diagonal(information))
         unlike = information / np.outer(scale, scale) + _FINEST * np.eye(scale.size)
         covariance = np.linalg.inv(unlike) / np.outer(scale, scale)
