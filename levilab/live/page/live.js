@@ -528,12 +528,12 @@ by("strobe").addEventListener("change", strobe);
 by("replay").addEventListener("click", () => space?.replay?.());
 if (matchMedia("(prefers-reduced-motion: reduce)").matches) by("motion").value = "0";
 by("sound").addEventListener("change", () => sound.play(by("sound").checked));
-const isMadeUp = () => !by("synthetic").hidden;
-by("csv").addEventListener("click", () => save(new Blob([isMadeUp() ? "# SYNTHETIC\n" : "", isOfMinutes() ? history.table() : tableOf(data.readings)], {type: "text/csv"}), "csv"));
+const isSynthetic = () => !by("synthetic").hidden;
+by("csv").addEventListener("click", () => save(new Blob([isSynthetic() ? "# SYNTHETIC\n" : "", isOfMinutes() ? history.table() : tableOf(data.readings)], {type: "text/csv"}), "csv"));
 by("png").addEventListener("click", () => {
   const [title, found] = isOfMinutes() ? [phrase("The last minutes"), {}] : [[data.about?.group, seen.run].filter(Boolean).join(", "), data.shown];
   const drawn = [isOfMinutes() ? "" : `○ ${phrase("Readings")}`, found.head && `${data.fit ? "― " : ""}${found.head}`].filter(Boolean).join("     ");
-  const whole = title + (isMadeUp() ? ` (${by("synthetic").textContent})` : "");
+  const whole = title + (isSynthetic() ? ` (${by("synthetic").textContent})` : "");
   titled(by("plot"), [whole, drawn, ...found.lines ?? []].filter(Boolean)).toBlob((picture) => save(picture, "png"));
 });
 by("netcdf").addEventListener("click", async () => {
