@@ -195,7 +195,8 @@ def _fill(template: str, values: Mapping[str, Any], code: str) -> str:
 def _write(value: Any, how: str, code: str) -> str:
     decimal = "." if code == ENGLISH else language_of(code).decimal
     if isinstance(value, tuple):
-        return ("; " if decimal == "," else ", ").join(_write(one, how, code) for one in value)
+        texts = [_write(one, how, code) for one in value]
+        return ("; " if decimal == "," and any("," in one for one in texts) else ", ").join(texts)
     if how == "s":
         return str(value)
     if isinstance(value, str):
