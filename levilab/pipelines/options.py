@@ -399,8 +399,9 @@ def read_options(given: Mapping[str, Any], *, typed: bool = False) -> dict[str, 
         one = OPTIONS[names[shown]]
         off = value != "none" and str(value).casefold() in _OFF
         if off and not typed and "none" in one.choices:
-            others = ", ".join(repr(choice) for choice in one.choices if choice != "none")
-            raise UsageError(shown, "'none' in quotation marks is expected, or {others:s}", others, value=str(value))
+            *others, last = (repr(choice) for choice in one.choices if choice != "none")
+            said = "'none' in quotation marks is expected, or {others:s} or {last:s}"
+            raise UsageError(shown, said, tuple(others), last, value=str(value))
         if value is None:
             continue
         if one.needs and given.get(typed_name(one.needs) if typed else one.needs) is None:

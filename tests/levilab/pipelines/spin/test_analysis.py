@@ -93,7 +93,7 @@ def test_a_note_of_channels_names_its_file_and_them_as_they_are_in_german_too(tm
         np.savetxt(tmp_path / name, shifted, "%.7g", ",", header="time [s],mark,laser", comments="")
     found = SPIN.analyze([tmp_path / "p1.csv", tmp_path / "p2.csv"], SpinOptions())
     said = [in_language(text, "de") for text in found.all_warnings]
-    has = "hat Aufzeichnungen von mark; laser; ausgewertet wird mark, die Option `channel` wählt etwas anderes"
+    has = "hat Aufzeichnungen von mark, laser; ausgewertet wird mark, die Option `channel` wählt etwas anderes"
     assert [text for text in said if "Aufzeichnungen" in text] == [f"p1.csv: {has}", f"p2.csv: {has}"]
 
 
