@@ -26,7 +26,7 @@ def live(
         bool, flag("Let phones in the same network look on, by a second address with a QR code.", "--share")
     ] = False,
     language: Language = "en",
-    no_open: Annotated[bool, flag("Open no browser: print the address only.", "--no-open")] = False,
+    no_open: Annotated[bool, flag("Open no browser: print the address only.", "--no-open", "--no-browser")] = False,
 ) -> None:
     """Serve the view until Ctrl-C."""
     if seed and not mock:

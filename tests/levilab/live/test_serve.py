@@ -34,7 +34,7 @@ def test_a_port_that_is_taken_is_named(tmp_path):
 
 
 def test_a_run_that_is_not_there_is_named(tmp_path):
-    ended = command("live", "nothere", "--no-open", "--port", "0", cwd=tmp_path)
+    ended = command("live", "nothere", "--no-browser", "--port", "0", cwd=tmp_path)
     assert ended.status == 1
     assert "nothere: there is no such run" in ended.err
 

@@ -89,6 +89,13 @@ def spin_down_file(folder, name, *, frequency=1.0, time=1.0, decimals=12):
     return path
 
 
+def test_scatter_beyond_the_stated_u_names_the_law_about_which_it_is(tmp_path):
+    budgets = analyzed("spindown", [spin_down_file(tmp_path, "run.csv")], tilt="none", reading_u=0.001).budget
+    notes = [(budget.model, one.note) for budget in budgets for one in budget.included if one.name == "excess"]
+    assert {law for law, _ in notes} == {"disc", "power"}
+    assert all(note.endswith(f" about the {law} law") for law, note in notes)
+
+
 def test_a_clock_that_is_wrong_moves_each_constant_by_its_row(tmp_path):
     off = 1e-4
     plain, fast, late = (
