@@ -3,16 +3,6 @@
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
-def how_many(n: int, noun: str) -> str:
-    """Return a number of things.
-
-    >>> how_many(1, "run"), how_many(4, "run"), how_many(0, "match")
-    ('1 run', '4 runs', '0 matches')
-    """
-    plural = f"{noun}es" if noun.endswith(("ch", "s")) else f"{noun}s"
-    return f"{n} {noun if n == 1 else plural}"
-
-
 def with_minus(text: str) -> str:
     """Return a number as Python writes it, with a minus where a hyphen stands before it.
 

@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
-from analysis.numbers import how_many
 from analysis.pulses.clean import mains_lines
 from analysis.pulses.search import shorten
 from instruments.drivers.oscilloscope.sound import SoundCard
 from instruments.links.sound import inputs
+from levilab.texts.text import how_many
 
 #: How long is listened [s], and in how many parts the level is compared.
 _LISTENS_S, _PARTS = 3.0, 6

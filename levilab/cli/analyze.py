@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from analysis.numbers import how_many
 from levilab.cli.later import Later, NamedLast
 from levilab.cli.options import Json, Language, Paths, existing_path, flag, folder, number, option, place
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError, as_typed
 from levilab.pipelines.options import DEFAULTS, KINDS, OPTIONS, Option, options_of, read_options, typed_name
-from levilab.texts.text import Text, text_of
+from levilab.texts.text import Text, how_many, text_of
 
 if TYPE_CHECKING:
     from levilab.pipelines.document import Analysis

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.numbers import how_many
 from levilab.errors import UsageError
 from levilab.formats.titles import read_title
 from levilab.present.units import split
+from levilab.texts.text import how_many
 
 if TYPE_CHECKING:
     from pathlib import Path

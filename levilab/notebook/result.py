@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 import levilab
-from analysis.numbers import how_many
 from levilab.errors import UsageError, unquote
 from levilab.files import CannotWrite, as_json, check_folder, replace_atomically
 from levilab.notebook.fit import FIT, INSTEAD, LEAST_CORRELATION, METHODS, FittedModel, axes_of
@@ -32,6 +31,7 @@ from levilab.report.export.contents import contents_of_readings, readings_of
 from levilab.report.export.write import FORMATS
 from levilab.report.page import render_part
 from levilab.report.tables.latex import to_latex
+from levilab.texts.text import how_many
 
 if TYPE_CHECKING:
     from collections.abc import ItemsView, Iterator, KeysView, Mapping

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import levilab
-from analysis.numbers import how_many
 from levilab.errors import UsageError
 from levilab.notebook.analysis import analyze_data
 from levilab.notebook.labels import dataset_of_contents
@@ -17,6 +16,7 @@ from levilab.present.html import facts_as_html, table_as_html
 from levilab.report.export.contents import contents_of_results
 from levilab.runs.listing import Listed, list_runs
 from levilab.runs.run import Run
+from levilab.texts.text import how_many
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping, Sequence

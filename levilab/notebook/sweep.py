@@ -8,7 +8,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
-from analysis.numbers import how_many
 from levilab.errors import UsageError
 from levilab.notebook.labels import dataset_of, head_as_html
 from levilab.notebook.names import Exportable, bare
@@ -24,6 +23,7 @@ from levilab.sweeps.request import SweepRequest, store_for
 from levilab.sweeps.run import compile_for, run, workers_for
 from levilab.sweeps.store import Store
 from levilab.sweeps.summary import axes_lines, columns_table, headline, summarise
+from levilab.texts.text import how_many
 
 if TYPE_CHECKING:
     from os import PathLike

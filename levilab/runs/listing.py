@@ -13,14 +13,13 @@ import pydantic_core
 from rich.cells import cell_len
 from rich.markup import escape
 
-from analysis.numbers import how_many
 from levilab.errors import DataError
 from levilab.formats.table import NO_READING
 from levilab.present.numbers import short_name
 from levilab.present.terminal import print_rows, terminal
 from levilab.runs.find import RECORD, find_runs, must_be_searchable
 from levilab.runs.run import READINGS, Run, RunRecord
-from levilab.texts.text import Text, in_language
+from levilab.texts.text import Text, how_many, in_language
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,6 @@ from itertools import count
 from pathlib import Path
 from typing import Any, Self
 
-from analysis.numbers import how_many
 from instruments.drivers.oscilloscope import Trace
 from levilab.computer import computer, utc_now
 from levilab.errors import DataError, unquote
@@ -27,7 +26,7 @@ from levilab.runs.events import RunEvent
 from levilab.runs.find import RECORD
 from levilab.runs.package import field, package, resource
 from levilab.runs.run import EVENTS, LOCK, PACKAGE, READINGS, STATES, WIRE, Run, RunRecord, Status, lock_of, read_record
-from levilab.texts.text import Text
+from levilab.texts.text import Text, how_many
 
 #: Files that grow line by line, kept in memory to be written again.
 _KEPT = (READINGS, STATES, EVENTS, traces.INDEX)

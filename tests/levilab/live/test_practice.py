@@ -167,7 +167,7 @@ def ask_which_washers(page):
 
 
 #: Another top is drawn while the motion stands still, as with reduced motion, and its poses, a tenth of a millimetre
-#: apart, have begun anew.
+#: apart, have begun again.
 ANOTHER_TOP = """() => {
   const space = levilab.space, parts = space.parts, upright = [0, 0, 0, 1, 0, 0, 0, 1];
   space.add(0, 0.0025, new Float32Array([0, 0, 0.07, 0, 0, 0.0701]), new Float32Array(upright), [1, 1]);
