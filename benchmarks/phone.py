@@ -20,9 +20,9 @@ import numpy as np
 import levilab
 from analysis.errors import AnalysisError
 from analysis.rotation import spin_of_field
-from analysis.rotation.synthetic import frequency_bounds, synthetic_field, synthetic_flight
 from levilab.pipelines.options import SpinOptions
 from levilab.pipelines.spin.magnetometer import read_field_record
+from phone_records import frequency_bounds, synthetic_field, synthetic_flight
 
 RESULTS = Path(__file__).parent / "results" / "phone.json"
 SEED = 20261124

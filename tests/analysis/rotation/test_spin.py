@@ -6,7 +6,7 @@ import pytest
 from analysis.errors import ShapesDiffer, TimesNotIncreasing, TooFewReadings
 from analysis.rotation import spin_of_field
 from analysis.rotation.errors import NoLine
-from analysis.rotation.synthetic import frequency_bounds, synthetic_field
+from phone_records import frequency_bounds, synthetic_field
 
 TRIALS = 60
 

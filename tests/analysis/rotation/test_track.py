@@ -5,7 +5,7 @@ import pytest
 
 from analysis.rotation import track_of_field
 from analysis.rotation.errors import NoLine
-from analysis.rotation.synthetic import synthetic_flight
+from phone_records import synthetic_flight
 
 
 @pytest.fixture

@@ -5,13 +5,13 @@ import importlib.util
 import numpy as np
 import pytest
 
-from analysis.rotation.synthetic import synthetic_field, synthetic_flight
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import LimitOptions, SpinDownOptions, SpinOptions
 from levilab.pipelines.spin.figure import spin_figure
 from levilab.pipelines.spin.report import meaning
 from levilab.pipelines.suits import analyze_suiting
+from phone_records import synthetic_field, synthetic_flight
 from support.figures import faults
 from support.paths import ROOT
 
