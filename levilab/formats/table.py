@@ -243,7 +243,7 @@ def _table(
     name = shorten(str(path), 200)
     notes = [*warnings, *(reword(note, Said("{path:s}: {what}", name, note), names_input=True) for note in rows.notes)]
     numbers = dict(zip(chosen, rows.values, strict=False))
-    notes += [of_file("±", Said("{seen} is not used", _seen(name, c))) for c in _drop_unused(numbers, wanted)]
+    notes += [of_file("±", Said("{seen} is not used", _seen(name, c)), "advice") for c in _drop_unused(numbers, wanted)]
     # The comparison is false for NaN, too.
     present = {column: np.abs(values) < NO_READING for column, values in numbers.items() if column.name not in gaps}
     present = {column: there & (numbers[column] != 0) if column.inverse else there for column, there in present.items()}
@@ -348,11 +348,12 @@ def _notes_on_u(seen: str, column: Column, missing: "NDArray[np.bool_]", read: "
         how = "missing" if column.behind else "empty"
         yield of_file("gaps", Said(gap, seen, how, missing.sum(), read.sum()))
     elif column.behind:
-        yield of_file("±", Said("{seen} is taken as the standard uncertainty", seen))
+        yield of_file("±", Said("{seen} is taken as the standard uncertainty", seen), "advice")
 
 
 def _missed_warning(name: str, lines: "NDArray[np.int64]", rows: int, *, periods: bool) -> str:
     """Return the warning about rows left out, with what counts as missed, a period of 0 with `periods`."""
     zero = ", a period of 0" * periods
     places = ", ".join(str(line) for line in lines[:5]) + (", …" if lines.size > 5 else "")
-    return of_file("missed", Said(_MISSED_ONE if lines.size == 1 else _MISSED, name, lines.size, rows, zero, places))
+    said = _MISSED_ONE if lines.size == 1 else _MISSED
+    return of_file("missed", Said(said, name, lines.size, rows, zero, places), "advice")

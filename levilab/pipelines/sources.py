@@ -30,7 +30,7 @@ from levilab.present.clock import local
 from levilab.present.numbers import filled, list_in_words, short_name
 from levilab.runs.find import RECORD, find_runs, no_such_path
 from levilab.runs.run import READINGS, Run
-from levilab.texts.note import Note, of_file
+from levilab.texts.note import Note, Weight, of_file
 from levilab.texts.note import kind_of as kind_of_text
 from levilab.texts.text import Sentences, Text, how_many, text_of
 
@@ -43,24 +43,25 @@ SAME = 5e-5
 
 
 @dataclass(frozen=True)
-class Doubting:
-    """A sentence in a table of remarks that makes the numbers worthless where it is right; see `note_of`."""
+class Weighed:
+    """A sentence in a table of remarks that is no plain warning; see `note_of`."""
 
     text: str | Callable[..., str]
+    weight: Weight
 
 
-def note_of(of: Remark, table: Mapping[str, str | Callable[..., str] | Doubting], *values: Any, **named: Any) -> Note:
+def note_of(of: Remark, table: Mapping[str, str | Callable[..., str] | Weighed], *values: Any, **named: Any) -> Note:
     """Return a remark as a note, whose sentence stands in a table by its kind, or is made there of values.
 
     The fields of a sentence are the remark's values in their order, but for its ``{name}`` and ``{law}``.
     """
     row = table[of.kind]
-    said = row.text if isinstance(row, Doubting) else row
+    said, weight = (row.text, row.weight) if isinstance(row, Weighed) else (row, "warning")
     if not isinstance(said, str):
         text = said(*values, **named)
     else:
         text = filled(said, of.values, name=of.name, law=of.law) if "{" in said else said
-    return Note(f"{of.kind}:{of.law} {of.name}", text, is_doubt=isinstance(row, Doubting))
+    return Note(f"{of.kind}:{of.law} {of.name}", text, weight=weight)
 
 
 class Readings:
@@ -467,7 +468,7 @@ def _of_file(path: Path, needs: Needs[R], options: InputOptions) -> Source[R]:
     readings = needs.read_file(path, replace(options, **kept))
     said = "{name:s}: is read as {file:s} says: {options:s}"
     text = Text(said, path.name, place_of_correction(path).name, describe(kept))
-    note = [of_file("correction", text)] if kept else []
+    note = [of_file("correction", text, "advice")] if kept else []
     return Source(path, path, sha256_of(path), None, readings, path.name, (*readings.warnings, *note), kept)
 
 
@@ -481,7 +482,7 @@ def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
         what = "{path:s}: holds no {name:s}, so nothing was recorded; analyze another run"
         raise DataError(what, path=run.folder, name=data.name)
     readings = needs.read_run(run, options)
-    doubts = (Note(kind_of_text(text), text, is_doubt=True) for text in run.warnings())
+    doubts = (Note(kind_of_text(text), text, weight="doubt") for text in run.warnings())
     return Source(run.folder, data, sha256_of(data), run, readings, run.folder.name, (*doubts, *readings.warnings))
 
 

@@ -21,7 +21,7 @@ from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import unquote
 from levilab.present.numbers import enumeration, plain, with_sign, with_uncertainty
 from levilab.present.units import unit
-from levilab.texts.note import is_advice, is_doubt
+from levilab.texts.note import is_doubt, weight_of
 from levilab.texts.text import Sentences, Text, how_many, in_language
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
     model = max(laws, key=lambda law: laws[law], default="") or document.get("best_model", "")
     parts = document["runs"]
     said = [
-        [text for text in (*source.warnings, *found.about_run(run)) if not is_advice(text)]
+        [text for text in (*source.warnings, *found.about_run(run)) if weight_of(text) != "advice"]
         for source, run in zip(found.sources, found.runs, strict=True)
     ]
     groups = tuple(

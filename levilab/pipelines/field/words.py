@@ -10,7 +10,7 @@ from analysis.numbers import digits
 from analysis.remarks import Remark
 from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, statistic
-from levilab.pipelines.sources import Doubting, note_of
+from levilab.pipelines.sources import Weighed, note_of
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.texts.text import Sentences, Text
 
@@ -170,7 +170,7 @@ def _contradicts(found: float, stated: float, u: float, name: str) -> str:
     )  # fmt: skip
 
 
-_REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(
+_REMARKS: Mapping[str, str | Callable[..., str] | Weighed] = MappingProxyType(
     {
         "scan scatters": lambda reduced: Text(
             "the fit leaves more than the stated uncertainties explain (χ²/dof = {chi:n}): all "
@@ -178,13 +178,16 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(
             chi=digits(reduced, 3),
             factor=digits(math.sqrt(reduced), 3),
         ),
-        "scan overstated": (
+        "scan overstated": Weighed(
             "the readings scatter far less than their stated uncertainties (χ²/dof = {chi:n}): what is "
             "common to all of them, such as the scale of the instrument, belongs into gain_u and "
-            "background_u_t"
+            "background_u_t",
+            "advice",
         ),
         "contradicts": _contradicts,
-        "no strength": Doubting("the strength is not significantly different from zero: was the probe near the base?"),
+        "no strength": Weighed(
+            "the strength is not significantly different from zero: was the probe near the base?", "doubt"
+        ),
         "stray reading": lambda height, off: Text(
             "the reading at {height:.4g} mm lies {off:.1f} u off the others: measure that height again",
             height=1e3 * height,

@@ -116,7 +116,7 @@ def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> Limi
     if not falls:
         raise DoesNotSuit("{path:s}: no top falls in it after {n} windows whose spin is certain", path, FEWEST)
     seen = Text("{name:s}: {n} of {tops} tops fall in this record", path.name, len(falls), len(track.flights))
-    notes = (*record.warnings, of_file("falls", seen))
+    notes = (*record.warnings, of_file("falls", seen, "advice"))
     return LimitReadings(np.array([one.value for one in falls]), np.array([one.u for one in falls]), notes)
 
 

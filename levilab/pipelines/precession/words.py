@@ -10,7 +10,7 @@ from analysis.precession.power import Power
 from analysis.precession.sweep import EXCLUDED_P, Point, SweepFit
 from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Quantity, columns_of, entry, statistic
-from levilab.pipelines.sources import Doubting, note_of
+from levilab.pipelines.sources import Weighed, note_of
 from levilab.present.numbers import plain, pulses_too_many, with_uncertainty
 from levilab.texts.text import Sentences, Text
 
@@ -110,11 +110,12 @@ def _point(points: tuple[Point, ...], k: float) -> str:
     return Text("point {number:.0f}, at {drive:.5g} Hz", number=k + 1, drive=points[int(k)].drive)
 
 
-_REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(
+_REMARKS: Mapping[str, str | Callable[..., str] | Weighed] = MappingProxyType(
     {
-        "many miscounts": Doubting(
+        "many miscounts": Weighed(
             "{named:.0f} of {n:.0f} points look like miscounts: too many to leave out, so the line goes "
-            "through all of them; look at the laser's signal and the trigger level"
+            "through all of them; look at the laser's signal and the trigger level",
+            "doubt",
         ),
         "miscount": _miscount,
         "unexplained": _miscount,
@@ -122,10 +123,11 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(
             "the points scatter {times:n} times as much as their u says (p = {p:n}): all uncertainties "
             "are enlarged by that"
         ),
-        "sweep overstated": (
+        "sweep overstated": Weighed(
             "the points scatter much less than their u says (χ² of {chi:n} for {freedom:.0f} degrees of "
             "freedom): their u is too large, and so is that of the line; gates in a row scatter more "
-            "than their mean, for a locked top swings about its drive and comes back"
+            "than their mean, for a locked top swings about its drive and comes back",
+            "advice",
         ),
         "sweep exact": "the points lie on the line to the last digit: without their u nothing can be tested; give it",
         "moves the slope": lambda points, k, change, share: Text(
@@ -147,13 +149,14 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Doubting] = MappingProxyType(
             "is uncertain by {slope:n} beside its u of {u:n}"
         ),
         "drive u unknown": "u of the drive's frequency is not known and taken as large as that of the precession",
-        "spin off": Doubting(
+        "spin off": Weighed(
             lambda _, off: Text(
                 "the spin that was counted lies {hz:n} Hz {way} the drive: a locked top spins with it; is "
                 "the tape on a loose washer, or was the top not locked?",
                 hz=digits(abs(off), 3),
                 way="below" if off < 0 else "above",
-            )
+            ),
+            "doubt",
         ),
         "slopes differ": (
             "the slopes of the {n:.0f} runs differ by more than their u says (p = {p:n}): the line "

@@ -116,7 +116,7 @@ def _between(readings: SpinReadings, options: "InputOptions", path: "Path") -> S
     u = None if readings.u is None else readings.u[part]
     kept = replace(readings, time=readings.time[part], frequency=readings.frequency[part], u=u)
     said = "only the {n} of {all} readings between {low:g} Hz and {high:g} Hz are fitted, as asked; the others are not"
-    note = Note("between", Text(said, len(kept), len(readings), low, high))
+    note = Note("between", Text(said, len(kept), len(readings), low, high), weight="advice")
     return replace(kept, warnings=(*readings.warnings, note))
 
 
@@ -206,11 +206,11 @@ def _of_track(
         )
         raise DoesNotSuit(Text(rises, path=path, start=start, end=end, n=last - first, window=window))
     text = "{name:s}: {what}: each reading is the frequency in a window of {window:.3g} s"
-    how_read = [of_file("windows", Text(text, name=path.name, what=what, window=window))]
+    how_read = [of_file("windows", Text(text, name=path.name, what=what, window=window), "advice")]
     if last - first < len(track.time):
         text = "{name:s}: the top coasts from {start:.1f} s to {end:.1f} s; the windows before and after are left out"
         begin, stop = track.time[first], track.time[last - 1]
-        how_read.append(of_file("coasts", Text(text, name=path.name, start=begin, end=stop)))
+        how_read.append(of_file("coasts", Text(text, name=path.name, start=begin, end=stop), "advice"))
     part = slice(first, last)
     of_record, of_track = notes
     return SpinReadings(track.time[part], track.frequency[part], track.u[part], (*of_record, *how_read, *of_track))
@@ -263,7 +263,9 @@ def _without_rest(table: Table, fewest: int) -> Table:
         f"{table.path.name}: the last {rows} of 0 Hz, after the top fell, {'is' if left_out == 1 else 'are'} left out"
     )
     columns = {name: values[:end] for name, values in table.columns.items()}
-    return replace(table, columns=columns, lines=table.lines[:end], warnings=(*table.warnings, of_file("rest", note)))
+    return replace(
+        table, columns=columns, lines=table.lines[:end], warnings=(*table.warnings, of_file("rest", note, "advice"))
+    )
 
 
 #: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, seconds that
@@ -272,7 +274,7 @@ FASTEST_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 1e-4
 
 
 def _doubt(text: str) -> Note:
-    return Note("unit", text, is_doubt=True, names_input=True)
+    return Note("unit", text, weight="doubt", names_input=True)
 
 
 def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[Note]:

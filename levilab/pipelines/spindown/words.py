@@ -22,7 +22,7 @@ from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.verdict import Verdict, is_simple
 from analysis.uncertainty import Estimate
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, estimate, statistic
-from levilab.pipelines.sources import Doubting, note_of
+from levilab.pipelines.sources import Weighed, note_of
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.units import name_with_unit
 from levilab.texts.note import reword
@@ -374,7 +374,7 @@ def _few_runs(of: Remark) -> str:
     )  # fmt: skip
 
 
-_REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyType(
+_REMARKS: Mapping[str, str | Callable[[Remark], str] | Weighed] = MappingProxyType(
     {
         "not converged": "the fit did not converge, the numbers are those of the best point found",
         "no freedom": (
@@ -387,18 +387,20 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyT
         "undetermined": "{name} is not determined, as it depends exponentially on the exponent",
         "factor": "{name} is known only to a factor of about {times:n}, as it depends exponentially on the exponent",
         "outlier": _outlier,
-        "falling": _outlier,
-        "calculated": Doubting(
+        "falling": Weighed(_outlier, "advice"),
+        "calculated": Weighed(
             lambda of: Text(
                 "the readings lie on the {law} law to {hz:n} Hz, too good to be measured: were they "
                 "calculated? Then no uncertainty here says anything about a top",
                 law=of.law,
                 hz=digits(of.values[0], 1),
-            )
+            ),
+            "doubt",
         ),
-        "no u": (
+        "no u": Weighed(
             "the readings have no uncertainties of their own: their scatter about each law stands for them, so a law "
-            "that does not fit shows only beside a better one"
+            "that does not fit shows only beside a better one",
+            "advice",
         ),
         "understated": lambda of: Text(
             "even the best law, {law}, misses the readings by {times:n} times their stated uncertainties, more than "
@@ -406,9 +408,10 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyT
             law=law_names([of.law or ""]),
             times=digits(of.values[0]),
         ),
-        "overstated": (
+        "overstated": Weighed(
             "the readings scatter only {times:n} times as much about the best law as their stated uncertainties say: "
-            "these are upper bounds, and so is u of the constants"
+            "these are upper bounds, and so is u of the constants",
+            "advice",
         ),
         "few readings": lambda of: Text(
             "{n:.0f} readings are too few for AICc: BIC compares the laws, as sure as the stated uncertainties are"
@@ -417,26 +420,31 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Doubting] = MappingProxyT
             n=of.values[0],
             laws=law_names(filter(None, of.name.split(", "))),
         ),
-        "correlated": lambda of: Text(
-            "neighbouring residuals resemble each other: their correlation is {r:.2f} ± {u:.2f}, so {n:.0f} readings "
-            "are worth as much as {worth:n} independent ones; it is in all uncertainties",
-            r=of.values[0],
-            u=of.values[1],
-            n=of.values[2],
-            worth=digits(independent(round(of.values[2]), of.values[0])),
+        "correlated": Weighed(
+            lambda of: Text(
+                "neighbouring residuals resemble each other: their correlation is {r:.2f} ± {u:.2f}, so {n:.0f} "
+                "readings are worth as much as {worth:n} independent ones; it is in all uncertainties",
+                r=of.values[0],
+                u=of.values[1],
+                n=of.values[2],
+                worth=digits(independent(round(of.values[2]), of.values[0])),
+            ),
+            "advice",
         ),
-        "changed": Doubting(
+        "changed": Weighed(
             lambda of: Text(
                 "no law describes run {run:.0f} of {n:.0f}: that noise makes a change as large in any of the "
                 "runs has p = {p:n}; look at it",
                 run=of.values[0],
                 n=of.values[1],
                 p=digits(min(of.values[1] * of.values[2], 1.0)),
-            )
+            ),
+            "doubt",
         ),
-        "mixed u": (
+        "mixed u": Weighed(
             "{some:.0f} of {all:.0f} runs give no uncertainties of their readings: theirs come from the "
-            "scatter about each law"
+            "scatter about each law",
+            "advice",
         ),
         "one run": (
             "this is one run: another of the same top may differ by more than its u (draught, temperature, the start): "

@@ -80,7 +80,7 @@ def test_notes_of_one_kind_stand_together_whatever_their_values(tmp_path):
 
 
 def test_a_note_is_the_same_in_another_process():
-    note = Note("unit", "in kHz?", is_doubt=True, names_input=True)
+    note = Note("unit", "in kHz?", weight="doubt", names_input=True)
     again = pickle.loads(pickle.dumps(note))
-    assert (again, again.kind, again.is_doubt, again.names_input) == ("in kHz?", "unit", True, True)
-    assert reword(again, "in Hz?").is_doubt
+    assert (again, again.kind, again.weight, again.names_input) == ("in kHz?", "unit", "doubt", True)
+    assert reword(again, "in Hz?").weight == "doubt"
