@@ -1,19 +1,20 @@
 // How the search of the site ranks pages: that of the typed word first, users' pages before those of developers.
 // The weights are those of Sphinx (searchtools.js); `score` adds the page's own factor.
 var Scorer = {
-  // words that people type → the page for them
+  // page → the words for which it is the first
   pages: {
-    excel: "open-my-file", spreadsheet: "open-my-file", xlsx: "open-my-file", csv: "open-my-file",
-    labview: "open-my-file", arduino: "open-my-file", audio: "open-my-file", smartphone: "phone", phyphox: "phone",
-    microphone: "sound-card", "sound card": "sound-card", jupyter: "notebook", python: "notebook", grading: "class",
-    students: "class", worksheet: "class", windows: "install", oscilloscope: "instruments/oscilloscope", washers: "experiments/washers",
-    pdf: "report", tutorial: "tutorial", wav: "open-my-file", mp3: "open-my-file", film: "video", animation: "animation",
-    lock: "glossary", locked: "glossary",
+    "open-my-file": ["excel", "spreadsheet", "xlsx", "csv", "labview", "arduino", "audio", "wav", "mp3"],
+    "class": ["students", "student", "teacher", "worksheet", "grading", "seed"],
+    "sound-card": ["microphone", "sound card", "speaker"],
+    "glossary": ["lock", "locked", "c3/2", "c32"],
+    "phone": ["smartphone", "phyphox"], "notebook": ["jupyter", "python"], "messages": ["warning"],
+    "install": ["windows"], "report": ["pdf"], "tutorial": ["tutorial"], "video": ["film"], "animation": ["animation"],
+    "instruments/oscilloscope": ["oscilloscope"], "experiments/washers": ["washers"],
   },
   score: ([page, title, anchor, description, score, file]) => {
     const asked = (new URLSearchParams(location.search).get("q") || "").trim();
     const typed = asked.toLowerCase();
-    if (Scorer.pages[typed] === page) return 1000 + score;
+    if (Scorer.pages[page]?.includes(typed)) return 1000 + score;
     // a name of the reference that is typed whole, as of a function or a command
     const ends = ["." + typed, "> " + typed].some((end) => `.${title.toLowerCase()}`.endsWith(end));
     if (ends && anchor && page.startsWith("reference/") && /[_. ]|[a-z][A-Z]/.test(asked)) return 500 + score;

@@ -21,7 +21,7 @@ from support.browser import DESK, FLAGS, executable  # noqa: E402
 from support.live_pages import until  # noqa: E402
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import FloatRect, Page
 
 #: The browser of this script draws without a graphics card, where the page leaves smooth edges out to be fast.  So it
 #: is made to name a card: the picture shows the page as on a machine that has one.  Nothing but the edges differs.
@@ -33,10 +33,10 @@ GRAPHICS = """for (const kind of [WebGLRenderingContext, WebGL2RenderingContext]
 }"""
 
 
-def take_picture(page: Page, name: str) -> None:
-    """Write NAME.png, with 256 colours to keep it small."""
+def take_picture(page: Page, name: str, clip: FloatRect | None = None) -> None:
+    """Write NAME.png of the page, or of a part of it, with 256 colours to keep it small."""
     path = PICTURES / f"{name}.png"
-    page.screenshot(path=path)
+    page.screenshot(path=path, clip=clip)
     with Image.open(path) as picture:
         small = picture.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=2)
     small.save(path, optimize=True)

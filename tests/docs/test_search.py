@@ -1,6 +1,5 @@
 """What people type into the search of the site, and the page that comes first; `make site` runs it on the new site."""
 
-import re
 import threading
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
@@ -8,35 +7,27 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 
 from support.browser import watch
-from support.paths import DOCS, ROOT
+from support.paths import QUOTED, ROOT
 
 SITE = ROOT / "build/site"
-MESSAGES = re.findall(r"^### (.+)$", (DOCS / "messages.md").read_text(encoding="utf-8"), re.MULTILINE)
 #: What is typed → one of these pages is the first.
 QUERIES = {
     "phyphox": ("phone",),
     "smartphone": ("phone",),
-    "excel": ("open-my-file",),
-    "xlsx": ("open-my-file",),
-    "labview": ("open-my-file",),
-    "arduino": ("open-my-file",),
-    "logger pro": ("open-my-file",),
-    "csv": ("open-my-file",),
-    "audio": ("open-my-file",),
-    "microphone": ("sound-card",),
-    "sound card": ("sound-card",),
+    **dict.fromkeys(("excel", "xlsx", "labview", "arduino", "logger pro", "csv", "audio"), ("open-my-file",)),
+    **dict.fromkeys(("microphone", "sound card", "speaker"), ("sound-card",)),
     "windows": ("install",),
     "install": ("install",),
     "pdf": ("report",),
-    "grading": ("class",),
-    "worksheet": ("class",),
+    **dict.fromkeys(("grading", "worksheet", "seed", "teacher", "student"), ("class",)),
     "washers": ("experiments/washers",),
     "oscilloscope": ("instruments/oscilloscope",),
     "pymeasure": ("pymeasure",),
     "jupyter": ("notebook",),
     "animation": ("animation",),
     "first experiment": ("tutorial",),
-    "lock": ("glossary",),
+    **dict.fromkeys(("lock", "C3/2", "c32"), ("glossary",)),
+    "warning": ("messages",),
     "Präzession": ("tutorial-de", "glossary"),
     "simulate_many": ("reference/python-simulator",),
     "spin_at_fall": ("reference/python-analyses",),
@@ -46,7 +37,7 @@ QUERIES = {
 #: The same, and one of these pages is among the first two.
 AMONG_TWO = {
     "precession phone": ("video", "phone"),
-    **dict.fromkeys(MESSAGES, ("messages",)),
+    **dict.fromkeys(QUOTED, ("messages",)),
     "no answer to counter within 2 s": ("messages",),
     "the top did not follow the drive to 40 Hz": ("messages",),
 }
