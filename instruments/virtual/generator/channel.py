@@ -357,7 +357,8 @@ class Channel:
         """Return the limits of the offset at the present amplitude [V]; a DC voltage has no amplitude."""
         low, high = self.voltage_limits()
         half = 0.0 if self["waveform"] == "DC" else self.number("amplitude_vpp") / 2
-        return min(0.0, low + half), max(0.0, high - half)
+        middle = (low + high) / 2  # where there is no room for the amplitude
+        return min(middle, low + half), max(middle, high - half)
 
     def from_vpp(self, vpp: float, unit: str) -> float:
         """Return a peak-to-peak voltage [V] in this unit."""

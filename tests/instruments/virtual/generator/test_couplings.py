@@ -4,7 +4,7 @@ Source: Agilent/Keysight 33500 Series Operating and Service Guide, unless a test
 """
 
 import numpy as np
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from instruments.clock import VirtualClock
@@ -24,19 +24,30 @@ SIN SQU PULS RAMP DC NOIS PRBS ARB USER MIN MAX DEF INF ON OFF DBM VRMS VPP BUS 
 1e6 3e7 9.9e37 1e999 A VOLATILE 0,0,0,0,0,0,0,1 RAD abcdefghijklmnop
 """
 WORDS = (*_WORDS.split(), "1 MHZ,20,-3", "2 DBM", "-300 DBM")
+#: Few random pairs of these say anything: commands that reach the limits of each other.
+_COMMANDS = """
+FREQ 3e7;FUNC SIN;FUNC SQU;FUNC RAMP;FUNC DC;APPL:DC 1 MHZ,20,-3;VOLT 4.7;VOLT MAX;VOLT:OFFS MIN;VOLT:OFFS MAX;
+VOLT:HIGH MAX;VOLT:LOW MIN;VOLT:LIM:STAT ON;VOLT:LIM:HIGH 4.7;VOLT:LIM:LOW -5;OUTP:LOAD INF;OUTP:LOAD 50
+"""
+COMMANDS = st.one_of(
+    st.sampled_from([*map(str.strip, _COMMANDS.split(";"))]),
+    st.builds("{} {}".format, st.sampled_from(HEADERS), st.sampled_from(WORDS)),
+)
 
 
-@given(commands=st.lists(st.tuples(st.sampled_from(HEADERS), st.sampled_from(WORDS)), max_size=30))
+@given(commands=st.lists(COMMANDS, max_size=30))
+@example(commands=["VOLT MAX", "VOLT:LIM:STAT ON", "VOLT:LIM:HIGH 4.7"])
 def test_whatever_is_set_the_settings_fit_each_other(commands):
     for kind in (Virtual33500B, Virtual33220A):
         device = kind(VirtualClock(), listener=lambda *_: None)
-        for header, word in commands:
-            send(device, f"{header} {word}\n".encode())
+        for command in commands:
+            send(device, f"{command}\n".encode())
         channel = device.channels[0]
         low, high = channel.voltage_limits()
         half = 0.0 if channel["waveform"] == "DC" else channel.number("amplitude_vpp") / 2
-        if low < high:  # voltage limits that leave no room count for nothing
-            assert channel.number("offset") + half <= high + 1e-6 or half >= (high - low) / 2 - 1e-6
+        if channel.amplitude_limits()[0] <= high - low:  # else no room is left for the least amplitude
+            assert low - 1e-6 <= channel.number("offset") - half
+            assert channel.number("offset") + half <= high + 1e-6
         assert all(np.isfinite(value) for value in device.settings.values() if isinstance(value, float))
         slowest, fastest = channel.frequency_limits()
         assert slowest * (1 - 1e-9) <= channel.frequency <= fastest * (1 + 1e-9)
