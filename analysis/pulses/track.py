@@ -50,7 +50,6 @@ class Track:
         chirp: its slope [Hz/s].
         chirp_u: standard uncertainty of that [Hz/s].
         turns: turns since the first window, counted through as long as `connected` holds.
-        turns_u: standard uncertainty of the fraction of a turn [turns].
         connected: whether the number of turns since the window before is certain; the first is not.
         pulses: used in each window.
         spins: what was found in each window.
@@ -63,7 +62,6 @@ class Track:
     chirp: Array
     chirp_u: Array
     turns: Array
-    turns_u: Array
     connected: NDArray[np.bool_]
     pulses: NDArray[np.int64]
     spins: tuple[SpinFrequency, ...]
@@ -234,6 +232,6 @@ def _connect(found: Iterable[SpinFrequency | tuple[float, float]], seen: int, du
     certain = sound & (ahead_u < CERTAIN) & (np.abs(off) < 0.25)
     turns = phase[0] + np.concatenate([[0.0], np.cumsum(np.rint(ahead - fraction) + fraction)])
     return Track(
-        time, frequency, u, chirp, chirp_u, turns, phase_u, np.concatenate([[False], certain]),
+        time, frequency, u, chirp, chirp_u, turns, np.concatenate([[False], certain]),
         np.array([s.pulses for s in spins]), tuple(spins), tuple(empty),
     )  # fmt: skip
