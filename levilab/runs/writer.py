@@ -195,9 +195,8 @@ class RunWriter:
         When it returns, this row and all earlier ones are on the disk, in `folder`.
         """
         line = ",".join(_cell(row.get(channel["name"])) for channel in self.record.channels)
-        with _explain_errors(f"write the reading {line}", self.folder):
+        with self._appending(f"write the reading {line}"):
             self._append(READINGS, line)
-            self._rescue_if_lost()
 
     def states(self, lines: Iterable[str]) -> None:
         """Append many rows to states.csv, on the disk together.  Raises CannotWrite."""
@@ -208,9 +207,8 @@ class RunWriter:
 
     def film(self, lines: Sequence[str]) -> None:
         """Append rows of a film's track to states.csv, on the disk and kept as readings are.  Raises CannotWrite."""
-        with _explain_errors(f"write {STATES}", self.folder):
+        with self._appending(f"write {STATES}"):
             self._append(STATES, "\n".join(lines))
-            self._rescue_if_lost()
 
     def trace(self, time_s: float, trace: Trace, channel: str) -> int:
         """Keep an oscilloscope's record; returns its number.  Raises CannotWrite."""
@@ -282,10 +280,9 @@ class RunWriter:
         event = {"utc": utc_now(), "time_s": time_s, "kind": kind, "text": unquote(text)} | data
         if isinstance(text, Text):  # for views in other languages
             event |= {"says": text.as_table()}
-        with _explain_errors(f"write the event {text!r}", self.folder):
+        with self._appending(f"write the event {text!r}"):
             self._append(EVENTS, json.dumps(event, ensure_ascii=False, allow_nan=False))
             self.events += 1
-            self._rescue_if_lost()
 
     def wire(self, address: str, direction: str, data: bytes) -> None:
         """Append bytes that went over the wire to wire.log.
@@ -343,6 +340,15 @@ class RunWriter:
         self._files[name] = _GrowingFile(path)
 
     # --- a folder that is removed under way ---
+
+    @contextlib.contextmanager
+    def _appending(self, what: str) -> Iterator[None]:
+        """Write the run again where its folder went meanwhile, also if the disk takes no more.  Raises CannotWrite."""
+        with _explain_errors(what, self.folder):
+            try:
+                yield
+            finally:
+                self._rescue_if_lost()
 
     def _write_in_place(self, write: Callable[[], None]) -> None:
         """Write something into the folder; once more where the folder went at this moment.  Raises OSError."""

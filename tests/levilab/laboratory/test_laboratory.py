@@ -74,6 +74,7 @@ FAILED_ONCE = {
     "a phone showed the image of a spin": draw(771759),
     "a top fell within the window of a phone": draw(762582),
     "the lid was closed while a phone counted": replace(draw(820013), models={"counter": "phyphox"}),
+    "a folder was removed from a full disk": draw(840092),
     "a folder was removed before the power went": a_plan(
         "spin", "hold_s=0", "drive_frequency_hz=35", events=[Event("folder", 0, 187), Event("power", 0, 478)]
     ),
