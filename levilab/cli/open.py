@@ -160,7 +160,7 @@ def _print_doubts(look: "Look", run: "UnderstoodRun") -> None:
     from levilab.present.terminal import terminal
 
     console = terminal()
-    for text in run.warnings:
+    for text in run.warnings if run.doubts or look.problem else ():  # else the analysis says them
         console.print(escape(in_language(Text("note: {text}", text=text))))
     for doubt in run.doubts:
         console.print(f"[yellow]{in_language('question')}:[/yellow] {escape(in_language(doubt.text))}")

@@ -56,6 +56,12 @@ def test_an_answer_is_kept_analyzed_and_reported(doubtful):
     assert (again.status, "is read as my.csv.levilab.toml says" in again.out) == (0, True)
 
 
+def test_a_note_on_the_file_is_said_once(tmp_path):
+    (tmp_path / "my.csv").write_text("t [s],f [Hz],f_std [Hz]\n" + "0,38,1\n9,37,1\n19,36,1\n30,35,1\n", "utf-8")
+    ended = command("open", "my.csv", cwd=tmp_path)
+    assert (ended.out + ended.err).count("column 'f_std [Hz]' is not read") == 1
+
+
 def test_json_is_the_understanding_alone(doubtful):
     ended = command("open", str(OMEGA), "--json", cwd=doubtful.parent)
     (look,) = json.loads(ended.out)
