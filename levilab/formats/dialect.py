@@ -159,13 +159,13 @@ def value_and_u(text: str) -> tuple[str, str] | None:
 
 
 def unit_behind(text: str) -> str:
-    """Return the unit behind a number; empty where there is none.
+    """Return the unit behind a number, which may be %; empty where there is none.
 
-    >>> unit_behind("38,01 Hz"), unit_behind("38 apples")
-    ('Hz', '')
+    >>> unit_behind("38,01 Hz"), unit_behind("0.1 %"), unit_behind("38 apples")
+    ('Hz', '%', '')
     """
     found = _WITH_UNIT.fullmatch((value_and_u(text) or (text,))[0])
-    return found["unit"] if found and is_unit(found["unit"]) else ""
+    return found["unit"] if found and (is_unit(found["unit"]) or found["unit"] == "%") else ""
 
 
 def _without_unit(text: str) -> str:

@@ -63,8 +63,8 @@ TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: No such top floats far below or above these [Hz], linear theory says 21.65 to 80.6: the unit is in doubt there.
 #: 20 to 60 turns a second are 126 to 377 rad/s: taken for turns, they lie above.
 SLOWEST_SPIN_HZ, FASTEST_SPIN_HZ = 10.0, 100.0
-#: What a title of an uncertainty says that is no standard uncertainty.
-_EXPANDED = re.compile(r"2 ?(?:σ|sigma)|k ?= ?2|fehler|error|unsicherheit|uncertaint", re.IGNORECASE)
+#: What a title says of an uncertainty that is no standard one, or of a scatter that is not of the mean: f_std.
+_NO_U = re.compile(r"(?i)2 ?(σ|sigma)|k ?= ?2|fehler|error|unsicherheit|uncertaint|stdev|stabw|(?<![a-z])st?d(?![a-z])")
 #: Units in which the numbers of a file may be meant.
 _UNITS = ("Hz", "rpm", "rad/s", "°/s")
 #: Uncertainties of a spreadsheet, in % or without a unit, below which they may be parts of one, shown in %.
@@ -547,15 +547,15 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
 
 
 def _notes_on_u(path: Path, layout: Layout, chosen: Sequence[Column], *, wanted: bool) -> list[str]:
-    """Return notes on columns of expanded uncertainties, where standard ones are missing, and on cells in %."""
+    """Return notes on columns of other uncertainties, where standard ones are missing, and on cells in %."""
     name = shorten(str(path), 200)
     half = (
-        "{path:s}: column '{title:s}' is not read: u is half of 2σ or of U (k = 2), and a greatest error divided by "
-        "√3: write it in a column u [Hz]"
+        "{path:s}: column '{title:s}' is not read: u is half of 2σ or of U (k = 2), a greatest error divided by √3, "
+        "of a mean of n readings their scatter divided by √n: write it in a column u [Hz]"
     )
     missing = wanted and {_SPIN, companion(_SPIN)} & {one.name for one in chosen} == {_SPIN}
     titles = zip(layout.header, layout.titles(), strict=False) if missing else ()
-    expanded = [title for title, full in titles if _EXPANDED.search(title) and _may_be_of_spin(read_title(full))]
+    expanded = [title for title, full in titles if _NO_U.search(title) and _may_be_of_spin(read_title(full))]
     notes: list[str] = [of_file("expanded u", Said(half, name, shorten(title))) for title in expanded]
     said = "{path:s}: column '{title:s}' holds {number:g}, taken in {unit:s}; if it shows {shown:g} %, write u in Hz"
     for column in (one for one in chosen if layout.aligned and one.name == companion(_SPIN)):

@@ -97,6 +97,7 @@ def in_german(notes):
     (rows("{t} s ± 0.5 s   {f} Hz ± 0.03 Hz"), 0.03),
     ("t,f\n" + rows("{t},{f} ± 0.1 %"), [0.001 * f for f in SPINS]),
     (rows("{t} s   {f} Hz ± 0.1 %"), [0.001 * f for f in SPINS]),
+    ("t,f [Hz],u\n" + rows("{t},{f},0.1 %"), [0.001 * f for f in SPINS]),
     ("t;f\n" + rows("{t} s;{f} Hz ± 30 mHz"), 0.03),
     ("Zeit [s]|Frequenz [Hz]|z [mm]\ns|Hz|cm\n" + rows("{t}|{f}|2"), None),
     ("t   f\n[s]   [Hz]\n" + rows("{t}   {f}"), None),
@@ -462,7 +463,7 @@ def test_a_title_with_a_unit_goes_before_a_column_without_one(tmp_path):
     assert "spin_frequency_u_hz" not in table.columns
 
 
-@pytest.mark.parametrize("title", ["2σ [Hz]", "U (k=2) [Hz]", "max. Fehler [Hz]"])
+@pytest.mark.parametrize("title", ["2σ [Hz]", "U (k=2) [Hz]", "max. Fehler [Hz]", "f_std [Hz]"])
 def test_an_expanded_uncertainty_is_named_and_not_read(tmp_path, title):
     path = tmp_path / "wide.csv"
     path.write_text(f"t [s],f [Hz],{title},T-Fehler [K]\n0,40,0.04,1\n10,38.5,0.04,1\n20,37,0.04,1\n", encoding="utf-8")
