@@ -79,10 +79,10 @@ class UsageError(RequestError):
         super().__init__("{name}: {text}" if value is None else "{name} = {value}: {text}", **vars(self))
 
 
-def check_language(code: str) -> None:
-    """Raise UsageError for a language that levilab does not speak."""
+def check_language(code: str, name: str = "language") -> None:
+    """Raise UsageError for a language that levilab does not speak, and that an argument of this name has."""
     if code not in languages():
-        raise UsageError("language", Text("one of {known:s} is expected", known=", ".join(languages())), value=code)
+        raise UsageError(name, Text("one of {known:s} is expected", known=", ".join(languages())), value=code)
 
 
 class DataError(LevilabError):

@@ -159,9 +159,10 @@ def speak_from(args: Sequence[str]) -> None:
         speak(code)
 
 
-def _speak(language: str) -> str:
+def _speak(context: typer.Context, language: str) -> str:
     """Speak a language before the other options are read, which may be refused.  Raises UsageError."""
-    check_language(language)
+    source = context.get_parameter_source("language")
+    check_language(language, "LEVILAB_LANGUAGE" if source and source.name == "ENVIRONMENT" else "language")
     speak(language)
     return language
 

@@ -130,6 +130,8 @@ def test_an_error_and_a_question_are_in_the_language_of_the_person(tmp_path, mon
     assert "mehr, als dieser Versuchsstand erlaubt" in command(*words, cwd=tmp_path).err
     unknown = command("acquire", "spin", "--mock", "--language", "xx", cwd=tmp_path)
     assert (unknown.status, unknown.err) == (2, "levilab: --language xx: one of de, en is expected\n")
+    monkeypatch.setenv("LEVILAB_LANGUAGE", "fr")
+    assert command("runs", cwd=tmp_path).err == "levilab: LEVILAB_LANGUAGE fr: one of de, en is expected\n"
     monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
     speak("de")
     _ask(PlaceProbe(Text("Height {which}: {height:.1f} mm.", which="1", height=61.5), 0.0615))
