@@ -94,7 +94,7 @@ class AnalysisResult(Exportable):
         "notes": "warnings",
     }
     instead: ClassVar[Mapping[str, str]] = {
-        "to_csv": "to_dataframe().to_csv(path), or export('result.csv')",
+        **dict.fromkeys(("to_csv", "to_excel"), "export('result.csv') or export('result.xlsx')"),
         "to_pandas": "to_dataframe()",
         "savefig": "plot().savefig(path)",
         "laws": "models",

@@ -292,6 +292,7 @@ REFUSED = {
     "result.c1": "take result.models['stokes']['c1']",
     "result.redchisq": "did you mean redchi",
     "result.to_csv('x.csv')": "export('result.csv')",
+    "result.to_excel('x.xlsx')": "export('result.xlsx')",
     "result.to_pandas()": "take to_dataframe()",
     "result.version": "take document['software']['levilab']",
     "result.units": "result['c32'].unit",
