@@ -6,10 +6,11 @@ var Scorer = {
     "open-my-file": ["excel", "spreadsheet", "xlsx", "csv", "labview", "arduino", "audio", "wav", "mp3"],
     "class": ["students", "student", "teacher", "worksheet", "grading", "seed"],
     "sound-card": ["microphone", "sound card", "speaker"],
-    "glossary": ["lock", "locked", "c3/2", "c32"],
-    "phone": ["smartphone", "phyphox"], "notebook": ["jupyter", "python"], "messages": ["warning"],
-    "install": ["windows"], "report": ["pdf"], "tutorial": ["tutorial"], "video": ["film"], "animation": ["animation"],
-    "instruments/oscilloscope": ["oscilloscope"], "experiments/washers": ["washers"],
+    "glossary": ["lock", "locked", "c3/2", "c32", "uncertainty", "aicc", "undecided", "gate"],
+    "phone": ["smartphone", "phyphox"], "notebook": ["jupyter", "python"], "messages": ["warning", "error"],
+    "live": ["share", "qr code"], "install": ["windows", "mac"], "simulator": ["simulate"], "practise": ["virtual bench"],
+    "report": ["pdf"], "tutorial": ["tutorial"], "video": ["film"], "animation": ["animation"],
+    "instruments/oscilloscope": ["oscilloscope"], "experiments/washers": ["washers"], "experiments/spin": ["tape", "lamp"],
   },
   score: ([page, title, anchor, description, score, file]) => {
     const asked = (new URLSearchParams(location.search).get("q") || "").trim();
