@@ -162,9 +162,8 @@ class Flight:
             time: [s].
             values: dotted keys of the scene, and their values.
         """
-        self.simulate_until(time)
+        now = self._piece_at(time)
         self._step = None  # another drive may need another step
-        now = self._pieces.at(time)
         if isinstance(now, _Flying):
             self._pieces.cut(time)
             samples = self._samples_of(now)
@@ -180,15 +179,13 @@ class Flight:
 
     def put_back(self, time: float) -> None:
         """Start the top again at this time, as the scene says, if it has fallen."""
-        self.simulate_until(time)
-        if isinstance(self._pieces.at(time), _Absent):
+        if isinstance(self._piece_at(time), _Absent):
             self._pieces.cut(math.nextafter(time, math.inf))
             self._state, self._step, self._known_until = self._put_by_hand(time), None, time
 
     def take_away(self, time: float) -> None:
         """Let no top be up from this time on, as after a fall."""
-        self.simulate_until(time)
-        if isinstance(self._pieces.at(time), _Flying):
+        if isinstance(self._piece_at(time), _Flying):
             self._pieces.cut(time)
             self._fall(time)
 
@@ -216,19 +213,21 @@ class Flight:
 
     def first_lift(self) -> float:
         """Return the mean height of the rim over the first second [m], in which a top bobs at least once."""
-        self.simulate_until(self._starts)
-        piece = self._pieces.at(self._starts)
+        piece = self._piece_at(self._starts)
         if isinstance(piece, _Flying):
             return float(self._samples_of(piece).lift.mean())
         return self._scene.start.position_m[2]
+
+    def floats(self, time: float) -> bool:
+        """Return whether a top is up at this time; `attitude` would simulate the piece once more."""
+        return isinstance(self._piece_at(time), _Flying)
 
     def spin_of_fall(self, time: float) -> float | None:
         """Return the mean spin in a second that ended less than a second before the top fell [Hz].
 
         Later it tumbles, and its tape turns otherwise.  None: a top is up, or it fell within a second.
         """
-        self.simulate_until(time)
-        piece = self._pieces.at(time)
+        piece = self._piece_at(time)
         if not isinstance(piece, _Absent) or piece.state is None:
             return None
         return float(self.tape(np.array([piece.start - PIECE_S]))[1][0]) or None
@@ -292,6 +291,11 @@ class Flight:
             for found, columns in ((place, R), (axis, N), (arm, ARM)):
                 found[part] = np.stack([np.interp(times[part], time, one) for one in states[:, columns].T], axis=1)
         return place, axis, arm, up
+
+    def _piece_at(self, time: float) -> _Flying | _Absent:
+        """Simulate up to this time, and return the piece then."""
+        self.simulate_until(time)
+        return self._pieces.at(time)
 
     def _flying_pieces(self, times: Array) -> Iterator[tuple[_Flying, slice]]:
         """Simulate up to these times, and yield the pieces in which a top is up, with their places in the times."""
@@ -381,10 +385,8 @@ class Flight:
 
     def _wait(self, fallen: float) -> None:
         """Leave the top down from the time of its fall until it is put back, if ever."""
-        self._state, self._known_until = (
-            None,
-            math.inf if self._put_back_after_s is None else fallen + self._put_back_after_s,
-        )
+        self._state, pause = None, self._put_back_after_s
+        self._known_until = math.inf if pause is None else fallen + pause
 
 
 def _simulate_again(piece: _Flying) -> Trajectory:
@@ -403,8 +405,7 @@ def _state_within(piece: _Flying, time: float) -> tuple[Array, Array | None]:
     """Return the state at a time within a piece, shape (18,), and the memory of its drive."""
     state, memory = piece.state.copy(), piece.memory
     if time - piece.start > _AT_ONCE:
-        again: dict[str, Any] = {"step": piece.step, "start": state, "memory": memory}
-        motion = simulate(piece.scene, time - piece.start, rate=None, **again)
+        motion = simulate(piece.scene, time - piece.start, rate=None, step=piece.step, start=state, memory=memory)
         state, memory = motion.states[-1].copy(), motion.memory
     state[TIME] = time
     return state, memory
@@ -428,10 +429,8 @@ def _stem(motion: Trajectory, height: float) -> NDArray[np.float32]:
     Single precision: a displacement of 5 mm is right to 0.5 nm.
     """
     states = motion.states
-    axis = states[:, N]
-    rate = (
-        states[:, L][:, 1] * axis[:, 2] - states[:, L][:, 2] * axis[:, 1]
-    ) / motion.scene.top.inertia_transverse_kg_m2
+    axis, momentum = states[:, N], states[:, L]
+    rate = (momentum[:, 1] * axis[:, 2] - momentum[:, 2] * axis[:, 1]) / motion.scene.top.inertia_transverse_kg_m2
     moving = states[:, V][:, 0] + height * rate
     return np.asarray([states[:, R][:, 0] + height * axis[:, 0], moving], dtype=np.float32)
 

@@ -225,8 +225,11 @@ class MotionWorld:
 
     def poses(self, start: float, step: float, n: int) -> Poses:
         """Return the top's place and attitude; see World."""
-        times = start + step * np.arange(n, dtype=np.float64)
-        return poses_of(*self._flight.attitude(times), start=start, step=step)
+        return poses_of(*self._flight.attitude(start + step * np.arange(n, dtype=np.float64)), start=start, step=step)
+
+    def floats(self) -> bool:
+        """Return whether the top is up now."""
+        return self._flight.floats(self.clock.now())
 
     def spin_of_fall(self) -> float | None:
         """Return the spin just before the fall of the top that has fallen [Hz]; see `Flight.spin_of_fall`."""

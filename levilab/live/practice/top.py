@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.spindown.tilt import Release
 from levilab.bench.config import Limits
-from levilab.live.practice.drive import GATE_S
 from levilab.live.practice.seeds import keys_of_seed
 from levilab.live.practice.what_if import USUAL, keys_of
 from levilab.simulator.compilation import announce_compilation
@@ -68,8 +67,7 @@ class PracticeTop:
 
     def floats(self) -> bool:
         """Return whether the top is up now, as a person at the bench sees; the counter knows it a second later."""
-        poses = self.wiring.poses
-        return poses is not None and bool(poses(self.world.clock.now(), GATE_S, 1).up[0])
+        return self.world.floats()
 
     def put_back(self) -> None:
         """Spin a top by hand and let it float."""

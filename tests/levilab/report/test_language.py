@@ -68,7 +68,8 @@ def test_no_english_text_is_left_in_a_german_figure(name, path):
         pytest.importorskip("av")
     analysis = ANALYSES[name]
     paths = sorted((SAMPLE_DATA / path).glob("*-hz")) or [SAMPLE_DATA / path]
-    figure = analysis.figure(analysis.analyze(paths, analysis.options_from({"rim_m": 0.03} if name == "video" else {})))
+    options = analysis.options_from({"rim_m": 0.03, "stop_s": 1.5} if name == "video" else {})
+    figure = analysis.figure(analysis.analyze(paths, options))
     as_png(figure)
     said = [text.get_text() for text in figure.findobj(Label)]
     left = [text for text in said if re.search(r"\b(mark|rim|base|path|turns|drag|law|by|the|spin)\b", text)]
