@@ -47,9 +47,9 @@ SLOW = """
 #: Rooms of processes, sockets and types, whose slow tests a version of Python may change: `make all-pythons` leaves out
 #: all other slow ones, and .github/workflows/tests.yml carries out every test on each version.
 VERSIONED = """
-    instruments/links  instruments/virtual/servers  levilab/cli  levilab/live/practice/test_bench.py  levilab/notebook
-    levilab/live/test_doors.py  levilab/live/test_hostile.py  levilab/live/test_serve.py  levilab/runs  levilab/sweeps
-    levilab/workers  levilab/world/test_serve.py
+    instruments/links  instruments/virtual/servers  levilab/cli  levilab/live/practice/test_bench.py
+    levilab/live/test_doors.py  levilab/live/test_hostile.py  levilab/live/test_serve.py  levilab/notebook/test_guesses.py
+    levilab/notebook/test_front_door.py  levilab/runs  levilab/sweeps  levilab/workers  levilab/world/test_serve.py
 """
 #: Files with tests of ten seconds and more: they go first of all, so that at the end no worker waits for another's.
 LONGEST = """
