@@ -2,11 +2,12 @@
 
 In a window the place x + iy is a sum of waves: the backward and the forward slow swing and the precession, each with
 a frequency and a slope, and of lines of the second and third order, at sums and differences of the slow swings' and
-the vertical swing's frequencies, since the field changes with height.  One of these lies within 0.2 Hz of the
-backward swing: a fit without it is wrong by tens of millihertz.  Where the height is known, it gives the vertical
-swing.  Noise that is correlated is worth fewer readings.  Amplitudes are linear; frequencies follow by Gauss and
-Newton from the peaks of a spectrum, from several starts.  The likeliest fit is not always the right one, as a line
-beside a swing may be the stronger one: others are kept as its rivals.
+the vertical swing's frequencies, since the field changes with height.  A height z in the stiffness, a force −κzx, makes
+of the forward swing a line at α₊ − α_v, of the backward one a line at α₋ + α_v, by one and the same complex share, as
+(α₊ − α)(α − α₋) is equal at both.  These lines may be stronger than the swing beside them: the share says which is
+which.  Where the height is known, it gives the vertical swing.  Noise that is correlated is worth fewer readings.
+Amplitudes are linear; frequencies and share follow by Gauss and Newton from the peaks of a spectrum, from several
+starts.  The likeliest fit is not always the right one: others are kept as its rivals.
 """
 
 from __future__ import annotations
@@ -26,7 +27,6 @@ from analysis.residuals import independent
 from analysis.sway.vertical import (
     ALONE,
     BESIDE,
-    CUBIC,
     VERTICAL_U_HZ,
     Beside,
     Places,
@@ -57,6 +57,11 @@ _SPANS_HZ = 20.0
 _TRIED, _STEPS = 3, 25
 #: A sensor's image, over its line, that is left where the whole record has shown it: prior.
 _IMAGE = 0.05
+#: Amplitudes of lines, over the places: those of the heights alone in a sensor that leans, and what the coupling of the
+#: swings leaves of others in full motions of 1 mm.  u of the share of its line in either swing, real and imaginary.
+_ALONE, _BEYOND, _SHARE_U = 0.1, 0.02, 0.5
+#: By that share, the amplitudes of forward less and of backward plus vertical swing, over those of the swings.
+_OF_EITHER = np.array([[1, 1], [-1j, 1j]])
 #: Rounding: the noise is no smaller a part of the places, and frequencies differ by no smaller a part of their effect.
 _FINEST = 1e-8
 #: The number of likeliest swings of a window that are kept, and how far their −2 log L may be above the least.
@@ -185,6 +190,7 @@ def swings_in_window(t: Array, s: Places, heights: Array | None = None, *, risin
         heights: shape (n,) [m]; None where they are not known.
         rising: see `swings_of`.
     """
+    s = s - s.mean()
     lines = _spectrum(t, s)
     forward, seen = _peaks(lines, SLOW_HZ)[:2], _peaks(lines, (-SLOW_HZ[1], -SLOW_HZ[0]))[:_TRIED]
     if not (forward and seen):
@@ -193,7 +199,7 @@ def swings_in_window(t: Array, s: Places, heights: Array | None = None, *, risin
     apart = 0.6 / float(t[-1] - t[0])
     starts = [np.array([backward, forward[0]]) for backward in {*seen, seen[0] - apart, seen[0] + apart}]
     starts += [np.array([backward, one]) for backward in seen[:2] for one in forward[1:]]
-    rows = BESIDE + CUBIC + ALONE if rising else BESIDE + CUBIC
+    rows = BESIDE + ALONE if rising else BESIDE
     still = _still(t, s, rising=rising)
 
     def fit(slow: Array, rise: float | None = None, line: _Precession | None = None) -> _Fit:
@@ -204,11 +210,9 @@ def swings_in_window(t: Array, s: Places, heights: Array | None = None, *, risin
 
     fits = [fit(start) for start in starts]
     best = _likeliest(fits)[0]
-    # either swing, or both, may be the line that the other makes with the vertical swing, and the true one a weak line
+    # either swing, or both, may be the line that the other makes with the vertical swing
     (back, ahead), rise = best.swings.frequency.tolist(), best.vertical(t, s).value
-    weak = -_weak(t, best.rest.conj()), _weak(t, best.rest)
-    turned = ((back, back + rise), (ahead - rise, ahead), (back, weak[1]), (weak[0], ahead))
-    fits += [fit(np.array(slow), ahead - back) for slow in turned]
+    fits += [fit(np.array(slow), ahead - back) for slow in ((back, back + rise), (ahead - rise, ahead))]
     fits += [fit(np.array(slow), rise) for slow in ((back, ahead), (ahead - rise, back + rise))]
     line, mirror = _precession(t, best.rest), _precession(t, best.rest.conj())
     ends = [fit(one.swings.frequency, one.swings.vertical.value, line) for one in _likeliest(fits)]
@@ -251,12 +255,6 @@ def _likeliest(fits: Sequence[_Fit]) -> list[_Fit]:
             kept.append(one)
     least = improbable(kept[0])
     return [one for one in kept if improbable(one) - least < _FARTHEST][:_KEPT]
-
-
-def _weak(t: Array, rest: Places) -> float:
-    """Return the frequency of the strongest line where a forward swing is looked for [Hz]."""
-    even = np.arange(*SLOW_HZ, 0.5 / float(t[-1] - t[0]))
-    return float(even[np.argmax(np.abs(np.exp(-2j * np.pi * np.outer(even, t)) @ (rest * np.hanning(t.size))))])
 
 
 def _expected(t: Array, heights: Array | None, slow: Array) -> Vertical:
@@ -303,8 +301,7 @@ def _in_spans(t: Array, values: NDArray[Any]) -> NDArray[Any]:
 
 
 def _spectrum(t: Array, s: Places) -> Sequence[Line]:
-    even = np.linspace(t[0], t[-1], t.size)
-    regular = np.interp(even, t, s.real) + 1j * np.interp(even, t, s.imag)
+    regular = np.interp(np.linspace(t[0], t[-1], t.size), t, s)
     return spectral_lines(regular - regular.mean(), (t.size - 1) / float(t[-1] - t[0])).lines
 
 
@@ -314,19 +311,19 @@ def _peaks(lines: Sequence[Line], between: tuple[float, float]) -> list[float]:
 
 
 class _Fit(NamedTuple):
-    """Swings, what they leave of the places, and what they were fitted with: waves, drift, and the vertical swing."""
+    """Swings, what they leave of the places, and what they were fitted with: waves, others, and the vertical swing."""
 
     swings: Swings
     rest: Places
     waves: Places
-    still: Places
+    others: Places
     expected: Vertical
-    rows: Beside
+    alone: Beside
 
     def vertical(self, t: Array, s: Places) -> Vertical:
         """Return the vertical swing by the lines beside the slow ones, wherever they are [Hz]."""
-        late, s, waves, still = (_in_spans(t, one) for one in (t - t.mean(), s, self.waves, self.still))
-        return of_places(late, s, waves, still, self.expected, rows=self.rows)
+        late, s, waves, others = (_in_spans(t, one) for one in (t - t.mean(), s, self.waves, self.others))
+        return of_places(late, s, waves, others, self.expected, rows=self.alone)
 
 
 def _fit(
@@ -346,54 +343,56 @@ def _fit(
     rise: where the vertical swing is looked for first, there unless given [Hz].
     """
     late, half, count = t - t.mean(), float(t[-1] - t[0]) / 2, start.size
-    frequency, slope = start.copy(), slopes_start.copy()
-    rise = known.value if rise is None else rise
+    q = np.concatenate([start, slopes_start, [known.value if rise is None else rise, 0, 0]])
+    known_u = np.concatenate([_SLOPES_U[:count], [known.u, _SHARE_U, _SHARE_U]])
+    most = np.concatenate([np.full(count, 0.3 / half), np.full(count, 0.3 / half**2), [0.1 / half, 0.3, 0.3]])
     # the field's part of what is known goes with the slow swings, that of the heights does not
     of_field, follows = vertical_swing(start[0], start[1]), (known.u / VERTICAL_U_HZ) ** 2
-    prior = np.zeros((count + 1, 2 * count + 1))  # what is known of the slopes and the vertical swing, over its u
-    prior[:count, count:-1] = np.diag(1 / _SLOPES_U[:count])
-    prior[-1, -1] = 1 / known.u
-    most = np.concatenate([np.full(count, 0.3 / half), np.full(count, 0.3 / half**2), [0.1 / half]])
     turn, size = 2j * np.pi * late, float(np.linalg.norm(s)) / math.sqrt(t.size)
-    noise = size
+    noise, parts = size, [_ALONE if row in ALONE else _BEYOND for row in rows]
+    widths = size * np.array([1.0] * count + parts + [1.0] * still.shape[1])
     for _ in range(_STEPS):
-        waves = np.exp(turn * (frequency[:, None] + late / 2 * slope[:, None]))
-        lines = beside(waves.T, np.exp(turn * rise), rows).T
-        linear = np.concatenate([waves, lines, still.T])
+        waves = np.exp(turn * (q[:count, None] + late / 2 * q[count:-3, None]))
+        lines = beside(waves.T, np.exp(turn * q[-3]), rows).T
+        linear, share = np.concatenate([waves, lines, still.T]), q[-2:] @ _OF_EITHER
+        linear[1::-1] += share[:, None] * lines[:2]
         mirror = linear.conj()
-        # an amplitude is about as large as the places: lines that are as one do not cancel each other
-        normal = mirror @ linear.T + 2 * (noise / size) ** 2 * np.eye(len(linear))
+        # lines that are as one do not cancel each other
+        normal = mirror @ linear.T + 2 * np.diag((noise / widths) ** 2)
         amplitudes = np.linalg.solve(normal, mirror @ s)
         rest = s - amplitudes @ linear
         left = np.linalg.norm(rest) / math.sqrt(2 * (t.size - len(linear) - count))
         noise = math.hypot(float(left), _FINEST * size)
+        sizes = amplitudes[count : count + len(rows)] + np.pad(share * amplitudes[1::-1], (0, len(rows) - 2))
+        moved = (np.array(rows).T * sizes) @ lines
         moving = waves * amplitudes[:count, None]
-        moved = (np.array(rows).T * amplitudes[count : count + len(rows)]) @ lines
         moving[:2] += moved[:2]
-        slopes = np.concatenate([moving, late / 2 * moving, moved[2:]]) * turn
-        slopes -= np.linalg.solve(normal, mirror @ slopes.T).T @ linear
-        real = slopes.view(np.float64)  # both coordinates
-        information, gradient = real @ real.T / noise**2, real @ rest.view(np.float64) / noise**2
+        shared = _OF_EITHER * amplitudes[1::-1] @ lines[:2]
+        slopes = np.concatenate([moving * turn, late / 2 * moving * turn, moved[2:] * turn, shared])
+        paid = np.linalg.solve(normal, mirror @ slopes.T).T
+        real = np.concatenate([(slopes - paid @ linear) / noise, 2**0.5 * paid / widths], axis=1).view(np.float64)
+        information, gradient = real @ real.T, slopes.view(np.float64) @ rest.view(np.float64) / noise**2
         # its own slopes would move the swings by 1e-6 Hz
-        expected = known.value + follows * (vertical_swing(frequency[0], frequency[1]) - of_field)
-        off = np.append(slope / _SLOPES_U[:count], (rise - expected) * prior[-1, -1])
-        information += prior.T @ prior
-        gradient -= prior.T @ off
+        off = q[count:] / known_u
+        off[-3] -= (known.value + follows * (vertical_swing(q[0], q[1]) - of_field)) / known.u
+        information[count:, count:] += np.diag(1 / known_u**2)
+        gradient[count:] -= off / known_u
         scale = np.sqrt(np.diagonal(information))
         unlike = information / np.outer(scale, scale) + _FINEST * np.eye(scale.size)
         covariance = np.linalg.inv(unlike) / np.outer(scale, scale)
-        step = np.clip(covariance @ gradient, -most, most)
-        frequency, slope, rise = frequency + step[:count], slope + step[count:-1], rise + float(step[-1])
-        if np.abs(step[:count]).max() < 1e-3 * np.sqrt(np.diagonal(covariance)[:count]).min():
+        step, u = np.clip(covariance @ gradient, -most, most), np.sqrt(np.diagonal(covariance))
+        q += step
+        if np.abs(step[:count]).max() < 1e-3 * u[:count].min():
             break
     found = Swings(
         time=float(t.mean()),
-        frequency=frequency,
-        u=np.sqrt(np.diagonal(covariance)[:count]),
+        frequency=q[:count],
+        u=u[:count],
         amplitude=np.abs(amplitudes[:count]),
-        vertical=Vertical(rise, math.sqrt(covariance[-1, -1])),
-        beside=np.abs(amplitudes[count : count + 2]),
+        vertical=Vertical(float(q[-3]), float(u[-3])),
+        beside=np.abs(sizes[:2]),
         noise=noise,
-        misfit=2 * t.size * math.log(noise**2) + float(off @ off) + 2 * float(np.linalg.norm(amplitudes / size)) ** 2,
+        misfit=2 * t.size * math.log(noise**2) + float(off @ off) + 2 * float(np.linalg.norm(amplitudes / widths)) ** 2,
     )
-    return _Fit(found, rest, waves.T, still, known, rows)
+    steady = np.concatenate([waves[2:], lines[[not row[2] for row in rows]], still.T]).T
+    return _Fit(found, rest, waves[:2].T * amplitudes[:2], steady, known, rows[len(BESIDE) : -2])  # without the beat

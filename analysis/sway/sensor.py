@@ -35,8 +35,7 @@ def slow_part(times: Array, signal: Places | Array) -> tuple[Array, Places]:
     from scipy.signal import decimate
 
     even = np.linspace(times[0], times[-1], times.size)
-    regular = np.interp(even, times, signal.real) + 1j * np.interp(even, times, signal.imag)
-    regular -= regular.mean()
+    regular = np.interp(even, times, signal - signal.mean()).astype(np.complex128)
     fewer = int((times.size - 1) / float(times[-1] - times[0]) / (2 * PRECESSION_HZ[1]))
     if fewer > 1:
         even, regular = even[::fewer], decimate(regular, fewer, ftype="fir")

@@ -61,50 +61,54 @@ def of_heights(late: Array, heights: Array, expected: Vertical, beat: float) -> 
         expected: without them.
         beat: of the slow swings, which is seen in the heights, too [Hz].
     """
-    turns = 2 * np.pi * late * beat
-    still = np.linalg.qr(np.column_stack([np.ones_like(late), late, np.cos(turns), np.sin(turns)]))[0]
+    beats = np.exp(2j * np.pi * late * beat)[:, None].view(np.float64)
+    still = np.linalg.qr(np.column_stack([np.ones_like(late), late, beats]))[0]
     rest = heights - still @ (still.T @ heights)
 
     def misfit(rise: float) -> float:
-        turns = 2 * np.pi * late * rise
-        return _misfit(rest, np.column_stack([np.cos(turns), np.sin(turns)]), still)
+        lines = np.exp(2j * np.pi * late * rise)[:, None].view(np.float64)
+        return _misfit(rest, lines - still @ (still.T @ lines))
 
     return _posterior(misfit, expected, float(np.ptp(late)))
 
 
 def of_places(
-    late: Array, places: Places, waves: Places, still: Array, expected: Vertical, *, rows: Beside
+    late: Array, places: Places, swings: Places, others: Places, expected: Vertical, *, rows: Beside
 ) -> Vertical:
     """Return the vertical swing as the lines beside the slow swings have it.
 
     Args:
         late: times from the middle, shape (n,) [s].
         places: shape (n,) [m].
-        waves: the slow swings first, shape (n, 2 or 3).
-        still: what else is in the places, shape (n, k).
+        swings: backward and forward, with their amplitudes, shape (n, 2) [m].
+        others: what else is in the places, with free amplitudes, shape (n, k).
         expected: without them.
-        rows: of the lines.
+        rows: of lines whose amplitudes do not follow from those of the swings.
     """
-    steady, moving = (tuple(row for row in rows if bool(row[2]) is moves) for moves in (False, True))
-    if steady:
-        still = np.concatenate([beside(waves, np.ones_like(places), steady), still], axis=1)
-    others = np.linalg.qr(np.concatenate([waves, still], axis=1))[0]
-    rest = places - others @ (others.conj().T @ places)
+    others = np.linalg.qr(np.concatenate([swings, others], axis=1))[0]
+
+    def rest(columns: Places) -> Array:
+        left = columns - others @ (others.conj().T @ columns)
+        return np.concatenate([left.real, left.imag])
 
     def misfit(rise: float) -> float:
-        return _misfit(rest, beside(waves, np.exp(2j * np.pi * late * rise), moving), others)
+        up = np.exp(2j * np.pi * late * rise)
+        (ahead, back), free = beside(swings, up, BESIDE[:2]).T, beside(swings, up, rows).T
+        return _misfit(rest(places), rest(np.column_stack([ahead + back, 1j * (back - ahead), *free, *(1j * free)])))
 
     return _posterior(misfit, expected, float(np.ptp(late)))
 
 
 #: Of each line: how often the backward, the forward and the vertical swing are in its frequency.
 Beside = tuple[tuple[int, int, int], ...]
-#: The lines beside the slow swings, of which the last two are as near to these as the first two, for which they answer
-#: where the beat meets the vertical swing; and those of the heights alone: the vertical swing and the beat.
-BESIDE: Beside = ((0, 1, -1), (1, 0, 1), (0, 1, 1), (1, 0, -1), (-1, 2, -1), (2, -1, 1))
+#: The lines beside the slow swings: the two that are near them, by which forward and backward swing are coupled while
+#: the top rises and sinks, two that are far, and those of the third order; and lines of the heights alone: the vertical
+#: swing and the beat.
+BESIDE: Beside = (
+    *((0, 1, -1), (1, 0, 1), (0, 1, 1), (1, 0, -1), (-1, 2, -1), (2, -1, 1)),
+    *((-1, 2, 0), (2, -1, 0), (0, 1, -2), (1, 0, 2), (-1, 2, -2), (2, -1, 2)),
+)
 ALONE: Beside = ((0, 0, 1), (0, 0, -1), (-1, 1, 0), (1, -1, 0))
-#: Lines of the third order: up to 10 µm where both swings have 1 mm.
-CUBIC: Beside = ((-1, 2, 0), (2, -1, 0), (0, 1, -2), (1, 0, 2))
 
 
 def beside(waves: Places, up: Places, rows: Beside) -> Places:
@@ -113,20 +117,17 @@ def beside(waves: Places, up: Places, rows: Beside) -> Places:
     return np.array([math.prod(of[k] for of, k in zip(powers, row, strict=True) if k) for row in rows]).T
 
 
-def _misfit(rest: NDArray[np.number], lines: NDArray[np.number], others: NDArray[np.number]) -> float:
+def _misfit(rest: Array, lines: Array) -> float:
     """Return −2 times the logarithm of the likelihood of what the others leave, but for a constant.
 
     The lines may be there or not, each as probable; their amplitudes cost what a prior as wide as one reading costs
     (Schwarz, Ann. Stat. 6, 461 (1978)).
     """
-    numbers = 2 if np.iscomplexobj(rest) else 1  # of each reading
-    count, paid = numbers * rest.size, numbers * lines.shape[1]
-    lines = np.linalg.qr(lines - others @ (others.conj().T @ lines))[0]
     energy = float(np.linalg.norm(rest) ** 2)
     if not energy:  # as of heights that are all alike
         return 0.0
-    left = max(energy - float(np.linalg.norm(lines.conj().T @ rest) ** 2), _FINEST**2 * energy)
-    there = count * math.log(left / energy) + paid * math.log(count)
+    left = max(energy - float(np.linalg.norm(np.linalg.qr(lines)[0].T @ rest) ** 2), _FINEST**2 * energy)
+    there = rest.size * math.log(left / energy) + lines.shape[1] * math.log(rest.size)
     return -2 * float(np.logaddexp(-there / 2, 0.0))
 
 
