@@ -78,7 +78,7 @@ def test_a_dot_on_the_stem_shows_the_precession_and_the_size_of_the_rim_the_rise
     rise = 2e-3 * np.sin(2 * np.pi * 1.3 * level.times)
     flight = replace(level, lean=np.stack([lean.real, lean.imag], axis=1), rise=rise)
     camera = Camera(stem=0.02, distance=0.4)
-    stem = film(folder / "stem.mp4", camera, flight, phone_times(2.2))
+    stem = film(folder / "stem.mp4", camera, flight, phone_times(2.2)[::2])
     options = VideoOptions(rim_m=2 * RIM, stem_m=0.02, camera_m=0.47, height_m=0.07)
     video = ANALYSES["video"]
     analysis = video.analyze([stem], options)
@@ -291,7 +291,7 @@ def test_a_film_is_recalled_from_its_result_and_reported_with_its_still(path, tm
 @pytest.mark.slow
 def test_a_top_that_falls_has_its_spin_then_as_a_limit_that_others_read(folder):
     flight = level_flight(3.0, 22.0, chirp=-0.06)
-    shown, times = Pictures(CAMERA, flight), phone_times(2.9)
+    shown, times = Pictures(CAMERA, flight), phone_times(2.9)[::2]
     path = write_film(
         folder / "falls.mp4", (shown.noisy(shown.take(t) if t < 2.6 else shown.background) for t in times), times
     )
