@@ -223,14 +223,14 @@ class Flight:
         return isinstance(self._piece_at(time), _Flying)
 
     def spin_of_fall(self, time: float) -> float | None:
-        """Return the mean spin in a second that ended less than a second before the top fell [Hz].
+        """Return the mean spin in a second that ended one to two seconds before the top fell [Hz].
 
-        Later it tumbles, and its tape turns otherwise.  None: a top is up, or it fell within a second.
+        Later it tumbles, and its tape turns otherwise.  None: a top is up, or it fell within two seconds.
         """
         piece = self._piece_at(time)
         if not isinstance(piece, _Absent) or piece.state is None:
             return None
-        return float(self.tape(np.array([piece.start - PIECE_S]))[1][0]) or None
+        return float(self.tape(np.array([piece.start - 2 * PIECE_S]))[1][0]) or None
 
     def passages(self, place: Callable[[float], float], start: float, stop: float) -> Array:
         """Return when the tape passes a place in its turn, increasing, shape (n,) [s].

@@ -376,8 +376,11 @@ def test_a_fall_has_the_spin_before_it_though_a_top_that_tumbles_shows_the_count
     spin = world.spin_of_fall()
     assert spin == pytest.approx(29.8, abs=0.2)  # from 30 Hz drag takes 0.07 Hz a second
     assert cause_of_fall(scene, spin, 3.0).startswith("the spin could hold it")
+    world.change_scene({"top.mass_kg": scene.top.mass_kg, "start.spin_hz": 23.5})
     world.float_top(2)
     assert world.spin_of_fall() is None
+    world.clock.sleep(10.0)
+    assert world.spin_of_fall() == pytest.approx(23.5, abs=0.1)  # in its last second it lies down, and counts 23.7 Hz
 
 
 def test_each_group_has_a_top_of_its_own_with_its_truth(tmp_path):
