@@ -15,7 +15,7 @@ from analysis.errors import AnalysisError
 from analysis.remarks import Remark
 from analysis.residuals import durbin_watson, runs_test_p
 from analysis.spindown.drag import LAWS
-from analysis.spindown.fit import SpinDown, comparison_remarks, correlation_remarks
+from analysis.spindown.fit import SpinDown, comparison_remarks
 from analysis.spindown.joint import JointExponent, joint_exponent
 from analysis.spindown.lawfit import LawFit
 from analysis.spindown.selection import NO_FIT, Statistics, statistics, weigh
@@ -116,8 +116,7 @@ def combine(runs: Sequence[SpinDown]) -> Combined:
     decision = runs[0].verdict if len(runs) == 1 else verdict(weighed, criterion, changes=changes)
     mixed = 0 < sum(run.u is None for run in runs) < len(runs)
     said = [
-        *comparison_remarks(weighed, decision.best, mixed=mixed),
-        *correlation_remarks(correlation, sum(len(run.time) for run in runs)),
+        *comparison_remarks(weighed, decision.best, correlation, mixed=mixed),
         *(Remark("changed", values=(k + 1, len(runs), changes[k])) for k in decision.changed if len(runs) > 1),
         *_about_number(runs),
     ]

@@ -185,8 +185,7 @@ def fit_spin_down(
         remarks=(
             *_about_outliers(given, outliers, fits[best], kept=keep_outliers),
             *_too_good(best, stats[best], fits[best].reference[0]),
-            *comparison_remarks(stats, best),
-            *correlation_remarks(fits[best].rho, len(readings)),
+            *comparison_remarks(stats, best, fits[best].rho),
         ),
         model=model,
         correlation=fits[best].rho,
@@ -321,12 +320,15 @@ def _last_ones(outliers: NDArray[np.intp], n: int) -> frozenset[int]:
     return frozenset(i for i in outliers.tolist() if i > last)
 
 
-def comparison_remarks(fits: Mapping[str, Statistics], best: str, *, mixed: bool = False) -> list[Remark]:
+def comparison_remarks(
+    fits: Mapping[str, Statistics], best: str, correlation: Estimate | None, *, mixed: bool = False
+) -> list[Remark]:
     """Return what makes the comparison of laws, or their uncertainties, weaker than it looks.
 
     Args:
         fits: statistics by the law's name.
         best: name of the favoured law.
+        correlation: of neighbouring readings.
         mixed: whether some of several runs have uncertainties of their readings and others have none.
     """
     said, fit = [], fits[best]
@@ -341,15 +343,11 @@ def comparison_remarks(fits: Mapping[str, Statistics], best: str, *, mixed: bool
             said.append(Remark("understated", best, values=ratio))
         if gammainc(*half) < NO_FIT:
             said.append(Remark("overstated", best, values=ratio))
+            correlation = None  # residuals far below u look like noise that hardly changes
+    if correlation and correlation.value is not None and correlation.u is not None and is_correlated(correlation):
+        said.append(Remark("correlated", values=(correlation.value, correlation.u, fit.n)))
     undefined = [name for name, each in fits.items() if each.aicc is None]
     if undefined:
         by_bic = len(undefined) == len(fits) and fit.sigma_known
         said += [Remark("few readings", name=", ".join(undefined), values=(fit.n, by_bic))]
     return said
-
-
-def correlation_remarks(found: Estimate | None, n: int) -> list[Remark]:
-    """Return that neighbouring readings resemble each other."""
-    if found is None or found.value is None or found.u is None or not is_correlated(found):
-        return []
-    return [Remark("correlated", values=(found.value, found.u, n))]

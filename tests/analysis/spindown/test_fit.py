@@ -469,6 +469,7 @@ def test_an_uncertainty_stated_far_too_small_or_too_large_is_reported_and_change
     assert set(small.verdict.excluded) == {"stokes", "newton"}
     assert "understated" in kinds(small)
     assert "overstated" in kinds(large)
+    assert "correlated" not in kinds(large)  # small residuals beside a large u look like it
 
 
 @pytest.mark.parametrize(("n", "largest"), [(4, 39), (5, 14.8), (6, 9.6), (7, 7.5)])
