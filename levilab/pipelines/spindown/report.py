@@ -428,7 +428,7 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
             title="Spin-down.",
             caption=(
                 "The readings with all drag laws; what each law leaves over, which is noise about zero where the law "
-                "holds; and the straight lines that one draws on paper, straight where their law holds."
+                "holds; and the lines that one draws on paper, straight where their law holds and no tilt bends them."
             ),
             points=_points(analysis),
         ),
