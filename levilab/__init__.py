@@ -468,6 +468,7 @@ def report(
     *,
     tables: bool = False,
     crosscheck: bool = True,
+    short: bool = False,
 ) -> Path:
     """Write the report of runs, data files, folders, results or motions.
 
@@ -476,6 +477,7 @@ def report(
         output: the file; its ending, .html or .pdf, chooses the format.
         tables: write the tables of results, too, into a folder beside it.
         crosscheck: make a cross-check with the result's own parameters where none is stored and it takes seconds.
+        short: answer, values, figure and notes alone.
 
     Returns:
         The file.
@@ -487,7 +489,7 @@ def report(
     """
     from levilab.notebook.report import report_on
 
-    return report_on(data, output, tables=tables, crosscheck=crosscheck)
+    return report_on(data, output, tables=tables, crosscheck=crosscheck, short=short)
 
 
 @bare

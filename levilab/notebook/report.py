@@ -19,7 +19,7 @@ from levilab.runs.run import Run
 Reported = Run | AnalysisResult | SimulatedMotion | SimulatedMap | str | PathLike[str]
 
 
-def report_on(data: Any, output: str | PathLike[str], *, tables: bool, crosscheck: bool) -> Path:
+def report_on(data: Any, output: str | PathLike[str], *, tables: bool, crosscheck: bool, short: bool) -> Path:
     """Write a report of runs, files, folders or results; see `levilab.report`.
 
     Raises:
@@ -40,7 +40,7 @@ def report_on(data: Any, output: str | PathLike[str], *, tables: bool, crosschec
         paths = [path for item in items for path in _paths(item, Path(made))]
         folder = "" if output.parent.is_dir() else ", in a new folder"
         print(f"writing {output}{folder} …", file=sys.stderr)  # noqa: T201 - a cross-check takes seconds
-        return write_report(paths, output, given, tables=tables, crosscheck=crosscheck)
+        return write_report(paths, output, given, tables=tables, crosscheck=crosscheck, short=short)
 
 
 def _paths(item: Reported, made: Path) -> list[Path]:

@@ -239,6 +239,7 @@ GUESSES = {
         lambda path: "Simulated motion" in path.read_text(encoding="utf-8")
     ),
     "levilab.report(result, new / 'r.html', crosscheck=False)": lambda path: path.stat().st_size > 20_000,
+    "levilab.report(result, new / 'r.html', short=True)": lambda path: "reproduce" not in path.read_text("utf-8"),
 }
 #: Wrong guesses → what the error says instead.
 REFUSED = {
