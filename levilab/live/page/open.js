@@ -83,6 +83,7 @@ function show() {
   hold(asks ? phrase("Answer the question above first.") : look.problem ? phrase("It is not read; the reason stands above.") : "");
   by("keep").disabled = Boolean(look.problem) || !look.words.length || Boolean(look.options.rim_mm);
   by("again").disabled = !look.words.length;
+  by("command").parentElement.hidden = asks;
   write("command", ["levilab analyze", look.name, ...look.words].map((word, k) => k && /[^\w.,=/-]/.test(word) ? `"${word}"` : word).join(" "));
   const used = look.runs.flatMap(({columns}) => columns).filter(({quantity}) => quantity).map(({title, quantity, unit}) => phrase("{column} is {quantity} in {unit}", {column: title || phrase("a column"), quantity: wordsOf(quantity), unit}));
   write("news", inWords(look.problem) || `${look.name}: ${used.join(", ")}`);

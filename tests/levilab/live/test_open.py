@@ -56,6 +56,7 @@ def test_a_file_is_dropped_corrected_kept_and_analyzed(hall, watched, monkeypatc
     assert file.read_text("utf-8") == OMEGA
     assert page.get_by_role("button", name="Analyze").is_disabled()
     assert page.inner_text("#why") == "Answer the question above first."
+    assert page.is_hidden("#command")  # it would be refused, too
     assert "no unit" in page.get_by_role("group").first.inner_text()
     page.get_by_role("button", name="rad/s (38").press("Enter")
     until(page, "levilab.look.plots['0']")
