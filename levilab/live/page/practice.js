@@ -207,7 +207,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     reached = "";
     write("answers-wrong", "");
     write("task-title", phrase(row.title));
-    write("task-does", phrase(row.does));
+    for (const place of ["task-does", "goal"]) write(place, phrase(row.does));
     const answers = Object.entries(row.answers);
     put(by("task-share"), {hidden: answers.length > 0});
     by("answers").replaceChildren(...answers.map(([text, value]) => {

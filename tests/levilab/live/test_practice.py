@@ -295,6 +295,7 @@ def test_a_task_opens_the_control_that_it_needs_and_leads_to_the_next(starting, 
     assert page.locator("#washers_g").is_visible()
     assert not page.locator("#guide").is_visible()
     page.get_by_role("tab", name="Tasks").click()  # a person may go elsewhere
+    assert page.inner_text("#goal") == page.inner_text("#task-does")
     publish(starting.watches[""], replace(here, time_s=4.0, tasks_done=("catch", "mass")))
     until(page, "!document.getElementById('offer').hidden")
     assert page.inner_text("#offer-text").startswith("✓ Find the mass that floats: of 25 g only some tenths are free")
