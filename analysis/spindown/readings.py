@@ -17,7 +17,8 @@ class NoSpinDown(AnalysisError):
     def __init__(self, *, first: float, last: float) -> None:
         self.first, self.last = first, last
         super().__init__(
-            "the spin goes from {first:.6g} Hz to {last:.6g} Hz, a falling spin was expected: is the drive still on?"
+            "the spin goes from {first:.6g} Hz to {last:.6g} Hz (medians of the first and last third of the readings), "
+            "a falling spin was expected: is the drive still on?"
         )
 
 

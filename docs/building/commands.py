@@ -93,7 +93,8 @@ def _example(epilog: str) -> str:
 
 
 def _in_plain_text(text: str) -> str:
-    """Help is plain text: nothing in it is markup."""
+    """Help is plain text: nothing in it is markup but the backslash that keeps a bracket from rich."""
+    text = text.replace(r"\[", "[")
     return re.sub(r"([\\*_<>`$\[\]])", r"\\\1", re.sub(r"[ \t]+", " ", text)).strip()
 
 

@@ -426,16 +426,16 @@ def _agreement(of: Compared) -> str:
     if together is None or together.scatter is None:
         return "there is no other group to compare it with"
     if together.p < DIFFER:
-        return Text("the groups differ by {scatter}, more than their u, as different tops do", _scatter(of, together))
-    return Text("the groups agree within their u: they differ by {scatter}", scatter=_scatter(of, together))
+        return Text("the groups scatter by {scatter}, more than their u, as different tops do", _scatter(of, together))
+    return Text("the groups agree within their u: they scatter by {scatter}", scatter=_scatter(of, together))
 
 
 def _scatter(of: Compared, together: Comparison) -> str:
-    """Return by how much the groups differ: in per cent of the mean, unless that is near zero."""
+    """Return the standard deviation of the groups: in per cent of the mean, unless that is near zero."""
     scatter, average = together.scatter or 0.0, abs(of.mean.value or 0.0) if of.mean else 0.0
     if scatter < average:
-        return Text("{percent:n} %", percent=digits(100 * scatter / average, 2))
-    return Text("{scatter:n} {unit:s}", scatter=digits(scatter * unit(of.unit).shown.factor, 2), unit=of.shown_unit)
+        return Text("{percent:n} % (s.d.)", percent=digits(100 * scatter / average, 2))
+    return Text("{scatter:n} {unit:s} (s.d.)", digits(scatter * unit(of.unit).shown.factor, 2), of.shown_unit)
 
 
 def _chi_square(one: Compared, together: Comparison) -> str:

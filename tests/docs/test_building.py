@@ -16,12 +16,11 @@ from support.paths import DOCS
 def test_the_pages_of_commands_have_each_command_with_its_options():
     commands = typer.main.get_command(app).commands
     assert sorted(name for names in PAGES.values() for name in names) == sorted(commands)
-    assert [
-        name for page, names in PAGES.items() for name in names if f"## `levilab {name}`" not in reference(page)
-    ] == []
-    assert "### `levilab acquire spin`" in reference("reference/commands-acquire")
-    assert "```text\nlevilab acquire spin [OPTIONS]\n```" in reference("reference/commands-acquire")
-    assert reference("reference/commands-acquire").count("`--resume RUN`") == 1  # of all, said once
+    assert all(f"## `levilab {name}`" in reference(page) for page, names in PAGES.items() for name in names)
+    acquire = reference("reference/commands-acquire")
+    assert "### `levilab acquire spin`\n\n```text\nlevilab acquire spin [OPTIONS]\n```" in acquire
+    assert acquire.count("`--resume RUN`") == 1  # of all, said once
+    assert r'"f=Drehzahl \[rpm\]"' in reference("reference/commands-analyze")
     assert "`--tolerance X`\n: Error that is accepted" in reference("reference/commands-simulate")
     assert "| [`levilab sweep`](commands-simulate.md#levilab-sweep) | Map a scene" in overview()
 

@@ -53,7 +53,7 @@ def _tilt_moment(scene: Scene, tilt_deg: float) -> dict[str, Any]:
 #: laminar boundary layer), ρ for n = 2.
 WHAT_IF: dict[str, Change] = {
     "washers_g": Change(
-        "washers", "g", "The mass that floats is known to some tenths of a gram.", 0.0, 1.0, 0.02, _WASHERS_G,
+        "washers", "g", "A top floats if its mass is right to some tenths of a gram.", 0.0, 1.0, 0.02, _WASHERS_G,
         lambda scene, value: {"top.mass_kg": scene.top.mass_kg + 1e-3 * (value - _WASHERS_G)},
     ),
     "base_tilt_deg": Change(

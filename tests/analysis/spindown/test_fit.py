@@ -417,7 +417,7 @@ Y = readings()
         (TimesNotIncreasing, "time number 3 is 10 s and follows 10 s", ([0, 10, 10, 20], Y[:4])),
         (NotPositive, "spin frequency number 4 is 0 Hz", (T[:4], [4, 3, 2, 0])),
         (NotPositive, "standard uncertainty number 1 is -0.1 Hz", (T, Y, -0.1)),
-        (NoSpinDown, "is the drive still on", (T, np.full(20, 30.0))),
+        (NoSpinDown, r"of the first and last third of the readings\), a falling spin", (T, np.full(20, 30.0))),
         (NoSpinDown, "is the drive still on", (T, Y[::-1])),
     ],
 )

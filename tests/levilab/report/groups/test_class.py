@@ -17,7 +17,7 @@ from levilab.crosscheck.truth import Truth
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.suits import save
-from levilab.report.beside import DIFFER, GOOD, REPEAT, _quantity, _width, class_of, finding, verdict
+from levilab.report.beside import DIFFER, GOOD, REPEAT, _quantity, _width, agreement, class_of, finding, verdict
 from levilab.report.groups.document import write_class
 from levilab.report.groups.figure import class_figure
 from levilab.report.page import render
@@ -55,6 +55,7 @@ def test_each_group_is_beside_the_truth_of_its_seed(of_three):
     assert [group.source.name for group in of.groups] == [HOSTILE, "Group 2", "Group 10"]
     assert "3 of 3 results are good. What it means" in Page(render([(of.analysis, of.found)])).text
     (c32,) = of.quantities
+    assert f"{np.std([1e2 * x.value for x in c32.estimates], ddof=1) / c32.mean.value:.2g} % (s.d.)" in agreement(of)
     assert c32.truths == tuple(random_scene(seed).constants[0] for seed in (3, 2, 1))
     assert all(abs(one) < 3 for one in c32.from_truth)  # each is so in 99.7 % of all seeds
     assert all(0 < group.statistics["rms_residual"] < 0.06 for group in of.groups)  # u of a reading is 0.03 Hz
@@ -92,8 +93,7 @@ def test_the_page_names_groups_whose_seed_has_another_law(of_three, tmp_path, gr
 
 def test_two_runs_of_a_group_are_no_two_groups(of_three, tmp_path):
     assert "mean of 3 groups" in finding(compared(of_three))
-    again = with_changes(of_three, tmp_path, "Group 10", {"group": "Group 2"})
-    assert "mean of 3 runs of 2 groups" in finding(compared(again))
+    assert "3 runs of 2 groups" in finding(compared(with_changes(of_three, tmp_path, "Group 10", {"group": "Group 2"})))
 
 
 def test_a_run_given_twice_is_named(of_three, tmp_path):

@@ -97,8 +97,9 @@ def test_a_key_has_the_values_and_truths_of_each_seed_and_the_worksheet_none(tmp
     english = read_language("en")
     assert "Who clicked" in str(key_of(SHEETS["spin"], english, seeds, measured))
     assert "Who clicked" not in str(key_of(SHEETS["limit"], english, seeds, measured))  # whose sheet has no clicks
-    assert all(f"{one.value * 1e4:.3f}"[:4].replace(".", ",") in page for one in found.estimates if one)
-    assert all(f"{truth * 1e4:.3f}"[:4].replace(".", ",") in page for truth in found.truths if truth)
+    values = [1e4 * value for value in (*(one.value for one in found.estimates), *found.truths)]
+    assert all(f"{value:.3f}"[:4].replace(".", ",") in page for value in values)
+    assert min(abs(value - float(english.words["notation"].partition("(")[0])) for value in values) > 1  # no answer
     assert "SYNTHETISCH." in page
     assert "×10⁻⁴" not in Page(sheet.read_text(encoding="utf-8")).text
 
