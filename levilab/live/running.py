@@ -21,7 +21,7 @@ from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.uncertainty import Estimate
 from levilab.live.envelope import Groups
 from levilab.pipelines.spindown.readings import release_of
-from levilab.pipelines.spindown.words import law_names
+from levilab.pipelines.spindown.words import law_name, law_names
 from levilab.present.numbers import plain, with_uncertainty
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text, text_of
@@ -144,7 +144,7 @@ def spin_down(
         Text("as good: {laws}", laws=law_names(others)) if others else "",
         Text("excluded: {laws}", laws=law_names(found.verdict.excluded)) if found.verdict.excluded else "",
     ]
-    law = law_names([found.best])
+    law = law_name(found.best)
     return Running(
         Text("{law} law, the best so far   {equation}", law=law, equation=LAWS[found.best].equation),
         tuple(filter(None, lines)),

@@ -17,7 +17,7 @@ from levilab.pipelines.row import Quantity, columns_of
 from levilab.pipelines.sources import Source
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 from levilab.pipelines.spindown.document import SPINDOWN
-from levilab.pipelines.spindown.words import SYMBOLS, law_names
+from levilab.pipelines.spindown.words import SYMBOLS, law_name
 from levilab.present.numbers import enumeration, plain, with_uncertainty
 from levilab.runs.run import read_record
 from levilab.texts.text import Sentences, Text
@@ -94,7 +94,7 @@ def _of_laws(found: HeldTogether) -> Iterable[str]:
         constants = [
             Text("{symbol} = {value:n}", SYMBOLS[name], with_uncertainty(one)) for name, one in best.constants.items()
         ]
-        yield Text("The {law} law fits best: {how}.", law=law_names([best.name]), how=enumeration(constants))
+        yield Text("The {law} law fits best: {how}.", law=law_name(best.name), how=enumeration(constants))
         if (chi := best.statistics.reduced_chi_square) is not None:
             yield Text("The held spins scatter about it by {times:n} of their u.", times=plain(math.sqrt(chi), 2))
     for law in found.laws[: 1 if best else None]:  # a single drag lies on each
@@ -108,7 +108,7 @@ def _of_laws(found: HeldTogether) -> Iterable[str]:
                 "uncertainties off."
             )
             value = with_uncertainty(spindown)
-            yield Text(agrees, law=law_names([law.name]), symbol=SYMBOLS[name], value=value, pull=plain(pull, 2))
+            yield Text(agrees, law=law_name(law.name), symbol=SYMBOLS[name], value=value, pull=plain(pull, 2))
 
 
 def fit_source(source: Source[HoldReadings], _: HoldOptions) -> Hold:

@@ -36,7 +36,7 @@ from levilab.pipelines.spindown.words import (
     SPINDOWN_ROW,
     SYMBOLS,
     is_prior,
-    law_names,
+    law_name,
     remark,
     verdict_of_run,
 )
@@ -140,7 +140,7 @@ def _of_readings(
     remedy = _better_readings(source)
     yield Component("scatter", what, "B" if stated else "A", own, "Hz", sensitivity, note=note, remedy=remedy)
     if parts.excess > 0:
-        chi, law = digits(fit.statistics.reduced_chi_square or 0.0), law_names([fit.name])
+        chi, law = digits(fit.statistics.reduced_chi_square or 0.0), law_name(fit.name)
         note = Text("χ²/dof = {chi:n} about the {law} law", chi, law)
         remedy = "finding what the law, or the stated u, leaves out"
         yield direct_row("excess", "scatter beyond the stated u", parts.excess, unit, note, remedy, kind="A")

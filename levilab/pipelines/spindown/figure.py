@@ -19,7 +19,7 @@ from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 from levilab.pipelines.spindown.report import is_best, laws_of, tilt_part
-from levilab.pipelines.spindown.words import STRAIGHT_LINES, SYMBOLS, finding, law_names, short_law
+from levilab.pipelines.spindown.words import STRAIGHT_LINES, SYMBOLS, finding, law_name, short_law
 from levilab.present.drawing import (
     SMALL,
     band,
@@ -109,7 +109,7 @@ def _unit(analysis: SpinDownAnalysis) -> _Unit:
     residuals = [run.fit(analysis.combined.best).residuals for run in analysis.runs]
     floor = 1e-12 * float(analysis.runs[0].frequency[0])  # readings that a law describes exactly
     scatter = max(float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))), floor)
-    words = Text("the scatter about the {law} law ({hz:n} Hz)", law_names([analysis.combined.best]), digits(scatter))
+    words = Text("the scatter about the {law} law ({hz:n} Hz)", law_name(analysis.combined.best), digits(scatter))
     return _Unit([np.full(len(one), scatter) for one in residuals], scatter, "scatter", words)
 
 
@@ -291,7 +291,7 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
         ends.append((float(difference[-1]), name, text))
     _name_laws(axes, [end for end in ends if math.isfinite(end[0])])
     of = "; curves of the longest run" if several > 1 else ""
-    axes.set_title(Text("Readings and laws less the {law} law{of}", law=law_names([best]), of=of), pad=3)
+    axes.set_title(Text("Readings and laws less the {law} law{of}", law=law_name(best), of=of), pad=3)
 
 
 def _with_sign(difference: Array) -> str:

@@ -302,10 +302,11 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
     if loss > FASTEST_LOSS_PER_S or (0 < loss < SLOWEST_LOSS_PER_S):
         minutes = loss < SLOWEST_LOSS_PER_S and table.factors.get("time_s", 1.0) > 1
         written, unit = ("minutes", "s") if minutes else ("seconds", "min" if loss > FASTEST_LOSS_PER_S else "ms")
+        hours = Text(" ({hours:n} h)", digits(lasts / 3600)) if lasts > 3600 else ""
         doubt = Text(
-            "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz in {lasts:.4g} s, in air it takes minutes; if "
-            "the times are not in {written}, say so, as t=NAME [{unit:s}]",
-            name=table.path.name, first=first, last=last, lasts=lasts, written=written, unit=unit,
+            "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz in {lasts:n} s{hours}, in air it takes "
+            "minutes; if the times are not in {written}, say so, as t=NAME [{unit:s}]",
+            table.path.name, first, last, digits(lasts, 4), hours, written, unit,
         )  # fmt: skip
         return [_doubt(doubt)]
     if first > FASTEST_BY_HAND_HZ and FALLS_BETWEEN_HZ[1] < last / 2 < FALLS_BETWEEN_HZ[0]:

@@ -41,6 +41,7 @@ from levilab.pipelines.spindown.words import (
     SYMBOLS,
     is_prior,
     is_seen,
+    law_name,
     law_names,
     verdict_of_run,
 )
@@ -157,9 +158,9 @@ def _exponent(analysis: SpinDownAnalysis) -> Iterator[str]:
     if exponent.value is None or not exponent.u:
         return
     away = {name: abs(exponent.value - n) / exponent.u for name, n in _POWERS.items()}
-    near = [Text("{law} ({n:g})", law_names([name]), _POWERS[name]) for name, far in away.items() if far < _DIFFERS]
+    near = [Text("{law} ({n:g})", law_name(name), _POWERS[name]) for name, far in away.items() if far < _DIFFERS]
     far = [
-        Text("{law} ({n:g}) by {far:.0f} u", law=law_names([name]), n=_POWERS[name], far=far)
+        Text("{law} ({n:g}) by {far:.0f} u", law=law_name(name), n=_POWERS[name], far=far)
         for name, far in away.items()
         if far >= _DIFFERS
     ]
@@ -536,7 +537,7 @@ def _run_by_run(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
     paper = Text(
         "The fit of the {law} law{decided}, and beside it unweighted straight lines as one draws them on paper "
         "(ln ω, 1/ω, ω^−½ against time).",
-        law=law_names([combined.best]),
+        law=law_name(combined.best),
         decided=", the best" if combined.verdict.decided else "",
     )
     several = "s: standard deviation of one run's constant from another's; the uncertainty of the mean is s/√N."
@@ -695,7 +696,7 @@ def _readings(source: Source[SpinReadings], fit: SpinDown, options: SpinDownOpti
         Row((*clocks[i], with_decimals(t, 3), *reading(float(nu), u_, left.get(i))), "outlier" if i in outliers else "")
         for i, (t, nu, u_) in enumerate(zip(readings.time[:shown], readings.frequency[:shown], u, strict=True))
     ]
-    residual = Text("Residual: reading − {law} law.", law=law_names([best]))
+    residual = Text("Residual: reading − {law} law.", law=law_name(best))
     note = Sentences(residual, first_of(shown, len(readings)))
     return Listing("spindown-readings", table("Readings", heads, rows, numbers=heads), note)
 
@@ -718,7 +719,7 @@ def _points_of_run(k: int, name: str, run: SpinDown, analysis: SpinDownAnalysis)
     ]
     for law in run.fits:
         left = zip(heads, law.residuals.tolist(), u, strict=True)
-        name = law_names([law.name])
+        name = law_name(law.name)
         texts = tuple(Text("{head:n}\nν − {law} law = {off:n} Hz", head, name, off(r, u_)) for head, r, u_ in left)
         yield Points(f"residuals-{law.name}-{k}", texts)
         if law.name == analysis.combined.best:

@@ -138,13 +138,18 @@ SEEN = 6.0
 PRIOR = 0.9
 
 
-def law_names(laws: Iterable[str]) -> str:
-    """Return drag laws as a list in a sentence; "the laws" for none.
+def law_name(law: str) -> str:
+    """Return the name of a drag law in a sentence."""
+    return _PERSONS.get(law, law)
+
+
+def law_names(laws: Iterable[str], power: str = "power") -> str:
+    """Return drag laws as a list in a sentence, in which other languages have articles; "the laws" for none.
 
     >>> law_names(["stokes", "disc"])
     'Stokes and disc'
     """
-    return enumeration([_PERSONS.get(law, law) for law in laws] or ["the laws"])
+    return enumeration([Text("{law}", power if law == "power" else law_name(law)) for law in laws] or ["the laws"])
 
 
 def short_law(law: str) -> str:
@@ -168,7 +173,7 @@ def verdict_of_all(found: Combined, runs: Sequence[SpinDown]) -> str:
 def verdict_in_doubt(found: Combined) -> str:
     """Return what all runs say about the laws where no unit is sure."""
     said = "The unit comes first: as it was read the {law} law is nearest; do not use its constants."
-    return Text(said, law=law_names([found.best]))
+    return Text(said, law=law_name(found.best))
 
 
 def is_seen(tilt: Estimate | None) -> bool:
@@ -186,15 +191,15 @@ def finding(found: Combined) -> str:
     """Return the verdict of all runs in a few words, for the head of a figure."""
     said, best = found.verdict, found.best
     if not said.describes:
-        return Text("no drag law describes these readings; the {law} law comes nearest", law=law_names([best]))
+        return Text("no drag law describes these readings; the {law} law comes nearest", law=law_name(best))
     if said.decided:
         how = "; {laws} is excluded" if len(said.excluded) == 1 else "; {laws} are excluded"
         excluded = Text(how, laws=law_names(said.excluded)) if said.excluded else ""
-        return Text("the {law} law describes the readings{excluded}", law=law_names([best]), excluded=excluded)
+        return Text("the {law} law describes the readings{excluded}", law=law_name(best), excluded=excluded)
     simple = _simple(said)
     if len(simple) == 1:
         how = "{laws} cannot be distinguished; {law} has the fewest constants"
-        return Text(how, laws=law_names(said.indistinguishable), law=law_names([best]))
+        return Text(how, laws=law_names(said.indistinguishable), law=law_name(best))
     return Text("the readings cannot distinguish {laws}", laws=law_names(simple))
 
 
@@ -212,13 +217,8 @@ def _verdict(
 ) -> str:
     said, stats = found.verdict, {fit.name: fit.statistics for fit in fits}
     best = stats[said.best]
-
-    def names(laws: Sequence[str]) -> str:
-        exponent = constants.get("power", {}).get("exponent")
-        power = Text("power ({exponent:n})", exponent=_exponent(exponent))
-        return enumeration([power if name == "power" else law_names([name]) for name in laws])
-
-    simple, law = _simple(said), law_names([said.best])
+    power = Text("power ({exponent:n})", exponent=_exponent(constants.get("power", {}).get("exponent")))
+    simple, law = _simple(said), law_name(said.best)
     compared = [name for name in said.needless if stats[name].difference is not None]
     how, others, advice = _how(said.best, constants[said.best]), said.indistinguishable[1:], ""
     if not said.describes:
@@ -227,7 +227,7 @@ def _verdict(
         start = "The {law} law fits best: {how}." if how else "The {law} law fits best."
         first = Text(start, law=law, how=how)
     elif len(simple) == 1:
-        alike = names(said.indistinguishable)
+        alike = law_names(said.indistinguishable, power)
         first = Text("The laws {alike} cannot be distinguished: {law} has the fewest constants.", alike=alike, law=law)
         advice = "More runs, or a longer fall of the spin, can decide."
     else:
@@ -244,14 +244,15 @@ def _verdict(
         laws=law_names(said.excluded), rms=enumeration(misses or [""]), law=law, least=digits(best.rms_residual),
     )  # fmt: skip
     weak = Text("They speak against {laws}, not strongly enough to exclude.", laws=law_names(said.weak))
+    needless = Text("No better than {law}, with more constants: {laws}.", law=law, laws=law_names(compared, power))
     return Sentences(
         first,
         Text("If the {law} law holds, {how}.", law=law, how=how) if how and said.describes and not said.decided else "",
         excluded if misses else "",
-        Text("They cannot distinguish it from {laws}.", laws=names(others)) if others and said.decided else "",
+        Text("They cannot distinguish it from {laws}.", law_names(others, power)) if others and said.decided else "",
         advice,
         weak if said.weak else "",
-        _needless(said, names(compared)) if compared and (said.decided or len(simple) == 1) and said.describes else "",
+        needless if compared and (said.decided or len(simple) == 1) and said.describes else "",
         _wobble(tilt),
     )
 
@@ -290,10 +291,6 @@ def _wobble(tilt: Estimate | None) -> str:
     )
 
 
-def _needless(said: Verdict, names: str) -> str:
-    return Text("No better than {law}, with more constants: {laws}.", laws=names, law=law_names([said.best]))
-
-
 def _no_law(found: SpinDown | Combined, runs: Sequence[SpinDown], rms: str) -> str:
     change = found.verdict.change
     if change is None:
@@ -308,7 +305,7 @@ def _no_law(found: SpinDown | Combined, runs: Sequence[SpinDown], rms: str) -> s
     return Text(
         "No law describes these readings: {what}; the best one, {law}, leaves {rms:n} Hz rms. Its constants and their "
         "uncertainties are those of a curve through the readings, not of a drag.",
-        what=what, law=law_names([found.best]), rms=rms,
+        what=what, law=law_name(found.best), rms=rms,
     )  # fmt: skip
 
 
@@ -358,7 +355,7 @@ def _outlier(of: Remark) -> str:
     return Text(
         "the reading of {hz:.6g} Hz at {time:.12g} s lies {off:n} Hz from the {law} law, {many:n} times {unit}, and "
         "was {kept}{falling}",
-        hz=frequency, time=round(time, 3), off=digits(off), law=law_names([of.law or ""]), many=many,
+        hz=frequency, time=round(time, 3), off=digits(off), law=law_name(of.law or ""), many=many,
         unit="its uncertainty" if stated else "the rms residual of the others",
         kept="kept as asked" if kept else "left out",
         falling="; it stands at the end: the top may already have been falling" if falling else "",
@@ -405,7 +402,7 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Weighed] = MappingProxyTy
         "understated": lambda of: Text(
             "even the best law, {law}, misses the readings by {times:n} times their stated uncertainties, more than "
             "chance explains: all uncertainties are enlarged; check the readings' uncertainties",
-            law=law_names([of.law or ""]),
+            law=law_name(of.law or ""),
             times=digits(of.values[0]),
         ),
         "overstated": Weighed(

@@ -69,11 +69,11 @@ def test_rows_of_0_hz_after_the_fall_are_left_out_with_a_note(tmp_path):
 
 
 def test_readings_closer_than_a_turn_are_doubted(tmp_path):
-    """T [ms] above seconds; in seconds there is no doubt."""
     rows = "0,40\n10,39\n20,38.1\n30,37.2\n"
-    for unit, said in (("ms", ["the readings lie 10 ms apart, the top needs 25.9 ms for a turn"]), ("s", [])):
-        warnings = spin_readings(table_of(tmp_path, f"T [{unit}],f [Hz]\n{rows}")).warnings
-        assert [text.partition(";")[0].partition(": ")[2] for text in warnings] == said
+    said = {u: spin_readings(table_of(tmp_path, f"T [{u}],f [Hz]\n{rows}")).warnings for u in ("ms", "s", "h")}
+    assert ": the readings lie 10 ms apart, the top needs 25.9 ms for a turn;" in said["ms"][0]
+    assert said["s"] == ()
+    assert " from 40 to 37.2 Hz in 108000 s (30 h), in air it takes minutes;" in said["h"][0]
 
 
 def test_points_behind_thousands_are_named_where_they_pass_for_decimals(tmp_path):
