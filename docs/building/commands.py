@@ -233,6 +233,7 @@ MADE = {
     "reference/commands": {"<!-- all commands -->": overview},
     **{page: {"<!-- commands -->": partial(reference, page)} for page in PAGES},
     "data": {"<!-- all columns -->": columns, "<!-- all laws -->": laws},
+    "glossary": {"<!-- all laws -->": laws},
     "notebook": {"<!-- all names of a fit -->": fit},
     "simulator": {"<!-- all keys -->": scene},
     "sweeps": {"<!-- all observables -->": observables},
