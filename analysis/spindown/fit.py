@@ -344,8 +344,8 @@ def comparison_remarks(
         if gammainc(*half) < NO_FIT:
             said.append(Remark("overstated", best, values=ratio))
             correlation = None  # residuals far below u look like noise that hardly changes
-    if correlation and correlation.value is not None and correlation.u is not None and is_correlated(correlation):
-        said.append(Remark("correlated", values=(correlation.value, correlation.u, fit.n)))
+    if correlation and is_correlated(correlation):
+        said.append(Remark("correlated", values=(correlation.value or 0.0, correlation.u or 0.0, fit.n)))
     undefined = [name for name, each in fits.items() if each.aicc is None]
     if undefined:
         by_bic = len(undefined) == len(fits) and fit.sigma_known

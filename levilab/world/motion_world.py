@@ -225,7 +225,8 @@ class MotionWorld:
 
     def poses(self, start: float, step: float, n: int) -> Poses:
         """Return the top's place and attitude; see World."""
-        return poses_of(*self._flight.attitude(start + step * np.arange(n, dtype=np.float64)), start=start, step=step)
+        times = start + step * np.arange(n, dtype=np.float64)
+        return poses_of(*self._flight.attitude(times), start=start, step=step)
 
     def floats(self) -> bool:
         """Return whether the top is up now."""

@@ -5,7 +5,7 @@ import re
 
 import pytest
 
-from support.paths import QUOTED
+from support.messages import QUOTED
 from support.sources import sources
 
 

@@ -7,7 +7,8 @@ from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 import pytest
 
 from support.browser import watch
-from support.paths import QUOTED, ROOT
+from support.messages import QUOTED
+from support.paths import ROOT
 
 SITE = ROOT / "build/site"
 #: Page → what is typed, and it is the first.

@@ -55,10 +55,6 @@ FLAGS = (
     "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
     # and nothing else by way of the card that is not there: texts and boxes are drawn for a third less
     "--disable-gpu-compositing", "--disable-gpu-rasterization",
-    # no pages behind the address bar, a process for each window; the list takes the place of Playwright's own
-    ("--disable-features=WebUIOmniboxPopup,WebUIOmniboxAimPopup,AimEnabled,AvoidUnnecessaryBeforeUnloadCheckSync,"
-    "DestroyProfileOnBrowserClose,HttpsUpgrades,HttpsFirstBalancedModeAutoEnable,MediaRouter,OptimizationHints,"
-    "NetworkTimeServiceQuerying,PaintHolding,PreconnectToSearch,TcpPortRandomizationWin,ThirdPartyStoragePartitioning"),
     # nothing leaves the machine, and what tries to is seen as a request that failed
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1, EXCLUDE localhost",
 )  # fmt: skip

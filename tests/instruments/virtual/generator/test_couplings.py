@@ -46,8 +46,7 @@ def test_whatever_is_set_the_settings_fit_each_other(commands):
         low, high = channel.voltage_limits()
         half = 0.0 if channel["waveform"] == "DC" else channel.number("amplitude_vpp") / 2
         if channel.amplitude_limits()[0] <= high - low:  # else no room is left for the least amplitude
-            assert low - 1e-6 <= channel.number("offset") - half
-            assert channel.number("offset") + half <= high + 1e-6
+            assert abs(channel.number("offset") - (low + high) / 2) + half <= (high - low) / 2 + 1e-6
         assert all(np.isfinite(value) for value in device.settings.values() if isinstance(value, float))
         slowest, fastest = channel.frequency_limits()
         assert slowest * (1 - 1e-9) <= channel.frequency <= fastest * (1 + 1e-9)
