@@ -4,11 +4,11 @@ BIN    := .venv/bin
 DEMO   := demo
 OTHER_PYTHONS = $(shell $(BIN)/python -c 'import sys; print(*(f"3.{k}" for k in range(11, 15) if k != sys.version_info[1]))')
 
-# keep bytecode whatever the environment says: the tests start hundreds of processes, which would compile it anew
+# keep bytecode whatever the environment says: the tests start hundreds of processes, which would compile it again
 export PYTHONDONTWRITEBYTECODE :=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test quick explore fuzz mutants lint all-pythons wheel peers classroom site bench clean
+.PHONY: help setup demo test pages quick explore fuzz mutants lint all-pythons wheel peers classroom site bench clean
 
 help:  ## list the targets
 	@awk -F':.*## ' '/^[a-z-]+:.*## / {printf "  make %-12s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -22,7 +22,7 @@ setup: .venv/ready  ## make the environment in .venv
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev]'
 	@touch $@
 
-demo: setup  ## the main job on the virtual bench: acquire, analyze, report (into demo/, made anew)
+demo: setup  ## the main job on the virtual bench: acquire, analyze, report (into demo/, which is emptied first)
 	@rm -rf $(DEMO)
 	$(BIN)/levilab acquire spin --mock --out $(DEMO)
 	$(BIN)/levilab analyze spindown $(DEMO)
@@ -30,16 +30,19 @@ demo: setup  ## the main job on the virtual bench: acquire, analyze, report (int
 	@echo 'open $(DEMO)/report.html in a browser'
 
 # mypy works beside the tests: alone it would leave a core idle
-test: setup  ## everything that must pass: style, types, imports, tests
+test: setup  ## style, types, imports, and all tests but those of pages
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports --no-cache
-	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest && tests=0 || tests=$$?; wait $$types && exit $$tests
+	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -m 'not pages' && tests=0 || tests=$$?; wait $$types && exit $$tests
+
+pages: setup  ## the tests in a browser, and all commands of README and docs/ one after another
+	$(BIN)/python -m pytest -m pages
 
 quick: setup  ## within a minute: style and types, and the tests that are not slow
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
-	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -m 'not slow' && tests=0 || tests=$$?; wait $$types && exit $$tests
+	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -m 'not slow and not pages' && tests=0 || tests=$$?; wait $$types && exit $$tests
 
 explore: setup  ## simulated laboratories for SECONDS (600), and the property tests with new random examples
 	$(BIN)/levilab fuzz --seed $(or $(SEED),$(shell date +%s)) --seconds $(or $(SECONDS),600)

@@ -54,8 +54,7 @@ VERSIONED = """
 """
 #: Files with tests of ten seconds and more: they go first of all, so that at the end no worker waits for another's.
 LONGEST = """
-    levilab/live/test_practice.py  levilab/live/test_open.py  levilab/reproduce/test_run.py  test_documentation.py
-    levilab/notebook/test_jupyterlab.py
+    levilab/reproduce/test_run.py  test_documentation.py  levilab/notebook/test_jupyterlab.py
 """
 
 
@@ -76,7 +75,7 @@ def pytest_collection():
 
 
 def pytest_collection_modifyitems(items):
-    """Mark what is slow, and let it go first, the longest before the others."""
+    """Mark what is slow or of pages, and let the slow tests go first, the longest before the others."""
     tests = Path(__file__).parent
     slow, versioned, longest = (
         [(tests / name).resolve() for name in names.split()] for names in (SLOW, VERSIONED, LONGEST)
@@ -86,6 +85,8 @@ def pytest_collection_modifyitems(items):
         functools.cache(lambda file, paths=paths: any(map(file.is_relative_to, paths))) for paths in (slow, versioned)
     )
     for item in items:
+        if "browser" in getattr(item, "fixturenames", ()):
+            item.add_marker(pytest.mark.pages)
         if is_slow(item.path):
             item.add_marker(pytest.mark.slow)
         if item.get_closest_marker("slow") and not is_versioned(item.path):
