@@ -97,6 +97,8 @@ def _of_laws(found: HeldTogether) -> Iterable[str]:
         yield Text("The {law} law fits best: {how}.", law=law_name(best.name), how=enumeration(constants))
         if (chi := best.statistics.reduced_chi_square) is not None:
             yield Text("The held spins scatter about it by {times:n} of their u.", times=plain(math.sqrt(chi), 2))
+    elif found.laws:
+        yield "One held spin lies on the curve of each law: hold others, far from it, to see which law holds."
     for law in found.laws[: 1 if best else None]:  # a single drag lies on each
         if law.name in found.beside:
             (name,) = law.constants

@@ -35,17 +35,15 @@ def laws_table(analysis: HoldAnalysis) -> Table:
     found = analysis.combined
     rows = []
     for law in found.laws:
-        each = law.constants.items()
         constants = Sentences(
-            *(Text("{symbol} = {value}", symbol=SYMBOLS[name], value=without_unit(one)) for name, one in each),
+            *(Text("{symbol} = {value}", SYMBOLS[name], without_unit(one)) for name, one in law.constants.items()),
             between=", ",
         )
         spindown, pull = found.beside.get(law.name, (None, None))
         beside = without_unit(spindown) if spindown else "—"
-        rows.append((law.name, constants, plain(law.statistics.chi_square, 3), beside, plain(pull, 2)))
-    shown = 5 if found.beside else 3
-    heads = ("law", "constants", "χ²", "spin-down's", "pull")[:shown]
-    cells = [row[:shown] for row in rows]
+        rows.append((law.name, constants, plain(law.statistics.reduced_chi_square, 3), beside, plain(pull, 2)))
+    heads = ("law", "constants", "χ²/dof", "spin-down's", "pull")[: 5 if found.beside else 3]
+    cells = [row[: len(heads)] for row in rows]
     return table("Drag laws through the held spins, constants in SI", heads, cells, numbers=heads[2::2])
 
 

@@ -11,7 +11,6 @@ from analysis.spindown.tilt import count_of, slowing_by_tilt
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.hold.figure import hold_figure
-from levilab.present.document.blocks import Tabular
 from support.paths import SAMPLE_DATA
 
 HOLD = ANALYSES["hold"]
@@ -87,12 +86,13 @@ def test_tables_figure_and_report_have_each_spin_and_law():
     assert len(spins.rows) == 4
     assert {row.cells[0] for row in laws.rows} == {"stokes", "newton", "disc", "mixed", "power"}
     assert hold_figure(found).axes[-1].get_xlabel() == "spin  [Hz]"
-    assert any(isinstance(block, Tabular) for block in HOLD.part(found).result)
 
 
 def test_a_single_hold_and_one_without_a_gain(tmp_path):
     alone = analyzed(RUNS[:1])
     assert {law.name for law in alone.combined.laws} == {"stokes", "newton", "disc"}
+    assert [row.cells[2] for row in HOLD.tables(alone)[1].rows] == ["—"] * 3  # no degree of freedom
+    assert "lies on the curve of each law" in alone.text
     assert (part := HOLD.part(alone)).lead == "1 held spin"
     assert "Below" not in part.figure.caption
     assert "…" not in hold_figure(alone).texts[0].get_text()
