@@ -112,18 +112,15 @@ def _by_repetition(header: Sequence[str], above: Sequence[str]) -> tuple[list[st
     for k in range(len(header)):
         name = (above[k] if k < len(above) else "") or name
         names.append(name)
+    first = header[0].casefold() if counts[header[0].casefold()] == most else ""  # each run begins with it
     seen: Counter[str] = Counter()
-    keys = []
-    for k, title in enumerate(header):
-        repeated = most > 1 and counts[title.casefold()] == most
-        seen[title.casefold()] += 1
-        keys.append((names[k] or str(seen[title.casefold()])) if repeated else "")
-    if len(set(keys) - {""}) != most:  # names that do not go with the repetition
-        seen.clear()
-        for k, title in enumerate(header):
-            seen[title.casefold()] += 1
-            keys[k] = str(seen[title.casefold()]) if keys[k] else ""
-    return keys, list(header)
+    numbers = []
+    for title in map(str.casefold, header):
+        seen[title] += 1
+        repeated = most > 1 and (first or counts[title] == most)
+        numbers.append(str(seen[first or title]) if repeated else "")
+    keys = [number and (name or number) for name, number in zip(names, numbers, strict=True)]
+    return keys if len(set(keys) - {""}) == most else numbers, list(header)  # else names that do not go with it
 
 
 def _by_numbers(header: Sequence[str], _: Sequence[str]) -> tuple[list[str], list[str]]:

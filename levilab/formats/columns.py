@@ -356,9 +356,9 @@ def _is_unit_of(unit: str, name: str) -> bool:
 
 def _with_periods(header: Sequence[str]) -> list[Title]:
     """Return the titles' meanings, with T for a period beside a time; periods do not count beside a frequency."""
-    titles = [read_title(text) for text in header]
-    if sum(title.column == "time_s" for title in titles) > 1:
-        titles = [as_a_period(text) or title for text, title in zip(header, titles, strict=True)]
+    titles, periods = [read_title(text) for text in header], [as_a_period(text) for text in header]
+    if sum(title.column == "time_s" or period is not None for title, period in zip(titles, periods, strict=True)) > 1:
+        titles = [period or title for title, period in zip(titles, periods, strict=True)]
     if any(title.inverse for title in titles):
         titles = [_of_the_period(text, title) for text, title in zip(header, titles, strict=True)]
     if any(title.column == "spin_frequency_hz" and not title.inverse for title in titles):

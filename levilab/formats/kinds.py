@@ -62,8 +62,9 @@ KINDS = (
     _program("a LabVIEW TDMS file", ".tdms .tdms_index", "LabVIEW", "Write To Measurement File, Text (LVM)"),
     _program("a MATLAB file", ".mat", "MATLAB", "writematrix([t f], 'run.csv')"),
     _program("a Numbers spreadsheet", ".numbers", "Numbers", "File, Export To, Excel"),
+    _program("a binary Excel file", ".xlsb", "Excel", "File, Save As, .xlsx"),
     Kind("a text document", "copy its table into a spreadsheet", (".docx", ".doc", ".odt", ".rtf", ".pages")),
-    Kind("a presentation", "", (".pptx", ".ppt", ".odp", ".key")),
+    Kind("a presentation", "copy its table into a spreadsheet", (".pptx", ".ppt", ".odp", ".key")),
     Kind(
         "a picture",
         "the numbers that it shows are needed, as CSV or a spreadsheet",

@@ -66,7 +66,7 @@ class Layout:
         given, units = [], [*self.units, *[""] * self.width]
         for title, unit in zip(self.header or map(str, range(1, self.width + 1)), units, strict=False):
             own = "" if implied_unit(title) else read_title(title).unit
-            given.append(f"{title} [{unit}]" if not own and (is_unit(unit) or unit == "%") else title)
+            given.append(f"{title} [{unit}]" if not is_unit(own or "") and (is_unit(unit) or unit == "%") else title)
         return tuple(given)
 
     def must_have_one_unit(self, path: Path, index: int) -> None:
@@ -122,7 +122,7 @@ def _with_units_of_numbers(layout: Layout, sample: Sequence[tuple[str, ...]]) ->
     for k in range(layout.width):
         first = next((row[k] for row in sample if k < len(row) and layout.dialect.kind(row[k]) != "missing"), "")
         title = read_title("".join(layout.header[k : k + 1]))
-        if not units[k] and title.unit is None:
+        if not units[k] and not is_unit(title.unit or ""):
             clock = layout.dialect.kind(first) == "clock" and title.column is None
             units[k] = "s" if clock else unit_behind(first)
     return tuple(units) if any(units) else ()

@@ -22,6 +22,7 @@ import python_calamine
 from levilab.formats.columns import NoTable, TableError
 from levilab.formats.dialect import UNVALUED, value_and_u
 from levilab.formats.dress import undress
+from levilab.formats.kinds import OTHER, kind_of_bytes
 from levilab.texts.text import Text as Said
 
 #: Bytes that a workbook or an archive may unpack to: a spreadsheet of a million rows has some 100 MB, and a reader
@@ -132,6 +133,9 @@ def texts_of(file: Path) -> tuple[Text, ...]:
 def _texts(file: Path, _: int, size: int) -> tuple[Text, ...]:
     with file.open("rb") as stream:
         head = stream.read(1 << 16)
+    kind = kind_of_bytes(head, file.suffix)
+    if kind.suffixes and not kind.marks and (b"\0" in head or kind_of_bytes(head) is not OTHER):
+        raise NoTable(file, "is {kind}: {advice}", kind.name, kind.advice, kind=kind)
     if head.startswith(_OLE):
         return _sheets(file, file)
     if head.startswith(_ZIP):
@@ -169,24 +173,12 @@ def _read(file: Path, size: int) -> bytes:
 # --- archives ------------------------------------------------------------------------------------------
 
 
-#: A file in an archive, and what the archive is then.
-_OTHER_ARCHIVES: Mapping[str, str] = {
-    "word/document.xml": "a Word document: copy its table into a spreadsheet",
-    "ppt/presentation.xml": "a PowerPoint document: copy its table into a spreadsheet",
-    "Index/Document.iwa": "a Numbers spreadsheet: File > Export To > Excel or CSV",
-    "xl/workbook.bin": "a binary Excel file: save it as Excel workbook (.xlsx)",
-}
-
-
 def _unpacked(file: Path) -> tuple[Text, ...]:
     """Return the texts of a spreadsheet or of an archive with tables, after a look at how large it gets."""
     try:
         with zipfile.ZipFile(file) as archive:
             members = [member for member in archive.infolist() if not member.is_dir()]
-            names = {member.filename for member in members}
-            if what := next((what for name, what in _OTHER_ARCHIVES.items() if name in names), None):
-                raise NoTable(file, "is {what}", what)
-            workbook = bool({"xl/workbook.xml", "content.xml"} & names)
+            workbook = bool({"xl/workbook.xml", "content.xml"} & {member.filename for member in members})
             taken = members if workbook else [member for member in members if _may_be_table(member.filename)]
             seen = sum(member.file_size for member in taken)
             if len(taken) > MOST_MEMBERS or seen > MOST_UNPACKED:

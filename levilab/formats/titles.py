@@ -4,6 +4,7 @@ import re
 import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import filterfalse
 from math import pi
 
 from levilab.texts.text import Text
@@ -23,11 +24,10 @@ UNITS: Mapping[str, Mapping[str, float]] = {
         "h": 3600, **dict.fromkeys(("mm:ss", "m:ss", "min:s", "min:sec", "hh:mm:ss", "h:mm:ss", "h:min:s"), 1),
     },
     "frequency": {
-        "Hz": 1, "hertz": 1, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, "μHz": 1e-6, "1/s": 1, "s-1": 1, "rps": 1, "U/s": 1,
-        "rpm": PER_MINUTE, "1/min": PER_MINUTE, "min-1": PER_MINUTE, "/min": PER_MINUTE, "U/min": PER_MINUTE,
-        "UPM": PER_MINUTE,
-        "rad/s": PER_RADIAN, "rads-1": PER_RADIAN, "rad_s": PER_RADIAN, "rad_per_s": PER_RADIAN,
-        "°/s": 1 / 360, "°s-1": 1 / 360, "deg/s": 1 / 360, "deg_s": 1 / 360, "grad/s": 1 / 360,
+        "Hz": 1, "hertz": 1, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, "μHz": 1e-6, "1/s": 1, "rps": 1, "U/s": 1,
+        "rpm": PER_MINUTE, "1/min": PER_MINUTE, "U/min": PER_MINUTE, "UPM": PER_MINUTE, "hercios": 1,
+        "rad/s": PER_RADIAN, "rad_s": PER_RADIAN, "rad_per_s": PER_RADIAN,
+        "°/s": 1 / 360, "deg/s": 1 / 360, "deg_s": 1 / 360, "grad/s": 1 / 360,
     },
     "voltage": {"V": 1, "mV": 1e-3, "μV": 1e-6, "uV": 1e-6, "kV": 1e3},
     "length": {"m": 1, "cm": 1e-2, "mm": 1e-3, "μm": 1e-6, "um": 1e-6},
@@ -43,7 +43,7 @@ ANGULAR = (
 # Names that could as well be in 1/s as in 1/min: known only with a unit.
 NEED_UNITS = (
     "drehzahl", "speed", "rotation_speed", "rotational_speed", "vitesse", "vitesse_de_rotation", "varvtal",
-    "velocidad", "velocidad_de_giro", "velocidad_de_rotación", "n",
+    "velocidad", "velocidad_de_giro", "velocidad_de_rotacion", "n",
 )  # fmt: skip
 #: Unit of a column that counts turns since the start, which only grow, and its other names.
 TOTAL = "turns"
@@ -51,15 +51,15 @@ _TOTALS = (TOTAL, "counts", "pulses", "revolutions", "rotations", "umdrehungen",
 #: Units of other quantities, which no column of ours has.
 _FOREIGN = ("°C", "C", "°F", "F", "K", "lx", "hPa", "Pa", "dB", "kg", "g", "A", "mA", "W", "%")
 #: Units in which the title says whether turns or radians are counted.
-_PER_SECOND = ("1/s", "s-1")
+_PER_SECOND = ("1/s", "/s")
 
 #: Names of a component of the magnetic field.
 _COMPONENTS = (
-    "flux_density_{}", "magnetic_field_{}", "magnetfeld_{}", "magnetfält_{}", "champ_magnétique_{}",
-    "campo_magnético_{}", "magnetometer_{}", "mag_{}", "mag{}", "b_{}", "b{}",
+    "flux_density_{}", "magnetic_field_{}", "magnetfeld_{}", "magnetfalt_{}", "champ_magnetique_{}",
+    "campo_magnetico_{}", "magnetometer_{}", "mag_{}", "mag{}", "b_{}", "b{}",
 )  # fmt: skip
 
-# Canonical column: its dimension, and the names it goes by, in lower case, blanks and hyphens as "_".
+# Canonical column: its dimension, and the names it goes by, in lower case, without accents, blanks and hyphens as "_".
 QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "time_s": ("time", (
         "time", "t", "zeit", "elapsed", "elapsed_time", "timestamp", "seconds", "sekunden", "milliseconds", "minutes",
@@ -69,15 +69,15 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "spin_frequency_hz": ("frequency", (
         "spin_frequency", "f", "freq", "frequency", "frequenz", "nu", "ν", "nu3", "ν3", "f3", "ν_3", "nu_3", "f_3",
         "spin", "spin_freq", "f_spin", "rotation_frequency", "rotation", "drehfrequenz", "hz", "hertz", "rpm", "rad/s",
-        *ANGULAR, *NEED_UNITS, "fréquence", "frekvens", "frecuencia", "umdrehungsfrequenz", "umlauffrequenz",
-        "rotationsfrequenz", "rotationsfrekvens", "fréquence_de_rotation", "frecuencia_de_giro",
-        "frecuencia_de_rotación", "spin_rate", "rotation_rate")),
+        *ANGULAR, *NEED_UNITS, "frequence", "frekvens", "frecuencia", "umdrehungsfrequenz", "umlauffrequenz",
+        "rotationsfrequenz", "rotationsfrekvens", "frequence_de_rotation", "frecuencia_de_giro",
+        "frecuencia_de_rotacion", "spin_rate", "rotation_rate")),
     "precession_frequency_hz": ("frequency", (
-        "precession_frequency", "precession", "f_precession", "f_p", "fp", "νp", "ν_p", "nu_p", "präzession",
-        "präzessionsfrequenz")),
+        "precession_frequency", "precession", "f_precession", "f_p", "fp", "νp", "ν_p", "nu_p", "prazession",
+        "prazessionsfrequenz")),
     "drive_frequency_hz": ("frequency", ("drive_frequency", "f_drive", "drive", "f_d", "antriebsfrequenz")),
     "drive_amplitude_v": ("voltage", ("drive_amplitude", "amplitude", "drive_voltage", "amplitude_drive")),
-    "height_m": ("length", ("height", "z", "h", "höhe", "hoehe")),
+    "height_m": ("length", ("height", "z", "h", "hohe", "hoehe")),
     "x_m": ("length", ("x", "x_position", "position_x")),
     "y_m": ("length", ("y", "y_position", "position_y")),
     "flux_density_t": ("flux density", ("flux_density", "b", "bz", "b_z", "field", "flussdichte")),
@@ -98,17 +98,17 @@ IMPLIED_UNITS = dict.fromkeys((*ANGULAR, "rad/s"), "rad/s") | {
 }  # fmt: skip
 # The time of a turn, and turns in a time, are read where the title says their unit: T [ms], turns in 10 s.
 PERIODS = (
-    "period", "periode", "periodendauer", "période", "rotation_period", "spin_period", "umlaufzeit",
-    "umlaufdauer", "drehperiode", "période_de_rotation", "período", "período_de_rotación", "periodtid", "omloppstid",
+    "period", "periode", "periodendauer", "rotation_period", "spin_period", "umlaufzeit", "umlaufdauer",
+    "drehperiode", "periode_de_rotation", "periodo", "periodo_de_rotacion", "periodtid", "omloppstid",
 )  # fmt: skip
 TURNS = (
-    "turns", "rotations", "revolutions", "revs", "rev", "umdrehungen", "umdr.", "umdr", "umläufe", "rotationen",
+    "turns", "rotations", "revolutions", "revs", "rev", "umdrehungen", "umdr.", "umdr", "umlaufe", "rotationen",
     "tours", "varv", "vueltas",
 )  # fmt: skip
 #: The time of N turns: 10 Umdrehungen, 10 T, time for 10 turns.
 _TIME_OF_TURNS = re.compile(
-    r"(?:(?:\w+_)?(?:for|of|für|von|pour|de|för|av|para)_)?(?P<number>[1-9]\d{0,3})_?(?:"
-    + "|".join(map(re.escape, (*TURNS, "perioden", "periods", "périodes", "períodos", "perioder", "t")))
+    r"(?:(?:\w+_)?(?:for|of|fur|von|pour|de|av|para)_)?(?P<number>[1-9]\d{0,3})_?(?:"
+    + "|".join(map(re.escape, (*TURNS, "perioden", "periods", "periodes", "periodos", "perioder", "t")))
     + ")"
 )
 #: A symbol after its name says nothing more, as in Zeit t, Drehzahl n.
@@ -118,13 +118,13 @@ _INVERSE, OVER_TIME = (
     "say its unit in the title, as in period [ms]",
     "say in which time in the title, as in turns in 10 s",
 )
-NEARLY_FREQUENCIES = dict.fromkeys(("period", "periode", "période", "umlauf"), _INVERSE) | dict.fromkeys(
+NEARLY_FREQUENCIES = dict.fromkeys(("period", "umlauf"), _INVERSE) | dict.fromkeys(
     ("turns", "umdreh", "umdr", "rotations", "revolutions", "tours"), OVER_TIME
 )
 # Alone they belong to the spin frequency, else to the quantity whose name stands before or behind (u_z, z_err …).
 UNCERTAINTIES = (
     "u", "sigma", "σ", "±", "+/_", "uncertainty", "unsicherheit", "messunsicherheit", "incertitude", "incertidumbre",
-    "osäkerhet", "error", "err", "fehler", "messfehler", "stderr", "standard_error", "standard_uncertainty",
+    "osakerhet", "error", "err", "fehler", "messfehler", "stderr", "standard_error", "standard_uncertainty",
 )  # fmt: skip
 # These stand alone: beside a mean they are of one reading.
 _SCATTERS = (
@@ -229,8 +229,9 @@ _FOLDED_UNITS = frozenset(name.casefold() for units in UNITS.values() for name i
 
 
 def plain_unit(text: str) -> str:
-    """Return a unit as the table spells it: µ as μ, ⁻¹ as -1, without blanks, dots, carets and brackets."""
-    return re.sub(r"[\s^·*()\[\]]", "", unicodedata.normalize("NFKC", text).replace("−", "-"))
+    """Return a unit as the table spells it: µ as μ, min⁻¹ as /min, without blanks, dots, carets and brackets."""
+    plain = re.sub(r"[\s^·*()\[\]]", "", unicodedata.normalize("NFKC", text).replace("−", "-"))
+    return re.sub(r"\.?(s|min)-1$", r"/\1", plain)
 
 
 def factor_of(text: str, units: Mapping[str, float]) -> float | None:
@@ -265,7 +266,8 @@ def is_unit(text: str) -> bool:
 
 def plain_name(text: str) -> str:
     """Return a name as the tables spell it; of a name and its symbol, "Zeit t", the one that says more."""
-    name = re.sub(r"[\s\-]+", "_", unicodedata.normalize("NFKC", text).strip().casefold())
+    letters = filterfalse(unicodedata.combining, unicodedata.normalize("NFKD", text.strip().casefold()))
+    name = re.sub(r"[\s\-]+", "_", "".join(letters))
     word, _, symbol = name.rpartition("_")
     if name in NAMES or symbol not in SYMBOLS:
         return name
@@ -380,12 +382,12 @@ def nearly_a_frequency(text: str) -> str | None:
 
 
 def as_a_period(text: str) -> Title | None:
-    """Return the title of a T with a unit of time as that of a period, which it is beside a time.
+    """Return the title of a T, perhaps with an index, in a unit of time as that of a period, which it is beside a time.
 
-    >>> as_a_period("T [ms]").inverse, as_a_period("T")
+    >>> as_a_period("T_A1 [ms]").inverse, as_a_period("T")
     (True, None)
     """
-    form = re.fullmatch(r"T\s*(?:[/_,]|in\b)?\s*[\[(]?([^\[\]()]+)[\])]?", text.strip())
+    form = re.fullmatch(r"T(?:_?[A-Z]?\d)?\s*(?:[/_,]|in\b)?\s*[\[(]?([^\[\]()]+)[\])]?", text.strip())
     unit = form and form[1].strip()
     return Title("spin_frequency_hz", unit, inverse=True) if unit and unit_factor(unit, "time") else None
 

@@ -131,7 +131,7 @@ def read_samples(
         NoWaveform: it is no table of samples.
         TableError: it is damaged, or it contradicts itself.
     """
-    path, header = head.path, read_header(head, dialect, columns)
+    path, header = head.path, read_header(head, dialect, columns, needs_times=rate is None)
     certain = header.certain or rate is not None
     try:
         survey = _look_over(head, header)

@@ -150,6 +150,7 @@ def test_a_u_whose_cells_may_show_percent_is_said(title, unit, tmp_path):
 def test_tables_below_and_beside_one_another_are_runs(head, tmp_path):
     names = [head.strip("A\n").format(k) or str(k) for k in (1, 2)]
     (tmp_path / "below.csv").write_text("".join(f"{head.format(k)}t [s],f [Hz]\n{rows('{t},{f}')}" for k in (1, 2)))
+    (tmp_path / "beside.csv").write_text("t/s,f1/Hz,t/s,f2/Hz\n" + rows("{t},{f},{t},{f}"))
     with xlsxwriter.Workbook(tmp_path / "my.xlsx") as book:
         sheet, clock = book.add_worksheet(), book.add_format({"num_format": "h:mm"})
         book.add_worksheet().hide()
@@ -158,8 +159,9 @@ def test_tables_below_and_beside_one_another_are_runs(head, tmp_path):
         for k, f in enumerate(SPINS):
             sheet.write_datetime(k + 2, 0, time(k * 2, 0), clock)
             sheet.write_row(k + 2, 1, [f, f])
-    for path, times in ((tmp_path / "below.csv", [*INSTANTS]), (tmp_path / "my.xlsx", [120 * k for k in range(6)])):
-        tables = [read_table(run.path, quantities=SPIN) for run in understand(path).runs]
+    minutes = [120 * k for k in range(6)]
+    for name, times in (("below.csv", [*INSTANTS]), ("beside.csv", [*INSTANTS]), ("my.xlsx", minutes)):
+        tables = [read_table(run.path, quantities=SPIN) for run in understand(tmp_path / name).runs]
         assert [table.path.name[-1] for table in tables] == ["1", "2"]
         assert [table.column("spin_frequency_hz").tolist() for table in tables] == [[*SPINS]] * 2
         assert [table.column("time_s").tolist() for table in tables] == [times] * 2
@@ -419,6 +421,8 @@ def test_a_damaged_locked_or_foreign_file_says_what_to_do(tmp_path):
         "deep.json": (b"[" * 100_000, "JSON"),
         "run.json": (b'{"schema": "levilab-run/1"}', "name the folder of the run"),
         "words.json": (b'{"a": "b"}', "JSON file without a table"),
+        "exp.cmbl": (b"<?xml?>", "in Logger Pro: File, Export As, CSV"),
+        "exp.cap": (whole, "in Capstone: File, Export Data"),
     }
     for name, (content, says) in cases.items():
         (tmp_path / name).write_bytes(content)
