@@ -105,7 +105,7 @@ def lines_of_many(motions: Sequence[tuple[Scene, Array]]) -> list[AxisLines]:
 
 
 def _signal_of(scene: Scene, states: Array) -> tuple[Signal, float, Array]:
-    """Return n_x + i n_y of the time whose lines are looked for, its samples per second [Hz], and all spins [Hz].
+    """Return n_x + i n_y of the time whose lines are looked for, its samples per second [Hz], and its spins [Hz].
 
     The signal is empty where no line can be found.
     """
@@ -118,7 +118,7 @@ def _signal_of(scene: Scene, states: Array) -> tuple[Signal, float, Array]:
     spin = spin_of(scene, states) / (2 * np.pi)
     n = max(round(min(_steady_time(scene, states[:, TIME], spin), LONGEST_S) * rate), FEWEST)
     axis = states[:-1, N][:n]
-    return axis[:, 0] + 1j * axis[:, 1], rate, spin
+    return axis[:, 0] + 1j * axis[:, 1], rate, spin[:n]
 
 
 def _flatness(scene: Scene) -> Any:
