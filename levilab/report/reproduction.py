@@ -158,14 +158,15 @@ def _option(name: str, value: Any) -> list[str]:
 
     >>> _option("keep_outliers", True), _option("columns", {"t": "1", "f": "a b"}), _option("rate", None)
     (['--keep-outliers'], ['--columns', "'t=1,f=a b'"], [])
-    >>> _option("between", (24.0, 30.0)), _option("laws", ("stokes", "disc"))
-    (['--between', '24:30'], ['--laws', 'stokes,disc'])
+    >>> _option("between", (24.0, 30.0)), _option("laws", ("stokes", "disc")), _option("rim_m", 0.03)
+    (['--between', '24:30'], ['--laws', 'stokes,disc'], ['--rim', '30'])
     """
     if value is None or value is False:
         return []
     if isinstance(value, tuple):
         value = ",".join(value) if isinstance(value[0], str) else ":".join(f"{one:g}" for one in value)
-    text = _columns(value) if name == "columns" else str(value)
+    factor = OPTIONS[name].factor
+    text = _columns(value) if name == "columns" else str(value) if factor == 1 else f"{value / factor:.12g}"
     return [_flag(name)] if value is True else [_flag(name), shlex.quote(text)] if text else []
 
 
@@ -174,9 +175,8 @@ def _flag(name: str) -> str:
 
 
 def _is_plain(name: str) -> bool:
-    """Return whether the command line gives an option as it is: not by a file, and in the same unit."""
-    one = OPTIONS[name]
-    return one.typed == "" and one.kind is not Path
+    """Return whether the command line gives an option by its value, and not by a file."""
+    return OPTIONS[name].kind is not Path
 
 
 def _columns(names: Mapping[str, str]) -> str:
