@@ -370,8 +370,7 @@ def _fall(times: Array, x: Array, y: Array, turning: Turning | None, step: float
     fall = Estimate((left + lost) / 2, (lost - left) / np.sqrt(12), "s")
     if turning is None or turning.time.size < _FEWEST:
         return fall, None
-    u = float(np.median(turning.u))
-    return fall, spin_at_fall(turning.time, np.abs(turning.spin), u, (left, lost))
+    return fall, spin_at_fall(turning.time, np.abs(turning.spin), None, (left, lost))
 
 
 def _precession(times: Array, places: NDArray[np.complex128]) -> Estimate | None:
