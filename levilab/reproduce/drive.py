@@ -69,8 +69,8 @@ def crossings() -> list[Finding]:
         spin = driven(field, ramp, leans=False).highest()
         found.append(
             check(
-                f"spin at which {f'drag and a ramp of {ramp:g} Hz/s' if ramp else 'drag'} takes all of the pull of "
-                f"{1e3 * field:.1f} mT, without lean",
+                f"spin at which {f'drag and a ramp of {ramp:g} Hz/s take' if ramp else 'drag takes'} all of the pull "
+                f"of {1e3 * field:.1f} mT, without lean",
                 THESIS[f"drive.{key}"],
                 spin,
                 u=share * spin,
