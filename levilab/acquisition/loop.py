@@ -18,6 +18,7 @@ from levilab.acquisition.session import Earlier, Session
 from levilab.acquisition.table import EXPERIMENTS, settings_of
 from levilab.bench.bench import OutputMayBeOn, open_bench
 from levilab.bench.config import BenchConfig
+from levilab.bench.guard import guard_drive
 from levilab.bench.kinds import GENERATOR, estimates_u
 from levilab.bench.wiring import Wiring
 from levilab.computer import utc_now
@@ -166,7 +167,9 @@ def _at_the_bench(
     earlier = _earlier(request)
     log = writer.wire if request.wire_log else None
     wiring = replace(request.wiring(), count_with=request.config.count_with)
-    with open_bench(wiring, _kinds(request), log=log, check=stop.check, off=off) as bench:
+    kinds = _kinds(request)
+    guarded = guard_drive(wiring) if GENERATOR.name in kinds else contextlib.nullcontext()
+    with guarded, open_bench(wiring, kinds, log=log, check=stop.check, off=off) as bench:
         session: Session[Any] = Session(
             bench,
             settings,
