@@ -77,7 +77,7 @@ def leaning_of(times: Array, offsets: NDArray[np.complex128] | Array) -> Leaning
     frequency = frequency if lines == 1 else np.abs(frequency)
     middle = _in_the_middle(time - (times[0] + times[-1]) / 2, frequency, u) if time.size else None
     tilt = Estimate(float(size.mean()), float(np.sqrt(np.sum(u_size**2))) / size.size, "rad") if time.size else None
-    return Leaning(lean.real, lean.imag, time, frequency, np.hypot(u, _MODULATED * frequency), middle, tilt)
+    return Leaning(lean.real, lean.imag, time, frequency, u, middle, tilt)
 
 
 def _in_the_middle(late: Array, frequency: Array, u: Array) -> Estimate:
