@@ -100,7 +100,7 @@ def test_a_dot_on_the_stem_shows_the_precession_and_the_size_of_the_rim_the_rise
 def test_a_camera_beside_the_top_shows_place_height_lean_and_spin(folder):
     scene = run_path(str(SAMPLE_DATA / "make.py"))["TRACK_SCENE"]
     flight = flight_of(preset("undriven").changed({**scene, "start.spin_hz": 32.0}), 1.3)
-    camera = Camera(pose=BESIDE, away=(5.3, -45), distance=0.4)
+    camera = Camera(pose=BESIDE, away=(5.3, -45), distance=0.4, blur=2.2)  # a mark near an end is in the edge there
     path = film(folder / "side.mp4", camera, flight, phone_times(1.2))
     video = ANALYSES["video"]
     analysis = video.analyze([path], VideoOptions(rim_m=2 * RIM, beside=True))
@@ -110,14 +110,14 @@ def test_a_camera_beside_the_top_shows_place_height_lean_and_spin(folder):
     errors = np.array([found.x - middle[:, 0], found.y - middle[:, 2]])
     errors -= errors.mean(axis=1, keepdims=True)
     assert np.quantile(np.abs(errors), 0.99) < 1e-4
-    assert np.std(errors / found.u.T) == pytest.approx(1, abs=0.25)
+    assert (pulls := np.abs(errors / found.u.T)).max() < 4
+    assert np.mean(pulls**2) == pytest.approx(0.75, abs=0.25)
     turns = np.abs(flight.yaw) / (2 * np.pi)
     truth = np.polyfit(flight.times - found.turning.middle, turns, 4)[3]
-    assert found.spin.value == pytest.approx(truth, abs=4 * found.spin.u)
-    assert found.spin.u < 2e-3
+    assert found.spin.value == pytest.approx(truth, abs=min(4 * found.spin.u, 8e-3))
     assert "counter-clockwise seen from above" in found.text
     assert np.std(found.leaning.x - body[:, 0, 2] + body[:, 0, 2].mean()) < 2.5e-3  # rad: 0.1 of 30 pixels
-    assert found.leaning.middle.value == pytest.approx(7.0, abs=0.1)  # of this scene from above: 7.066 at 31.5 Hz
+    assert (lean := found.leaning.middle).value == pytest.approx(7.0, abs=3 * lean.u)  # from above 7.066 at 31.5 Hz
     save(video, analysis)
     columns = np.genfromtxt(folder / "side.tracks.csv", delimiter=",", names=True).dtype.names
     assert columns == ("time_s", "x_m", "x_u_m", "z_m", "z_u_m", "axis_x", "spin_frequency_hz")
