@@ -14,15 +14,12 @@ from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.crosscheck.subjects.sway import draw_scene
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.video.analysis import Video
+from levilab.pipelines.video.leaning import PRECESSION_HZ
 
 #: Height of the dot on the stem above the rim, and of the rim above the base [m].
 STEM_M, RIM_M = 0.02, 0.07
-#: Where the precession is [Hz].
-_PRECESSION_HZ = (3.0, 20.0)
-#: Half of the second of which a reading of the spin is the mean [s].
-_HALF_S = 0.5
-#: The top floats longer than its film, at both ends [s].
-_AROUND_S = 1.0
+#: Half of the second of which a reading of the spin is the mean, and how long the top floats before and after [s].
+_HALF_S, _AROUND_S = 0.5, 1.0
 
 
 def draw_camera(by: np.random.Generator) -> Camera:
@@ -102,7 +99,7 @@ def _precession(found: Video, flight: Flight, late: float) -> Iterator[Pull]:
     middle = float(lean.time[0]) + late
     axis = flight.lean[:, 0] + 1j * flight.lean[:, 1]
     frequency = np.fft.fftfreq(axis.size, flight.times[1] - flight.times[0])
-    kept = (frequency > _PRECESSION_HZ[0]) & (frequency < _PRECESSION_HZ[1])
+    kept = (frequency > PRECESSION_HZ[0]) & (frequency < PRECESSION_HZ[1])
     turning = np.fft.ifft(np.fft.fft((axis - axis.mean()) * np.hanning(axis.size)) * kept)
     turns = np.unwrap(np.angle(turning)) / (2 * np.pi)
     whole = float(np.ptp(found.time))
