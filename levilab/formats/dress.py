@@ -1,4 +1,4 @@
-"""Tables in the dress of the program that wrote them: Markdown, Arduino's monitor and plotter, CASSY.
+"""Tables in the dress of the program that wrote them: Markdown, Arduino's monitor and plotter, LabVIEW, CASSY.
 
 Each is rewritten line by line, so that the n-th line stays the n-th, with tabs between the fields.
 """
@@ -7,6 +7,8 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import count
+from math import inf
 
 from levilab.formats.dialect import Dialect, find_dialect
 from levilab.formats.titles import read_title
@@ -113,8 +115,7 @@ def _monitor(lines: Sequence[str]) -> Dressed:
         own_time = any(read_title(title).column == "time_s" for title in first)
         first[0] = "clock"
         return Dressed(_content(["\t".join(row[own_time:]) for row in rows]))
-    width = max(map(len, rows))
-    titles = () if width < 3 else ("clock", *(f"value {k}" for k in range(1, width)))
+    titles = ("clock", *(f"value {k}" for k in range(1, max(map(len, rows)))))
     return Dressed(_content(["\t".join(row) for row in rows]), titles)
 
 
@@ -132,8 +133,36 @@ def _cassy(lines: Sequence[str]) -> Dressed:
     return Dressed(_content([titles.get(k, line) for k, line in enumerate(plain)]))
 
 
+# --- LabVIEW ------------------------------------------------------------------------------------------
+
+_SETTINGS = re.compile(r"(?:Multi_Headings\WYes|X_Columns\WNo)\b")
+_NUMBER = r"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?"
+
+
+def _labview(lines: Sequence[str]) -> Dressed:
+    """Packets below a header each: one header above rows that go on, and times where X0 and Delta_X alone tell them."""
+    text, last = _content(lines).decode(), -inf
+    text = text.replace(",", ".") if "\nDecimal_Separator\t," in text else text
+
+    def joined(packet: str) -> str:
+        nonlocal last
+        settings = (re.search(rf"(?m)^{key}\W({_NUMBER})", packet) for key in ("X0", "Delta_X"))
+        values, titles = [float(found[1]) for found in settings if found], re.search(r"(?m)^X_Value.*\n", packet)
+        if len(values) < 2 or not titles:
+            return packet
+        head, rows, n = packet[: titles.end()], packet[titles.end() :], count()
+        rows = re.sub(r"(?m)^(?=[\t,][^\w\n]*\d)", lambda _: f"{values[0] + values[1] * next(n):.12g}", rows)
+        times = [last, *map(float, re.findall(f"(?m)^{_NUMBER}", rows)), inf]
+        blank = "\n" * (head.count("\n") - 1) + ("\n" if last < times[1] else titles[0])
+        last, begun = times[-2], last > -inf
+        return (blank if begun else head) + rows
+
+    return Dressed("".join(map(joined, re.split(r"(?m)^(?=Channels\b)", text))).encode())
+
+
 #: How a dress is taken off, and who wears it.
 _DRESSES: Sequence[tuple[Callable[[Sequence[str]], Dressed], Callable[[Sequence[str]], bool]]] = (
+    (_labview, lambda lines: any(map(_SETTINGS.match, lines))),
     (_cassy, lambda lines: any(_DEFINITION.match(line) for line in lines)),
     (_markdown, lambda lines: any(map(_RULE.fullmatch, lines))),
     *((partial(_plotter, label=label, more=more), _mostly(_pairs(label, more))) for label, more in (_COLON, _WORD)),

@@ -37,9 +37,6 @@ MOST_REWRITTEN = 1 << 26
 #: How the names of spreadsheets end, and those of texts in an archive.
 SPREADSHEETS = frozenset({".xlsx", ".xlsm", ".xls", ".ods"})
 TEXTS = frozenset({".csv", ".txt", ".tsv", ".dat", ".lvm", ".lab"})
-#: Of phyphox: when it was recorded, with what.
-_ABOUT = "meta"
-_JSON = frozenset({".json", ".jsonl"})
 _OLE, _ZIP = b"\xd0\xcf\x11\xe0", b"PK\x03\x04"
 _BLOCK = 1 << 18
 #: Files of a folder that a message names.
@@ -63,11 +60,6 @@ class Text:
     titles: tuple[str, ...] = ()
     aligned: bool = False
     lies: bool = False
-
-    @property
-    def rewritten(self) -> bool:
-        """Whether the lines are others than the file's."""
-        return self.content is not None
 
     def open(self) -> BinaryIO:
         """Return the stream of its bytes.  Raises OSError."""
@@ -158,11 +150,6 @@ def _place(file: Path, name: str) -> Path:
     return file.joinpath(*([part for part in parts if part not in {"", ".", ".."}] or ["unnamed"]))
 
 
-def forget() -> None:
-    """Forget the texts of the files that were opened."""
-    _texts.cache_clear()
-
-
 def _read(file: Path, size: int) -> bytes:
     if size > MOST_REWRITTEN:
         most = "has {size} MB, up to {most} MB are read in this form: use CSV"
@@ -196,7 +183,7 @@ def _unpacked(file: Path) -> tuple[Text, ...]:
 
 def _may_be_table(name: str) -> bool:
     parts = name.split("/")
-    hidden = any(part.startswith((".", "__")) or part == _ABOUT for part in parts)
+    hidden = any(part.startswith((".", "__")) or part == "meta" for part in parts)  # of phyphox: when, with what
     return not hidden and Path(name).suffix.casefold() in TEXTS
 
 
@@ -415,7 +402,7 @@ def _of_json(file: Path, size: int) -> Text:
         try:  # an object a line
             data = [json.loads(line) for line in content.splitlines() if line.strip()]
         except ValueError:
-            if file.suffix.casefold() not in _JSON:
+            if file.suffix.casefold() not in {".json", ".jsonl"}:
                 return Text(file)
             raise NoTable(file, "is cut off or no JSON: export it again, or as CSV") from None
     except RecursionError:

@@ -17,6 +17,18 @@ def sample_data():
     return SAMPLE_DATA
 
 
+@pytest.fixture
+def write(tmp_path):
+    """Write a file for the test."""
+
+    def file(content, name="data.csv"):
+        path = tmp_path / name
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+    return file
+
+
 @pytest.fixture(autouse=True, scope="session")
 def less_work():
     """Few tests look at drawn figures, and none at the trials of a report, whose number has a test of its own."""

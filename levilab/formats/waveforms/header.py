@@ -482,15 +482,8 @@ def _recognise_plain(head: Head, dialect: Dialect, wanted: Mapping[str, str], *,
     kept = _with_samples(columns, rows, 0, dialect)[0] if rows else ()
     if not kept:
         raise NoWaveform(head.path, "has no samples beside its times, its columns are {names:s}", quote_names(names))
-    return Header(
-        "CSV",
-        dialect,
-        layout.first_line,
-        kept,
-        time=time,
-        time_factor=1.0 if time is None else _time_factor(head, layout, time),
-        certain=certain,
-    )
+    factor = 1.0 if time is None else _time_factor(head, layout, time)
+    return Header("CSV", dialect, layout.first_line, kept, time=time, time_factor=factor, certain=certain)
 
 
 #: Titles of columns that number the rows.

@@ -43,7 +43,7 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
     titles = [" ".join(row) for row in fields[:first] if row]
     if first is None or len(titles) > _MOST_TITLES or any(any(row[1:]) for row in fields[first : first + 100]):
         raise NoWaveform(path, "holds no samples and no pulse times")
-    blocks = partial(read_blocks, path, head.encoding, dialect, first + 1, [0])
+    blocks = partial(read_blocks, head, dialect, first + 1, [0])
     if rate is not None:
         return _samples(head, rate, blocks)
     if not guess and not any(read_title(text).column == "time_s" or "pulse" in text.casefold() for text in titles):

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from levilab.errors import UsageError
 from levilab.formats.kinds import AUDIO, kind_of_bytes
+from levilab.formats.layout import ALIGNED
 from levilab.formats.table import file_errors
 from levilab.formats.texts import SPREADSHEETS, TEXTS, locate, texts_of
 from levilab.formats.waveforms.audio import read_audio
@@ -45,13 +46,14 @@ def read_record(
         record = None if inside else _read_binary(path, rate)
         if record is not None:
             return record
-        if inside or any(text.rewritten for text in texts_of(file)):
-            what = "is read for readings alone, as spreadsheets, ZIP, JSON and serial logs are: save samples as CSV"
+        texts = [text for text in texts_of(file) if not inside or text.path == path]
+        if len(texts) != 1 or texts[0].titles:
+            what = "is read for readings alone, as several sheets or runs and serial logs are: save samples as CSV"
             raise NoWaveform(path, what)
-        head = read_head(path)
+        head = read_head(path, texts[0])
         if set(columns or ()) - {"t", "time_s"}:
             raise NoWaveform(path, "holds readings: its columns are named")
-        dialect = dialect_of(head)
+        dialect = ALIGNED if texts[0].aligned else dialect_of(head)
         alone = dialect.separator is None and all(len(dialect.split(line)) < 2 for line in head.lines[-20:])
         if alone and not says_its_step(head, dialect):
             return read_column(head, dialect, rate, guess=guess)

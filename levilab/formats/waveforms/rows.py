@@ -13,6 +13,7 @@ from levilab.formats.columns import TableError, shorten
 from levilab.formats.dialect import MISSING, Dialect
 from levilab.formats.layout import EXPORT, HEAD, encoding_of, lines_of, refuse_other_kinds
 from levilab.formats.rows import EXPECTED, FIELDS, left_out
+from levilab.formats.texts import Text
 from levilab.formats.waveforms.waveform import HIGHEST
 from levilab.texts.text import how_many
 
@@ -29,33 +30,33 @@ class Head:
     Attributes:
         encoding: of all of it.
         lines: the whole ones.
-        whole: whether these are all.
+        text: all of it.
     """
 
     path: Path
     encoding: str
     lines: tuple[str, ...]
-    whole: bool
+    text: Text
 
 
-def read_head(path: Path) -> Head:
-    """Return the first 64 KiB of a text file as lines.
+def read_head(path: Path, text: Text) -> Head:
+    """Return the first 64 KiB of a text at a path as lines.
 
     Raises:
         NoTable: it is no text, or empty.
         OSError: it cannot be read.
     """
-    with path.open("rb") as stream:
+    with text.open() as stream:
         head = stream.read(HEAD)
         whole = not stream.read(1)
     refuse_other_kinds(path, head)
     encoding = encoding_of(head)
     lines = lines_of(path, head, encoding, whole=whole, padding="\0")  # some oscilloscopes pad a file with NULs
-    return Head(path, encoding, tuple(lines), whole)
+    return Head(path, encoding, tuple(lines), text)
 
 
-def pieces(path: Path, encoding: str, first_line: int) -> Iterator[tuple[int, str, bool]]:
-    """Yield whole lines of a file from a line on, about a million characters at a time.
+def pieces(source: Text, encoding: str, first_line: int) -> Iterator[tuple[int, str, bool]]:
+    """Yield whole lines of a text from a line on, about a million characters at a time.
 
     Yields:
         The 1-based number of the first line, the lines, and whether these are the last ones; only there the last line
@@ -65,7 +66,7 @@ def pieces(path: Path, encoding: str, first_line: int) -> Iterator[tuple[int, st
         TableError: a line has no end.
     """
     number, rest = 1, ""
-    with path.open(encoding=encoding, errors="replace", newline=None) as stream:
+    with io.TextIOWrapper(source.open(), encoding=encoding, errors="replace", newline=None) as stream:
         text = stream.read(PIECE)
         while text:
             following = stream.read(PIECE)
@@ -73,7 +74,7 @@ def pieces(path: Path, encoding: str, first_line: int) -> Iterator[tuple[int, st
             end = rest.rfind("\n") + 1 if following else len(rest)
             if end == 0 and len(rest) > LONGEST_LINE:
                 what = "has a line of more than {most} characters; {export}"
-                raise TableError(path, what, LONGEST_LINE, EXPORT, line=number)
+                raise TableError(source.path, what, LONGEST_LINE, EXPORT, line=number)
             ready, rest, text = rest[:end], rest[end:], following
             lines = ready.count("\n")
             for _ in range(min(max(first_line - number, 0), lines)):
@@ -113,17 +114,17 @@ class Block:
         return [fields[column] for fields in split if column < len(fields)]
 
 
-def read_blocks(path: Path, encoding: str, dialect: Dialect, first_line: int, used: Sequence[int]) -> Iterator[Block]:
+def read_blocks(head: Head, dialect: Dialect, first_line: int, used: Sequence[int]) -> Iterator[Block]:
     """Yield the numbers of some columns, in memory that does not grow with the file.
 
     Raises:
         TableError: a line is damaged, or a sample is missing.
         OSError: the file cannot be read.
     """
-    for line, text, last in pieces(path, encoding, first_line):
+    for line, text, last in pieces(head.text, head.encoding, first_line):
         numbers = _at_once(text, dialect, used)
         if numbers is None:
-            yield _line_by_line(path, text, line, dialect, used, last=last)
+            yield _line_by_line(head.path, text, line, dialect, used, last=last)
         else:
             yield Block(numbers, line, text)
 

@@ -145,7 +145,7 @@ def read_samples(
 
     def read(signal: int) -> Iterator[Array]:
         column, left = header.columns[signal], survey.count  # a last line may be torn in another column
-        for block in read_blocks(path, head.encoding, header.dialect, header.first_line, [column.index]):
+        for block in read_blocks(head, header.dialect, header.first_line, [column.index]):
             values = block.numbers[:left, 0]
             left -= len(values)
             if values.size:
@@ -208,7 +208,7 @@ def _look_over(head: Head, header: Header) -> _Survey:
     survey = _Survey()
     if not header.columns:
         raise TableError(head.path, "its header names channels, but none has samples: export a channel that is on")
-    for block in read_blocks(head.path, head.encoding, header.dialect, header.first_line, header.used):
+    for block in read_blocks(head, header.dialect, header.first_line, header.used):
         survey.count += len(block.numbers)
         survey.torn = survey.torn or block.torn
         if header.time is not None or header.sequence is not None:
@@ -300,7 +300,7 @@ def _uneven_times(head: Head, header: Header, survey: _Survey) -> _Times:
         raise TableError(path, what, -shortest * unit, line=line)
     if survey.count > MOST_UNEVEN:
         raise TableError(path, "holds {n} samples with uneven times: say `rate`, or cut the file", survey.count)
-    blocks = read_blocks(path, head.encoding, header.dialect, header.first_line, header.used)
+    blocks = read_blocks(head, header.dialect, header.first_line, header.used)
     times = np.concatenate([block.numbers[:, 0] for block in blocks])[: survey.count] * unit
     apart = np.diff(times)
     step, (longest, line) = float(np.median(apart)) or float(apart.mean()), survey.clock.longest

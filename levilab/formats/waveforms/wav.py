@@ -33,15 +33,7 @@ def read_wav(path: Path) -> Waveform:
     try:
         with warnings.catch_warnings(action="ignore"):  # chunks that are not samples
             rate, data = wavfile.read(path, mmap=True)
-    except (
-        ValueError,
-        struct.error,
-        EOFError,
-        TypeError,
-        OverflowError,
-        ZeroDivisionError,
-        UnboundLocalError,
-    ) as error:
+    except (ValueError, struct.error, EOFError, TypeError, ArithmeticError, UnboundLocalError) as error:
         raise TableError(path, _UNREADABLE, _ADVICE) from error
     return _waveform(path, rate, data)
 

@@ -122,9 +122,8 @@ def in_german(notes):
     ("".join(f"0:00:{t:02.0f} -> {f} Hz\n" for t, f in zip(INSTANTS, SPINS, strict=True)), None),
     ("Y unit;Hz\nt;f [Hz] links;Comment\n" + rows("{t:.0f}s;{f}"), None),
 ])  # fmt: skip
-def test_readings_are_read_however_they_are_written(text, u, tmp_path):
-    path = tmp_path / "my.txt"
-    path.write_text(text, encoding="utf-8")
+def test_readings_are_read_however_they_are_written(text, u, write):
+    path = write(text, "my.txt")
     table = read_table(path, quantities=SPIN, needed=SPIN[:2])
     factor = 60 if "U/min" in text else 1
     assert table.column("time_s").tolist() == [*INSTANTS]
@@ -182,16 +181,14 @@ def test_a_column_in_which_some_rows_have_no_u_behind_the_number_says_so(count, 
 @pytest.mark.parametrize(("cell", "do"), [
     ("38.5 Hz ± 30 ms", "one unit in all"), ("38.5 ± 1 %?", "the title u"), ("10²", "number"), ("4x1000", "number"),
 ])  # fmt: skip
-def test_a_number_behind_a_mark_that_cannot_be_used_is_quoted_as_it_stands(cell, do, tmp_path):
-    path = tmp_path / "my.csv"
-    path.write_text("t,f\n" + rows("{t},{f} ± 0.03").replace("38.5 ± 0.03", cell), encoding="utf-8")
+def test_a_number_behind_a_mark_that_cannot_be_used_is_quoted_as_it_stands(cell, do, write):
+    path = write("t,f\n" + rows("{t},{f} ± 0.03").replace("38.5 ± 0.03", cell), "my.csv")
     with pytest.raises(TableError, match=re.escape(f"'{cell}' stands in column 'f'") + f".*{do}"):
         read_table(path)
 
 
-def test_rows_that_a_person_doubts_are_left_out_on_request_and_named(tmp_path):
-    path = tmp_path / "my.csv"
-    path.write_text("t,f\n" + rows("{t},{f}").replace("37.1", "37.1?").replace("30.0,35", "~30.0,35"), encoding="utf-8")
+def test_rows_that_a_person_doubts_are_left_out_on_request_and_named(write):
+    path = write("t,f\n" + rows("{t},{f}").replace("37.1", "37.1?").replace("30.0,35", "~30.0,35"), "my.csv")
     with pytest.raises(TableError, match=r"line 4: '37.1\?'.*also in 1 other line"):
         read_table(path)
     table = read_table(path, skip_doubtful=True)
@@ -202,9 +199,8 @@ def test_rows_that_a_person_doubts_are_left_out_on_request_and_named(tmp_path):
     assert len(read_table(path, skip_doubtful=True)) == 1002  # beyond the lines after which an error ends the reading
 
 
-def test_a_line_with_bytes_that_are_no_text_is_left_out_with_its_number(tmp_path):
-    path = tmp_path / "my.csv"
-    path.write_text("t,f\n" + rows("{t},{f}").replace("37.1", "3\x007.1"), encoding="utf-8")
+def test_a_line_with_bytes_that_are_no_text_is_left_out_with_its_number(write):
+    path = write("t,f\n" + rows("{t},{f}").replace("37.1", "3\x007.1"), "my.csv")
     table = read_table(path)
     assert table.column("time_s").tolist() == [0, 10, 30, 40, 50]
     assert "line 4: '20.0,3�7.1' has bytes that are no text and is left out" in " ".join(table.warnings)
@@ -292,11 +288,9 @@ def test_an_angular_velocity_of_tracker_is_a_question_with_its_choices():
     assert not source.readings.doubtful
 
 
-def test_definitions_of_cassy_may_stand_one_below_the_other(tmp_path):
-    file = tmp_path / "cassy.txt"
+def test_definitions_of_cassy_may_stand_one_below_the_other(write):
     heads = "".join(f'MIN=0\tMAX=200\tSCALE=20\tDEF="{title}"\n' for title in ("t/s", "f_1/Hz"))
-    file.write_text(heads + "0\t38\n10\t37.5\n20\t37\n", encoding="utf-8")
-    table = read_table(file, quantities=SPIN)
+    table = read_table(write(heads + "0\t38\n10\t37.5\n20\t37\n"), quantities=SPIN)
     assert table.column("spin_frequency_hz").tolist() == [38, 37.5, 37]
     assert table.lines.tolist() == [3, 4, 5]
 
@@ -312,14 +306,13 @@ def test_a_member_of_a_zip_stays_in_it_whatever_its_name(tmp_path, name):
 
 
 def test_a_table_that_holds_no_samples_says_what_to_do():
-    for name in ("excel.xlsx", "arduino-monitor.txt", "libreoffice.ods/Messung 1"):
+    for name in ("excel.xlsx", "arduino-monitor.txt"):
         with pytest.raises(NoWaveform, match="save samples as CSV"):
             read_record(FILES / name)
 
 
-def test_a_column_without_name_and_unit_is_asked_about(tmp_path):
-    file = tmp_path / "wert.csv"
-    file.write_text("Zeit;Wert\n0;239\n60;195\n120;162\n180;136\n", encoding="utf-8")
+def test_a_column_without_name_and_unit_is_asked_about(write):
+    file = write("Zeit;Wert\n0;239\n60;195\n120;162\n180;136\n", "wert.csv")
     with pytest.raises(
         NoSuchColumn, match=r"column 2 'Wert' has the values 239 to 136 and no unit: rad/s \(38 to"
     ) as error:
@@ -355,9 +348,8 @@ def test_limits_in_one_column_of_a_spreadsheet_are_read(tmp_path):
         ("Datum;f\n31.02.2026 10:00:00;38\n01.03.2026 10:00:01;37\n01.03.2026 10:00:02;36\n", "'31.02.2026 10:00:00'"),
     ],
 )
-def test_what_could_be_read_in_two_ways_is_refused(text, says, tmp_path):
-    file = tmp_path / "odd.csv"
-    file.write_text(text, encoding="utf-8")
+def test_what_could_be_read_in_two_ways_is_refused(text, says, write):
+    file = write(text, "odd.csv")
     with pytest.raises(TableError) as error:
         read_table(file, quantities=SPIN, needed=SPIN[:2])
     assert says in str(error.value)
@@ -379,24 +371,19 @@ def workbook(path, sheet, **more):
 def test_a_spreadsheet_or_zip_that_unpacks_to_gigabytes_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(texts, "MOST_UNPACKED", 1 << 20)
     blank = b" " * (2 << 20)
-    bombs = {"bytes.xlsx": workbook(tmp_path / "bytes.xlsx", blank)}
+    workbook(tmp_path / "bytes.xlsx", blank)
     with zipfile.ZipFile(tmp_path / "zip.zip", "w", zipfile.ZIP_DEFLATED) as out:
         out.writestr("a.csv", blank)
-    bombs["zip.zip"] = tmp_path / "zip.zip"
-    lying = (tmp_path / "zip.zip").read_bytes()
-    size = (2 << 20).to_bytes(4, "little")
-    (tmp_path / "lying.zip").write_bytes(lying.replace(size, (100).to_bytes(4, "little")))  # what its directory says
-    bombs["lying.zip"] = tmp_path / "lying.zip"
-    for path in bombs.values():
+    said, lie = ((size).to_bytes(4, "little") for size in (2 << 20, 100))  # what its directory says
+    (tmp_path / "lying.zip").write_bytes((tmp_path / "zip.zip").read_bytes().replace(said, lie))
+    for path in list(tmp_path.iterdir()):
         with pytest.raises(TableError, match=r"unpacks to .*, up to 1 MB"):
             read_table(path)
 
 
 def test_a_cell_far_away_and_repeated_cells_are_refused_before_they_are_unpacked(tmp_path):
-    far = (
-        '<worksheet xmlns="http://schemas.openxmlformats.org/spreadsheetml/2006/main"><sheetData><row r="1"><c r="A1">'
-    )
-    far += '<v>1</v></c></row><row r="1048576"><c r="XFD1048576"><v>1</v></c></row></sheetData></worksheet>'
+    far = f'<worksheet xmlns="{MAIN}"><sheetData><row r="1"><c r="A1"><v>1</v></c></row><row r="1048576">'
+    far += '<c r="XFD1048576"><v>1</v></c></row></sheetData></worksheet>'
     with pytest.raises(TableError, match="1,048,576 rows of 16,384 columns"):
         read_table(workbook(tmp_path / "far.xlsx", far))
     with zipfile.ZipFile(FILES / "libreoffice.ods") as kept, zipfile.ZipFile(tmp_path / "many.ods", "w") as out:
@@ -458,19 +445,17 @@ def test_a_number_in_a_cell_keeps_its_last_bit(tmp_path):
     assert read_table(path, quantities=SPIN).column("spin_frequency_hz").tolist() == [value] * 4
 
 
-def test_a_title_with_a_unit_goes_before_a_column_without_one(tmp_path):
+def test_a_title_with_a_unit_goes_before_a_column_without_one(write):
     """N is the number of repeats, and the scatter in Hz is no spin of a top."""
-    path = tmp_path / "repeats.csv"
-    path.write_text("t [s],f mean [rpm],f std [rpm],N\n0,2400,4,10\n10,2310,4,10\n20,2220,4,10\n", encoding="utf-8")
+    path = write("t [s],f mean [rpm],f std [rpm],N\n0,2400,4,10\n10,2310,4,10\n20,2220,4,10\n", "repeats.csv")
     table = read_table(path, quantities=SPIN)
     assert table.column("spin_frequency_hz").tolist() == [40.0, 38.5, 37.0]
     assert "spin_frequency_u_hz" not in table.columns
 
 
 @pytest.mark.parametrize("title", ["2σ [Hz]", "U (k=2) [Hz]", "max. Fehler [Hz]", "f_std [Hz]"])
-def test_an_expanded_uncertainty_is_named_and_not_read(tmp_path, title):
-    path = tmp_path / "wide.csv"
-    path.write_text(f"t [s],f [Hz],{title},T-Fehler [K]\n0,40,0.04,1\n10,38.5,0.04,1\n20,37,0.04,1\n", encoding="utf-8")
+def test_an_expanded_uncertainty_is_named_and_not_read(write, title):
+    path = write(f"t [s],f [Hz],{title},T-Fehler [K]\n0,40,0.04,1\n10,38.5,0.04,1\n20,37,0.04,1\n", "wide.csv")
     (note,) = read_table(path, quantities=SPIN).warnings
     assert f"'{title}' is not read: u is half of 2σ" in note
 
@@ -517,9 +502,8 @@ TIMES = "0;0;38\n0;40;37.5\n1;20;37.2\n1;55;37"
     + [(f"t [min];t [s];f\n{rows}", WHICH) for rows in ("0;0;38\n1;60;37\n2;120;36", "0;9;38\n0;20;37\n0;30;36")]
     + [("t [min];t [s];f\n0.5;30;38\n0.6;36;37\n0.75;45;36", WHICH), (f"t;t;f\nmin;s;Hz\n{TIMES}", AS_ONE)],
 )
-def test_times_in_two_columns_are_asked_about(text, says, tmp_path):
-    path = tmp_path / "two.csv"
-    path.write_text(text, encoding="utf-8")
+def test_times_in_two_columns_are_asked_about(text, says, write):
+    path = write(text, "two.csv")
     with pytest.raises(TableError, match=says):
         read_table(path, quantities=SPIN)
 
@@ -532,6 +516,20 @@ def test_minutes_beside_other_seconds_are_the_times(titles, seconds, columns, tm
     rows = "".join(f"{k};{seconds};{38 - k}\n" for k in range(3))
     path.write_text(f"{titles}\n{rows}", encoding="utf-8")
     assert read_table(path, quantities=SPIN, columns=columns).column("time_s").tolist() == [0, 60, 120]
+
+
+@pytest.mark.parametrize("begins", [(0, 30), (0, 0)])
+@pytest.mark.parametrize("times", ["One", "No"])
+def test_packets_of_labview_are_one_run_where_their_times_go_on(begins, times, write):
+    text = f"Separator\tTab\nDecimal_Separator\t,\nMulti_Headings\tYes\nX_Columns\t{times}\n"
+    for start, k in zip(begins, (0, 3), strict=True):
+        text += f"Channels\t1\nY_Unit_Label\tHz\nX0\t{start}\nDelta_X\t1,0E+1\nX_Value\tUntitled\tComment\n"
+        packet = [(start + 10 * n if times == "One" else "", SPINS[k + n]) for n in range(3)]
+        text += "".join(f"{t}\t{f}\t\n".replace(".", ",") for t, f in packet) + "\n"
+    tables = [read_table(run.path, quantities=SPIN) for run in understand(write(text, "my.lvm")).runs]
+    assert [f for table in tables for f in table.column("spin_frequency_hz")] == [*SPINS]
+    assert [t for table in tables for t in table.column("time_s")] == [t + k for t in begins for k in (0, 10, 20)]
+    assert len(tables) == (1 if begins[1] else 2)
 
 
 def test_a_path_into_no_file_stays_a_path():
@@ -559,9 +557,8 @@ def test_turns_since_the_start_are_a_question_whose_first_answer_gives_the_mean_
     ("titles", "columns"),
     [("N,u", {"t": "1", "f": "2 [turns]"}), ("n [turns],u", {}), ("n [turns],u [counts]", {"f": "2"})],
 )
-def test_a_count_of_turns_uses_its_own_u(titles, columns, tmp_path):
-    path = tmp_path / "u.csv"
-    path.write_text(f"t [s],{titles}\n0,0,3\n10,390,4\n20,770,0\n30,1140,0\n", encoding="utf-8")
+def test_a_count_of_turns_uses_its_own_u(titles, columns, write):
+    path = write(f"t [s],{titles}\n0,0,3\n10,390,4\n20,770,0\n30,1140,0\n", "u.csv")
     table = read_table(path, quantities=SPIN, needed=SPIN[:2], columns=columns)
     assert table.column("spin_frequency_hz").tolist() == [39, 38, 37]
     assert table.column("spin_frequency_u_hz").tolist() == [0.5, 0.4, 0]  # √(u1² + u2²) turns in 10 s
@@ -577,22 +574,19 @@ def test_a_count_of_turns_uses_its_own_u(titles, columns, tmp_path):
         ("t,n [turns],u [Hz]\n0,0,1\n10,390,1\n20,770,1\n", SPIN, "give u of the count, in turns"),
     ],
 )
-def test_a_count_of_turns_that_gives_no_spins_says_what_to_do(table, quantities, said, tmp_path):
-    path = tmp_path / "u.csv"
-    path.write_text(table, encoding="utf-8")
+def test_a_count_of_turns_that_gives_no_spins_says_what_to_do(table, quantities, said, write):
+    path = write(table, "u.csv")
     with pytest.raises(TableError) as refused:
         read_table(path, quantities=quantities, columns={"f": "2"})
     assert said in str(refused.value)
 
 
-def test_a_count_of_turns_costs_no_row_of_another_analysis(tmp_path):
-    path = tmp_path / "u.csv"
-    path.write_text("t,n [turns],x_m\n0,0,1\n10,390,1\n20,770,1\n", encoding="utf-8")
+def test_a_count_of_turns_costs_no_row_of_another_analysis(write):
+    path = write("t,n [turns],x_m\n0,0,1\n10,390,1\n20,770,1\n", "u.csv")
     table = read_table(path, quantities=(*SPIN, "x_m"), needed=["x_m"])
     assert ([*table.columns], len(table)) == (["time_s", "x_m"], 3)
     assert "not used: column 'n [turns]' counts turns since the start" in table.warnings[0]
 
 
-def test_of_two_columns_without_titles_the_other_one_is_the_time(tmp_path):
-    (tmp_path / "my.txt").write_text(rows("{t} {f}"), encoding="utf-8")
-    assert read_table(tmp_path / "my.txt", columns={"f": "2 [Hz]"}).column("time_s")[1] > 0
+def test_of_two_columns_without_titles_the_other_one_is_the_time(write):
+    assert read_table(write(rows("{t} {f}")), columns={"f": "2 [Hz]"}).column("time_s")[1] > 0

@@ -32,16 +32,6 @@ ENGLISH = re.compile(r"\b(the|of|is|are|and|to|with|not|it|or|at|say|holds|colum
 SLOW = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
-@pytest.fixture
-def table_file(tmp_path):
-    def write(content, name="data.csv"):
-        path = tmp_path / name
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return path
-
-    return write
-
-
 @pytest.fixture(params=[FEW, 0], ids=["by line", "at once"])
 def either_way(request, monkeypatch):
     """A short table is read line by line, a long one at once if its lines are plain: here short ones are, too."""
@@ -127,12 +117,12 @@ ANGULAR = (
 
 
 @pytest.mark.parametrize("title", ANGULAR)
-def test_an_angular_frequency_in_1_per_s_is_in_rad_per_s(title, table_file):
+def test_an_angular_frequency_in_1_per_s_is_in_rad_per_s(title, write):
     """As German textbooks write it: 1/s of an ω is no Hz; its uncertainty likewise."""
     name, _, units = title.partition("\n")
     head = f"t in s;{name};u_ω in 1/s\n" + (f"{units};1/s\n" if units else "")
     rows = "".join(f"{t};{2 * math.pi * f!r};{2 * math.pi * 0.25!r}\n" for t, f in zip(*PLAIN.values(), strict=True))
-    table = read_table(table_file(head + rows))
+    table = read_table(write(head + rows))
     np.testing.assert_allclose(table.column(F), PLAIN[F], rtol=4e-16)
     np.testing.assert_allclose(table.column(U), [0.25] * 3, rtol=4e-16)
     assert any("rad/s" in warning for warning in table.warnings)
@@ -141,8 +131,8 @@ def test_an_angular_frequency_in_1_per_s_is_in_rad_per_s(title, table_file):
 @pytest.mark.parametrize(
     "title", ["f in 1/s", "Drehzahl [1/s]", "Drehzahl n / s^-1", "Frequenz f", "ω in Hz", "n / s⁻¹"]
 )
-def test_turns_in_1_per_s_stay_turns(title, table_file):
-    table = read_table(table_file(f"Zeit t in s;{title}\n0;61.5\n0.5;61.25\n1;61\n"))
+def test_turns_in_1_per_s_stay_turns(title, write):
+    table = read_table(write(f"Zeit t in s;{title}\n0;61.5\n0.5;61.25\n1;61\n"))
     np.testing.assert_array_equal(table.column(T), PLAIN[T])
     np.testing.assert_array_equal(table.column(F), PLAIN[F])
     assert not table.warnings
@@ -150,9 +140,9 @@ def test_turns_in_1_per_s_stay_turns(title, table_file):
 
 @BOTH_WAYS
 @pytest.mark.parametrize("name", TABLES)
-def test_a_table_reads_the_same_in_every_dialect(name, table_file):
+def test_a_table_reads_the_same_in_every_dialect(name, write):
     text, expected = TABLES[name]
-    table = read_table(table_file(text))
+    table = read_table(write(text))
     assert set(table.frame.columns) == set(expected)
     for column, values in expected.items():
         np.testing.assert_allclose(table.column(column), values, rtol=4e-16, atol=0)
@@ -160,9 +150,9 @@ def test_a_table_reads_the_same_in_every_dialect(name, table_file):
     assert (table.frame.dtypes == np.float64).all()
 
 
-def test_times_of_hours_and_minutes_are_doubted(table_file):
+def test_times_of_hours_and_minutes_are_doubted(write):
     """A stopwatch begins at 0 minutes, as in the tables above; 14:05 and 14:06 may be a minute apart."""
-    table = read_table(table_file("time,f\n14:05,61.5\n14:06,61.25\n14:07,61\n"))
+    table = read_table(write("time,f\n14:05,61.5\n14:06,61.25\n14:07,61\n"))
     np.testing.assert_allclose(table.column(T), [845, 846, 847])
     (warning,) = table.warnings
     assert "the times, as 14:05, are taken for minutes and seconds" in warning
@@ -176,23 +166,23 @@ def test_times_of_hours_and_minutes_are_doubted(table_file):
     ("t,f,u [ppm]\n0,61.5,1\n1,61.25,1\n2,61,1\n", "'ppm' is no unit of frequency"),
     ("t,f\n0,61.5\n1,61.25\n2,61\nmean,61.25\nEnd of data\n", "line 5: 'mean,61.25' is no reading"),
 ])  # fmt: skip
-def test_what_is_taken_for_what_it_looks_like_has_a_note(table_file, text, says):
-    table = read_table(table_file(text))
+def test_what_is_taken_for_what_it_looks_like_has_a_note(write, text, says):
+    table = read_table(write(text))
     assert {name: values.tolist() for name, values in table.columns.items()} == SECONDS
     assert says in table.warnings[0]
 
 
-def test_dates_count_from_the_first_that_is_written(table_file):
+def test_dates_count_from_the_first_that_is_written(write):
     text = "t,f,u\n,61.5,\n2026-11-20T14:05:12Z,61.5,\n2026-11-20T14:05:13Z,61.25,\n2026-11-20T14:05:14Z,61,\n"
-    assert read_table(table_file(text)).column(T).tolist() == [0, 1, 2]
+    assert read_table(write(text)).column(T).tolist() == [0, 1, 2]
 
 
 @BOTH_WAYS
 @pytest.mark.parametrize(
     "missed", ["", "-", "--", "n/a", "nan", "NaN", "inf", "-Infinity", "9.91E37", "9.9e+37", "1e999"]
 )
-def test_a_missed_reading_is_left_out_with_a_warning(missed, table_file):
-    table = read_table(table_file(f"t,f\n0,61.5\n0.2,{missed}\n0.5,61.25\n1,61\n"))
+def test_a_missed_reading_is_left_out_with_a_warning(missed, write):
+    table = read_table(write(f"t,f\n0,61.5\n0.2,{missed}\n0.5,61.25\n1,61\n"))
     assert table.column(T).tolist() == PLAIN[T]
     assert table.lines.tolist() == [2, 4, 5]
     assert len(table.warnings) == 1
@@ -201,22 +191,22 @@ def test_a_missed_reading_is_left_out_with_a_warning(missed, table_file):
 
 
 @BOTH_WAYS
-def test_many_missed_readings_make_one_warning(table_file):
-    table = read_table(table_file("t;f\n" + "".join(f"{i};{'' if i % 2 else '61,5'}\n" for i in range(30))))
+def test_many_missed_readings_make_one_warning(write):
+    table = read_table(write("t;f\n" + "".join(f"{i};{'' if i % 2 else '61,5'}\n" for i in range(30))))
     (warning,) = table.warnings
     assert warning.partition(": ")[2] == (
         "15 of 30 rows are left out as missed (empty, -, n/a, nan, inf or 9.91E37): lines 3, 5, 7, 9, 11, …"
     )
 
 
-def test_a_column_of_true_and_false_is_refused_by_its_line(table_file):
+def test_a_column_of_true_and_false_is_refused_by_its_line(write):
     for rows in (5, 200, 9000):  # those that the layout is guessed from hold the titles, or do not; beyond 64 kB
-        path = table_file("time_s,spin_frequency_hz\n" + "".join(f"{k},{k % 2 == 0}\n" for k in range(rows)))
+        path = write("time_s,spin_frequency_hz\n" + "".join(f"{k},{k % 2 == 0}\n" for k in range(rows)))
         with pytest.raises(TableError, match="line 2: 'True' stands in column 'spin_frequency_hz', a number"):
             read_table(path)
     titles_below = "".join(f"{k},{k}\n" for k in range(20)) + "time_s,spin_frequency_hz\n" + 200 * "no row, but words\n"
     with pytest.raises(NoTable, match="'0,0' begins no table of at least two columns"):
-        read_table(table_file(titles_below))
+        read_table(write(titles_below))
 
 
 @pytest.mark.parametrize("separator", [",", ";", "\t"])
@@ -224,8 +214,8 @@ def test_a_column_of_true_and_false_is_refused_by_its_line(table_file):
     (("Datum", "Temperatur", "Kommentar"), ("2024-01-05", "21.5", "kalt")),
     (("Temperatur", "Kommentar"), ("21", "kalt")),
 ])  # fmt: skip
-def test_the_error_of_a_table_of_words_names_the_known_titles(separator, header, row, table_file):
-    path = table_file("\n".join(map(separator.join, [header, *[row] * 19])) + "\n")
+def test_the_error_of_a_table_of_words_names_the_known_titles(separator, header, row, write):
+    path = write("\n".join(map(separator.join, [header, *[row] * 19])) + "\n")
     with pytest.raises(
         NoSuchColumn, match=f'no title is known .* among {quote_names(header)}: say `columns` = "t=NAME'
     ):
@@ -236,14 +226,14 @@ def test_the_error_of_a_table_of_words_names_the_known_titles(separator, header,
 
 @BOTH_WAYS
 @pytest.mark.parametrize("last", ["1.5", "1.5,6x", "1.5,60.5,7", "1.5,-e"])
-def test_a_torn_last_line_is_left_out_with_a_warning(last, table_file):
-    table = read_table(table_file("t,f\n0,61.5\n0.5,61.25\n1,61\n" + last))
+def test_a_torn_last_line_is_left_out_with_a_warning(last, write):
+    table = read_table(write("t,f\n0,61.5\n0.5,61.25\n1,61\n" + last))
     assert table.column(T).tolist() == PLAIN[T]
     assert f"line 5: '{last}' was cut off" in table.warnings[0]
 
 
-def test_numbers_without_header_are_time_frequency_and_uncertainty_with_a_warning(table_file):
-    table = read_table(table_file("0,61.5,.25\n0.5,61.25,.5\n1,61,.125\n"))
+def test_numbers_without_header_are_time_frequency_and_uncertainty_with_a_warning(write):
+    table = read_table(write("0,61.5,.25\n0.5,61.25,.5\n1,61,.125\n"))
     assert {name: table.column(name).tolist() for name in table.frame} == WITH_U
     assert f"no header; the columns are taken as {T}, {F}, {U}" in table.warnings[0]
 
@@ -267,8 +257,8 @@ def test_numbers_without_header_are_time_frequency_and_uncertainty_with_a_warnin
         ),
     ],
 )
-def test_columns_can_be_named(text, columns, expected, table_file):
-    table = read_table(table_file(text), columns=columns)
+def test_columns_can_be_named(text, columns, expected, write):
+    table = read_table(write(text), columns=columns)
     assert set(table.frame) == set(expected)
     for name, values in expected.items():
         np.testing.assert_allclose(table.column(name), values, rtol=4e-16)
@@ -318,9 +308,9 @@ ERRORS = {
 
 @BOTH_WAYS
 @pytest.mark.parametrize("name", ERRORS)
-def test_an_error_is_one_line_that_names_file_and_place(name, table_file):
+def test_an_error_is_one_line_that_names_file_and_place(name, write):
     content, columns, words = ERRORS[name]
-    path = table_file(content)
+    path = write(content)
     with pytest.raises(DataError) as caught:
         read_table(path, columns=columns)
     message = str(caught.value)
@@ -350,8 +340,8 @@ def test_a_pipe_is_refused_at_once(tmp_path):
 @pytest.mark.parametrize(
     ("error", "words"), [(PermissionError(13, "denied"), "may not be read"), (OSError(5, "I/O error"), "I/O error")]
 )
-def test_an_unreadable_file_is_reported(error, words, table_file, monkeypatch):
-    path = table_file(GOOD)
+def test_an_unreadable_file_is_reported(error, words, write, monkeypatch):
+    path = write(GOOD)
     monkeypatch.setattr(Path, "open", Mock(side_effect=error))
     for read in (read_table, read_run_readings):
         with pytest.raises(TableError, match=words):
@@ -379,9 +369,9 @@ def test_an_unreadable_file_is_reported(error, words, table_file, monkeypatch):
         ("t,f\n0,0:10\n1,61.2\n2,61\n", {}, "'0:10' stands in column 'f'"),
     ],
 )
-def test_what_is_nearly_a_reading_is_reported_with_what_to_do(text, columns, says, table_file):
+def test_what_is_nearly_a_reading_is_reported_with_what_to_do(text, columns, says, write):
     with pytest.raises(TableError) as error:
-        read_table(table_file(text), columns=columns, needed=[F])
+        read_table(write(text), columns=columns, needed=[F])
     assert says in str(error.value)
     assert not ENGLISH.search(in_language(error.value.message, "de"))
 
@@ -394,8 +384,8 @@ def test_what_is_nearly_a_reading_is_reported_with_what_to_do(text, columns, say
         ({"t": "1", "f": "2 [foo]"}, "grad/s, s and ms of a turn, turns in 10 s"),
     ],
 )
-def test_counts_between_readings_are_turns_in_that_time_if_so_told(columns, says, table_file):
-    file = table_file("time,counts\n0,400\n10,391\n20,380\n")
+def test_counts_between_readings_are_turns_in_that_time_if_so_told(columns, says, write):
+    file = write("time,counts\n0,400\n10,391\n20,380\n")
     with pytest.raises(TableError) as error:
         read_table(file, columns=columns, quantities=("time_s", F), needed=[F])
     assert says in str(error.value)
@@ -418,10 +408,10 @@ def test_counts_between_readings_are_turns_in_that_time_if_so_told(columns, says
         ("T [ms],f", (25.0, 20.0, math.nan, 40.0)),
     ],
 )
-def test_periods_and_turns_in_a_time_are_read_as_frequencies(title, values, table_file):
+def test_periods_and_turns_in_a_time_are_read_as_frequencies(title, values, write):
     both = title.endswith(",f")  # what is measured goes before what follows from it
     rows = "".join(f"{k},{v}{f',{hz}' if both else ''}\n" for k, (v, hz) in enumerate(zip(values, HZ, strict=True)))
-    table = read_table(table_file(f"t,{title}\n{rows}"), needed=[F])
+    table = read_table(write(f"t,{title}\n{rows}"), needed=[F])
     assert table.column(F).tolist() == pytest.approx([1.0, 2.0, 4.0] if both else [40.0, 50.0, 25.0])
     assert "1 of 4 rows is left out" in table.warnings[0]
     assert list(table.frame) == [T, F]
@@ -432,8 +422,8 @@ HZ = (1.0, 2.0, math.nan, 4.0)
 
 @pytest.mark.parametrize("period", ["T [ms]", "period (ms)"])
 @pytest.mark.parametrize("title", ["u [ms]", "u", "u_T [ms]", "T_err [ms]", "u_T", "ΔT [ms]", "u(T) [ms]"])
-def test_the_uncertainty_of_a_period_becomes_that_of_the_frequency(title, period, table_file):
-    table = read_table(table_file(f"t,{period},{title}\n0,25,0.1\n1,20,0.1\n2,40,0.1\n"))
+def test_the_uncertainty_of_a_period_becomes_that_of_the_frequency(title, period, write):
+    table = read_table(write(f"t,{period},{title}\n0,25,0.1\n1,20,0.1\n2,40,0.1\n"))
     assert table.column(U).tolist() == pytest.approx([1e-4 * f**2 for f in (40.0, 50.0, 25.0)])
 
 
@@ -442,14 +432,14 @@ def test_the_uncertainty_of_a_period_becomes_that_of_the_frequency(title, period
     ("z [m],Fehler [G],B [mT]", "flux_density_u_t", 1e-5), ("z [m],u [mm],B [mT]", "height_u_m", 1e-4),
     ("drive [Hz],u,precession [Hz]", "precession_frequency_u_hz", 0.1),
 ])  # fmt: skip
-def test_an_uncertainty_is_that_of_what_stands_beside_it(header, column, u, table_file):
-    table = read_table(table_file(f"{header}\n0,0.1,40\n1,0.1,50\n2,0.1,25\n"))
+def test_an_uncertainty_is_that_of_what_stands_beside_it(header, column, u, write):
+    table = read_table(write(f"{header}\n0,0.1,40\n1,0.1,50\n2,0.1,25\n"))
     assert (table.column(column).tolist(), table.warnings) == (pytest.approx([u] * 3), ())
 
 
-def test_a_missing_column_is_reported_with_those_there_are(table_file):
+def test_a_missing_column_is_reported_with_those_there_are(write):
     with pytest.raises(TableError, match=r"height_m; it has 't', 'f': say `columns` = z=NAME"):
-        read_table(table_file(GOOD)).column("height_m")
+        read_table(write(GOOD)).column("height_m")
 
 
 def test_the_columns_option_is_read_and_its_mistakes_are_wrong_usage():
@@ -479,17 +469,17 @@ def test_units_are_those_of_the_quantity_and_case_counts_where_it_must():
 
 @BOTH_WAYS
 @pytest.mark.parametrize("text", ["", f"{T},{F}\n", f"{T},{F}"])
-def test_a_run_without_readings_is_an_empty_table(text, table_file):
-    table = read_run_readings(table_file(text))
+def test_a_run_without_readings_is_an_empty_table(text, write):
+    table = read_run_readings(write(text))
     assert len(table.frame) == 0
     assert len(table.lines) == 0
     assert list(table.frame) == ([T, F] if text.endswith("\n") else [])
     assert len(table.warnings) == (text != "" and not text.endswith("\n"))
 
 
-def test_a_channel_of_a_run_that_was_not_known_costs_no_row(table_file):
+def test_a_channel_of_a_run_that_was_not_known_costs_no_row(write):
     """As of an oscilloscope's record without a frequency, which a resumed run would take again."""
-    path = table_file(f"{T},record,tape_frequency_hz\n0,1,\n1,2,30.5\n2,3,\n")
+    path = write(f"{T},record,tape_frequency_hz\n0,1,\n1,2,30.5\n2,3,\n")
     table = read_run_readings(path, (T, "record", "tape_frequency_hz"))
     assert table.column("record").tolist() == [1, 2, 3]
     assert np.isnan(table.column("tape_frequency_hz")).tolist() == [True, False, True]
@@ -498,8 +488,8 @@ def test_a_channel_of_a_run_that_was_not_known_costs_no_row(table_file):
 
 @BOTH_WAYS
 @pytest.mark.parametrize("last", ["1.5,60.5", "1.5,60.", "1.5", "1", "\0\0\0"])
-def test_a_runs_last_line_without_end_is_torn_even_if_it_parses(last, table_file):
-    table = read_run_readings(table_file(f"{T},{F}\n0,61.5\n0.5,61.25\n1,61\n{last}"))
+def test_a_runs_last_line_without_end_is_torn_even_if_it_parses(last, write):
+    table = read_run_readings(write(f"{T},{F}\n0,61.5\n0.5,61.25\n1,61\n{last}"))
     assert table.column(F).tolist() == PLAIN[F]
     assert "line 5" in table.warnings[0]
 
@@ -516,12 +506,12 @@ def test_a_run_being_written_grows_reading_by_reading(tmp_path):
 
 
 @BOTH_WAYS
-def test_a_damaged_line_within_a_run_is_an_error(table_file):
+def test_a_damaged_line_within_a_run_is_an_error(write):
     with pytest.raises(TableError, match="line 3"):
-        read_run_readings(table_file(f"{T},{F}\n0,61.5\n0.\n1,61\n"))
+        read_run_readings(write(f"{T},{F}\n0,61.5\n0.\n1,61\n"))
     for header in ("a,b", f"{T},{F}\r"):
         with pytest.raises(TableError, match="is no header of a run"):
-            read_run_readings(table_file(f"{header}\r\n0,61.5\n"))
+            read_run_readings(write(f"{header}\r\n0,61.5\n"))
 
 
 # --- properties --------------------------------------------------------------------------------------------------
@@ -617,10 +607,10 @@ def test_reading_at_once_and_line_by_line_agree(tmp_path, lines):
             np.testing.assert_allclose(a, b, rtol=1e-15)
 
 
-def test_a_plain_file_is_read_at_once_as_pandas_would(table_file):
+def test_a_plain_file_is_read_at_once_as_pandas_would(write):
     rng = np.random.default_rng(3)
     frame = pd.DataFrame({T: np.arange(40000) * 0.1, F: 61 + rng.normal(0, 1e-3, 40000), U: rng.uniform(1, 2, 40000)})
-    path = table_file(frame.to_csv(index=False))
+    path = write(frame.to_csv(index=False))
     table = read_table(path)
     pd.testing.assert_frame_equal(table.frame, pd.read_csv(path), check_exact=True)
     assert table.lines[[0, -1]].tolist() == [2, 40001]
@@ -628,30 +618,30 @@ def test_a_plain_file_is_read_at_once_as_pandas_would(table_file):
 
 
 @BOTH_WAYS
-def test_one_field_too_many_does_not_hide_one_that_is_missing(table_file):
+def test_one_field_too_many_does_not_hide_one_that_is_missing(write):
     for text in ("0,61\n1,60,5\n2\n3,59\n", "0,61\n1\n2,60,5\n3,59\n"):
         with pytest.raises(TableError, match=r"line 3: .* 2 are expected"):
-            read_table(table_file("t,f\n" + text))
+            read_table(write("t,f\n" + text))
     with pytest.raises(TableError, match=r"line 3: .* 3 are expected"):  # beside a column that is not used
-        read_table(table_file("t,f,x\n0,61,1\n1,60,1,5\n2,59\n3,58,1\n"))
+        read_table(write("t,f,x\n0,61,1\n1,60,1,5\n2,59\n3,58,1\n"))
 
 
 @BOTH_WAYS
-def test_a_comment_with_as_many_separators_as_a_row_stays_a_comment(table_file):
-    table = read_table(table_file("n,t,f\n1,0,61.5\n#2,.2,7\n3,0.5,61.25\n4,1,61\n"))
+def test_a_comment_with_as_many_separators_as_a_row_stays_a_comment(write):
+    table = read_table(write("n,t,f\n1,0,61.5\n#2,.2,7\n3,0.5,61.25\n4,1,61\n"))
     assert table.column(T).tolist() == PLAIN[T]
 
 
-def test_a_line_far_down_is_named(table_file):
+def test_a_line_far_down_is_named(write):
     rows = "".join(f"{i},61.5\n" for i in range(30000))
     with pytest.raises(TableError, match="line 30003: '6x' stands in column 'f'"):
-        read_table(table_file(f"t,f\n{rows}# pause\n30001,6x\n30002,61\n"))
+        read_table(write(f"t,f\n{rows}# pause\n30001,6x\n30002,61\n"))
 
 
 @BOTH_WAYS
-def test_columns_beside_the_wanted_ones_cost_no_reading(table_file):
+def test_columns_beside_the_wanted_ones_cost_no_reading(write):
     rows = "".join(f"{t},{60 - t},{'' if t % 5 else 0.07},ok\n" for t in range(20))
-    path = table_file("time_s,spin_frequency_hz,height_m,drive\n" + rows)
+    path = write("time_s,spin_frequency_hz,height_m,drive\n" + rows)
     table = read_table(path, quantities=(T, F, U))
     assert list(table.frame) == [T, F]
     assert len(table.frame) == 20
@@ -659,16 +649,16 @@ def test_columns_beside_the_wanted_ones_cost_no_reading(table_file):
 
 
 @BOTH_WAYS
-def test_uncertainties_with_gaps_are_not_used_rather_than_readings_lost(table_file):
+def test_uncertainties_with_gaps_are_not_used_rather_than_readings_lost(write):
     rows = "".join(f"{t},{60 - t},{'' if t % 2 else 0.03}\n" for t in range(20))
-    table = read_table(table_file("t,f,u\n" + rows))
+    table = read_table(write("t,f,u\n" + rows))
     assert list(table.frame) == [T, F]
     assert len(table.frame) == 20
     assert "empty in 10 of 20 rows" in table.warnings[0]
 
 
-def test_a_unit_can_be_stated_with_the_column(table_file):
-    path = table_file("Zeit;Drehzahl\n" + "".join(f"{t};{1800 - t}\n" for t in range(5)))
+def test_a_unit_can_be_stated_with_the_column(write):
+    path = write("Zeit;Drehzahl\n" + "".join(f"{t};{1800 - t}\n" for t in range(5)))
     table = read_table(path, columns={"t": "Zeit", "f": "Drehzahl [rpm]"})
     assert table.frame[F].iloc[0] == pytest.approx(30.0)
     with pytest.raises(TableError, match="no unit of frequency"):
@@ -676,9 +666,9 @@ def test_a_unit_can_be_stated_with_the_column(table_file):
 
 
 @pytest.mark.parametrize(("text", "says"), [('{"schema": 1}\n', "JSON"), ("<!DOCTYPE html>\n<p>", "HTML")])
-def test_what_is_another_kind_of_text_is_named(table_file, text, says):
+def test_what_is_another_kind_of_text_is_named(write, text, says):
     with pytest.raises(TableError, match=says):
-        read_table(table_file(text))
+        read_table(write(text))
 
 
 @pytest.mark.parametrize(
@@ -725,10 +715,10 @@ def test_passes_over_many_files_work_out_each_dialect_once(tmp_path, monkeypatch
 @pytest.mark.parametrize(
     "title", ["Magnetic Field {} (µT)", "Magnetfeld {} in µT", "B{} [µT]", "b_{}/µT", "mag{} (uT)"]
 )
-def test_components_of_a_field_and_its_magnitude_are_read(title, table_file):
+def test_components_of_a_field_and_its_magnitude_are_read(title, write):
     names = [title.format(axis) for axis in "xyz"]
     text = "\n".join(",".join(row) for row in [("Time (s)", *names, "Absolute field (µT)")]) + "\n"
-    table = read_table(table_file(text + "0,1,2,3,3.7\n0.01,1,2,3,3.7\n0.02,1,2,3,3.7\n"))
+    table = read_table(write(text + "0,1,2,3,3.7\n0.01,1,2,3,3.7\n0.02,1,2,3,3.7\n"))
     found = {name: values[0] for name, values in table.columns.items() if name != "time_s"}
     if title.startswith(("B", "b")):  # alone it is that of a Hall probe on the axis
         found["flux_density_z_t"] = found.pop("flux_density_t")

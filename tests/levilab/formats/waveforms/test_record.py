@@ -1,12 +1,14 @@
 """Samples out of files: every vendor's header, their traps, what is refused and how, and memory that does not grow."""
 
 import codecs
+import json
 import re
 import struct
 import sys
 import types
 import uuid
 import wave
+import zipfile
 
 import numpy as np
 import pytest
@@ -23,16 +25,6 @@ from levilab.texts.text import in_language
 FEW = settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 #: Of the sample files, which sample_data/make.py writes from one signal.
 STEP, COUNT, START = 2.5e-4, 2000, -0.25
-
-
-@pytest.fixture
-def write(tmp_path):
-    def file(content, name="data.csv"):
-        path = tmp_path / name
-        path.write_bytes(content if isinstance(content, bytes) else content.encode())
-        return path
-
-    return file
 
 
 def waveform(path, **given):
@@ -82,6 +74,17 @@ def test_times_that_lost_digits_give_the_step_by_a_line_and_say_so(sample_data):
     assert "is known to 9×10⁻⁵ of it" in record.warnings[0]
     ends = (0.25 - -0.25) / (COUNT - 1)
     assert abs(record.step - STEP) < abs(ends - STEP) / 5  # first and last time alone are far off
+
+
+def test_samples_in_an_archive_and_in_cells_are_those_of_the_csv(sample_data, tmp_path, write):
+    path = sample_data / "scope-files" / "picoscope.csv"
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.write(path, "b.csv")
+    t, volts = np.loadtxt(path, delimiter=",", skiprows=3).T
+    for one in (tmp_path / "a.zip", write(json.dumps({"t [ms]": t.tolist(), "U [V]": volts.tolist()}), "a.json")):
+        record = waveform(one)
+        assert (record.start, record.step) == (START, pytest.approx(STEP, rel=1e-12))  # of the times in ms
+        np.testing.assert_array_equal(record.samples(record.signals[0].name), volts)
 
 
 def rows(n=20, first=0):
