@@ -74,8 +74,10 @@ def plan_of(scene: Scene, spins: Span | None = None, masses: Span | None = None,
     spins, masses = spins or USUAL_SPINS, masses or _usual_masses(scene, floating_masses(scene))
     _check(spins, masses)
     axes = (Axis(MASS, np.linspace(*masses)), Axis(SPIN, np.linspace(*spins)))
-    # from the given place: some of the masses of a map float nowhere
-    return cut(Plan(scene.changed({"start.place": "given"}), axes, ("survived",), duration))
+    floating = stability_of(scene).floating if scene.start.place == "equilibrium" else None
+    here = {"start.position_m": [0.0, 0.0, floating.height], "start.velocity_m_s": [0.0, 0.0, 0.0]} if floating else {}
+    # from the place of the scene's own top: some of the masses of a map float nowhere
+    return cut(Plan(scene.changed({"start.place": "given", **here}), axes, ("survived",), duration))
 
 
 def floating_masses(scene: Scene) -> tuple[tuple[float, float], ...]:
