@@ -58,8 +58,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
         raise TrialFailed("no spin is found")
     turns = np.abs(flight.yaw) / (2 * np.pi)
     one, picture = (int(by.integers(of.time.size)) for of in (found.turning, found))
-    of_second = found.turning.time[one], abs(found.turning.spin[one]), found.turning.u[one]
-    time, second, u = (float(value) for value in of_second)
+    time, second, u = (float(of[one]) for of in (found.turning.time, abs(found.turning.spin), found.turning.u))
     return [
         pull_of("spin", found.spin, _slope(flight.times, turns, found.turning.middle + late, seconds / 2)),
         pull_of("spin of a second", Estimate(second, u, "Hz"), _slope(flight.times, turns, time + late, _HALF_S)),
@@ -75,9 +74,8 @@ def _beside(flight: Flight, seconds: float, by: np.random.Generator, seed: int, 
     low = (camera.away[0], camera.away[1] - 45)  # the top above the middle of the picture, so that the base is seen
     camera = replace(camera, pose=BESIDE, stem=0.0, height=224, away=low)
     path = film(folder / "side.mp4", camera, flight, phone_times(seconds), seed=seed)
-    analysis = ANALYSES["video"]
     seen = {"rim_m": 2 * RIM, "beside": True, "line_time_s": camera.line_time}
-    (found,) = analysis.analyze([path], analysis.options_from(seen)).runs
+    (found,) = (analysis := ANALYSES["video"]).analyze([path], analysis.options_from(seen)).runs
     if found.turning is None or found.scale.value is None:
         raise TrialFailed("no spin is found from beside")
     turns = np.abs(flight.yaw) / (2 * np.pi)
