@@ -208,13 +208,12 @@ class PracticeDrive:
         with contextlib.suppress(InstrumentError):  # the virtual one is always there; the next step comes
             self.generator.frequency = round(here + step, 6)
 
-    def lose(self) -> bool:
-        """Take note that the top has fallen.  Returns whether the drive held it by then."""
-        hold = self._hold
-        driven = hold is not None and not hold.is_lost
-        if hold is not None:
-            hold.is_lost = True
-        return driven
+    def lose(self) -> str:
+        """Take note that the top has fallen.  Returns how the drive held it by then."""
+        hold, self._hold = self._hold, None
+        if hold is None:
+            return ""
+        return ", after its drive had lost it" if hold.is_lost else ", where its drive held it"
 
     def take_count(self, spin: float | None) -> None:
         """Go on with taking hold of the top, or see whether it follows, just after a count.

@@ -37,7 +37,7 @@ def _why_not(found: Stability, *, hides: bool) -> str:
 
 
 def cause_of_fall(
-    scene: Scene, spin_hz: float | None, after_s: float | None, *, driven: bool = False, hides: bool = False
+    scene: Scene, spin_hz: float | None, after_s: float | None, *, held: str = "", hides: bool = False
 ) -> str:
     """Return why a top fell.
 
@@ -45,11 +45,11 @@ def cause_of_fall(
         scene: as it was when it fell.
         spin_hz: with which it fell [Hz]; None: it was never counted.
         after_s: time since it was put there [s]; None: the run that is recorded says when it fell.
-        driven: whether a drive held it.
+        held: how a drive held it.
         hides: whether the masses that float are to be found.
     """
     after = "" if after_s is None else Text(" after {seconds:.0f} s", seconds=after_s)
-    if scene.base.tilt_rad:
+    if base_deg := abs(math.degrees(scene.base.tilt_rad)):
         scene = scene.changed({"base.tilt_rad": 0.0})  # the theory is of an upright base
     found = _stability(scene.model_dump_json())
     if found.floating is None or not found.floating.spins:
@@ -57,22 +57,19 @@ def cause_of_fall(
     low, high = found.floating.spins[0]
     if spin_hz is None:
         return Text("it fell{after}, before its spin was counted", after=after)
-    fell = Text("it fell at {spin:.1f} Hz{after}", spin=spin_hz, after=after)
+    fell = Text("it fell at {spin:.1f} Hz{after}{held}", spin_hz, after, held)
     if spin_hz < _NEAR_LOW * low:
         across, along = scene.top.moment_tilt
         tilt = math.degrees(math.atan2(across, along))
         leans = Text(", but the moment of this one is tilted by {tilt:.1f}°, and it leans ever more before", tilt=tilt)
-        return Text(
-            "{fell}{held}: the spin holds an upright top down to {low:.1f} Hz{leans}",
-            fell=fell,
-            held=", where its drive held it" if driven else "",
-            low=low,
-            leans=leans if tilt else "",
-        )
+        said = "{fell}: the spin holds an upright top down to {low:.1f} Hz{leans}"
+        return Text(said, fell=fell, low=low, leans=leans if tilt else "")
     if spin_hz > _NEAR_HIGH * high:
         return Text(
             "near {high:.1f} Hz the top is too stiff for its axis to follow the field, which alone keeps it: {fell}",
             high=high,
             fell=fell,
         )
+    if base_deg:
+        return Text("the base leans by {tilt:.2g}°, and the top slides off: {fell}", base_deg, fell)
     return Text("the spin could hold it, from {low:.1f} to {high:.1f} Hz, so it swung too far: {fell}", low, high, fell)

@@ -145,7 +145,7 @@ class PracticeProcess:
             ask.Pause: lambda command: setattr(self, "_paused", command.on),
             ask.StopRun: self._stop_run,
             ask.RecordRun: self._want_run,
-            ask.PutBack: lambda _: self.top.put_back(),
+            ask.PutBack: self._put_back,
             ask.ChangeBench: self._change_bench,
             ask.TakeSeed: self._take_seed,
             ask.BeginTask: self._begin_task,
@@ -210,11 +210,11 @@ class PracticeProcess:
         after, runs = self.top.look(), self._session is not None
         if after is None:
             return
-        hides, driven = bool(self.tasks.name), self.drive.lose()
+        hides, held = bool(self.tasks.name), self.drive.lose()
         seen = None if runs else after  # the run says in its own words when that was
         # of a top that swings too far the counter misses pulses
         spin = None if self.top.spin_hz is None else self.top.world.spin_of_fall()
-        why = cause_of_fall(self.top.scene, spin, seen, driven=driven, hides=hides)
+        why = cause_of_fall(self.top.scene, spin, seen, held=held, hides=hides)
         if runs:
             self._fell = why
         else:
@@ -347,6 +347,10 @@ class PracticeProcess:
         else:
             self.top.hide({})  # with a top that a task has left
             self._voice.text = ""
+
+    def _put_back(self, _: ask.PutBack) -> None:
+        self.drive.lose()  # the next top was never held
+        self.top.put_back()
 
     def _take_seed(self, command: ask.TakeSeed) -> None:
         seed = seed_of_group(command.group, self._options.seed or 1) if command.seed is None else command.seed

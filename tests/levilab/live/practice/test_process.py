@@ -328,14 +328,17 @@ def test_a_top_falls_near_the_edge_and_is_put_back(tmp_path):
     assert script.spins(36.0, 39.0)[-1][2] == pytest.approx(25.0, abs=0.5)
 
 
-def test_a_held_top_that_falls_for_want_of_spin_is_not_said_to_be_lost_by_the_drive(tmp_path):
-    down = TuneDrive(frequency_hz=20.0, ramp_hz_per_s=0.3)
+@pytest.mark.parametrize(("tune", "end", "before", "held"), [
+    (TuneDrive(frequency_hz=20.0, ramp_hz_per_s=0.3), 45.0, "the top follows the drive at ", "where its drive held"),
+    (TuneDrive(amplitude_vpp=0.5), 70.0, "the drive has lost the top: ", "after its drive had lost"),
+])  # fmt: skip
+def test_a_fall_says_whether_the_drive_held_the_top(tmp_path, tune, end, before, held):
     script = carry_out(
-        tmp_path, (2.0, MatchDrive()), (2.1, SwitchDrive(on=True)), (20.0, down), (45.0, None), start_hz=26.0
+        tmp_path, (2.0, MatchDrive()), (2.1, SwitchDrive(on=True)), (20.0, tune), (end, None), start_hz=26.0
     )
-    follows, fell = script.said("message")[-2:]
-    assert follows.startswith("the top follows the drive at ")
-    assert ", where its drive held it: the spin holds an upright top down to 20.9 Hz" in fell
+    earlier, fell = script.said("message")[-2:]
+    assert earlier.startswith(before)
+    assert f", {held} it: the spin holds an upright top down to 20.9 Hz" in fell
 
 
 @pytest.mark.parametrize(
@@ -343,7 +346,8 @@ def test_a_held_top_that_falls_for_want_of_spin_is_not_said_to_be_lost_by_the_dr
     [
         ({}, 82.0, "near 83.7 Hz the top is too stiff for its axis to follow the field"),
         ({}, 40.0, "the spin could hold it, from 20.9 to 83.7 Hz, so it swung too far: it fell at 40.0 Hz after 7 s"),
-        ({"base.tilt_rad": 0.02}, 22.0, "it fell at 22.0 Hz after 7 s: the spin holds an upright top down to 20.9 Hz"),
+        ({"base.tilt_rad": -0.02}, 40.0, "the base leans by 1.1°, and the top slides off: it fell at 40.0 Hz after 7"),
+        ({"base.tilt_rad": 0.02}, 22.0, "it fell at 22.0 Hz after 7 s, where its drive held it: the spin holds"),
         ({"top.mass_kg": 0.0252}, 30.0, "the top is too heavy for this base: 25.20 g, and 24.25 to 24.97 g float, h"),
         ({"top.mass_kg": 0.0242}, 30.0, "the top is too light for this base: 24.20 g, and 24.25 to 24.97 g float, h"),
         ({}, None, "it fell after 7 s, before its spin was counted"),
@@ -351,7 +355,7 @@ def test_a_held_top_that_falls_for_want_of_spin_is_not_said_to_be_lost_by_the_dr
 )
 def test_a_fall_is_told_with_its_cause(changes, spin, said):
     scene = read_scene("practice").changed(changes)
-    assert cause_of_fall(scene, spin, 7.0, driven=False).startswith(said)
+    assert cause_of_fall(scene, spin, 7.0, held=", where its drive held it").startswith(said)
 
 
 @pytest.mark.parametrize(("tilt", "stands"), [(0.02, False), (0.0, True)])
