@@ -12,8 +12,8 @@ from analysis.uncertainty import Estimate
 
 #: Where the precession and the vertical swing are looked for [Hz].
 PRECESSION_HZ, VERTICAL_HZ = (3.0, 20.0), (0.5, 3.0)
-#: A vertical swing of 0.5 mm moves the precession by 1.4 % in its own rhythm; the mean of a second by 0.2 % (rms).
-_MODULATED = 0.002
+#: A vertical swing of 0.5 mm moves the precession by 1.4 % in its own rhythm, of which a second keeps half, relative.
+_MODULATED = 0.007
 #: Share of the pictures in which a dot is seen, at least.
 _SEEN = 0.8
 
