@@ -74,8 +74,9 @@ def _beside(flight: Flight, seconds: float, by: np.random.Generator, seed: int, 
     low = (camera.away[0], camera.away[1] - 45)  # the top above the middle of the picture, so that the base is seen
     camera = replace(camera, pose=BESIDE, stem=0.0, height=224, away=low)
     path = film(folder / "side.mp4", camera, flight, phone_times(seconds), seed=seed)
+    analysis = ANALYSES["video"]
     seen = {"rim_m": 2 * RIM, "beside": True, "line_time_s": camera.line_time}
-    (found,) = (analysis := ANALYSES["video"]).analyze([path], analysis.options_from(seen)).runs
+    (found,) = analysis.analyze([path], analysis.options_from(seen)).runs
     if found.turning is None or found.scale.value is None:
         raise TrialFailed("no spin is found from beside")
     turns = np.abs(flight.yaw) / (2 * np.pi)

@@ -65,11 +65,8 @@ def cause_of_fall(
         said = "{fell}: the spin holds an upright top down to {low:.1f} Hz{leans}"
         return Text(said, fell=fell, low=low, leans=leans if tilt else "")
     if spin_hz > _NEAR_HIGH * high:
-        return Text(
-            "near {high:.1f} Hz the top is too stiff for its axis to follow the field, which alone keeps it: {fell}",
-            high=high,
-            fell=fell,
-        )
+        said = "near {high:.1f} Hz the top is too stiff for its axis to follow the field, which alone keeps it: {fell}"
+        return Text(said, high, fell)
     if base_deg:
         return Text("the base leans by {tilt:.2g}°, and the top slides off: {fell}", base_deg, fell)
     return Text("the spin could hold it, from {low:.1f} to {high:.1f} Hz, so it swung too far: {fell}", low, high, fell)

@@ -374,7 +374,7 @@ def test_a_spreadsheet_or_zip_that_unpacks_to_gigabytes_is_refused(tmp_path, mon
     workbook(tmp_path / "bytes.xlsx", blank)
     with zipfile.ZipFile(tmp_path / "zip.zip", "w", zipfile.ZIP_DEFLATED) as out:
         out.writestr("a.csv", blank)
-    said, lie = ((size).to_bytes(4, "little") for size in (2 << 20, 100))  # what its directory says
+    said, lie = (size.to_bytes(4, "little") for size in (2 << 20, 100))  # what its directory says
     (tmp_path / "lying.zip").write_bytes((tmp_path / "zip.zip").read_bytes().replace(said, lie))
     for path in list(tmp_path.iterdir()):
         with pytest.raises(TableError, match=r"unpacks to .*, up to 1 MB"):
