@@ -76,7 +76,7 @@ def test_each_command_stands_after_a_dollar():
     """So that a reader tells what is typed from what is printed; tables of settings and programs have other blocks."""
     for page in (*PAGES, ROOT / "CONTRIBUTING.md"):
         text = page.read_text(encoding="utf-8")
-        assert not re.findall(r"```(sh|bash|shell|text)\n(levilab|pip|make|python|uv) ", text), page
+        assert not re.findall(r"```(sh|bash|shell|text|)\n(levilab|pip|make|python|uv) ", text), page
         for block in re.findall(r"```(?:console|shell-session)\n(.*?)```", text, re.DOTALL):
             assert block.startswith("$ "), (page, block)
 
