@@ -68,8 +68,8 @@ class LineDisplay(Display):
         self._fifths, self._prepared = 0, ""
 
     def preparing(self, text: str, fraction: float) -> None:
-        """Print a line each fifth of the way, of each part of it; none that is as the last."""
-        before, self._fifths = self._fifths, int(5 * fraction)
+        """Print a line each fifth of the way, of each part of it; none for a step back by noise, or as the last."""
+        before, self._fifths = self._fifths, max(int(5 * fraction), min(self._fifths, int(5 * fraction + 0.2)))
         if self._fifths > before and text != self._prepared:
             self._prepared = text
             self.message(text)
