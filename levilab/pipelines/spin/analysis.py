@@ -455,22 +455,22 @@ def in_a_sentence(run: SpinRun) -> str:
         at=at,
         which=run.which,
     )
-    trend = (
-        Text("Its slope through all {of} is {slope:n}.", of=f"{series.of}s", slope=with_uncertainty(run.trend))
-        if run.trend
-        else ""
-    )
+    said = "Its slope through all {of} is {slope:n}."
+    trend = Text(said, f"{series.of}s", with_uncertainty(run.trend)) if run.trend else ""
     return Sentences(way, trend, drive)
 
 
 def _about_drive(run: SpinRun) -> str:
     """Return whether the top is locked to a drive whose frequency is given, as a sentence."""
-    off = run.drive_offset
+    off, kinds = run.drive_offset, {kind for kind, *_ in run.series.phases}
     if off is None or off.value is None or not off.u:
         return ""
-    locked = abs(off.value) <= NOT_LOCKED * off.u
+    said = "The top {follows} the drive: while it is held, the spin less the drive's frequency is {off:n}{beware}."
+    if kinds and "held" not in kinds:
+        said = "The top {follows} the drive: it is never held; its mean spin less the drive's is {off:n}{beware}."
+    locked = (not kinds or "held" in kinds) and abs(off.value) <= NOT_LOCKED * off.u
     return Text(
-        "The top {follows} the drive: while it is held, the spin less the drive's frequency is {off:n}{beware}.",
+        said,
         "is locked to" if locked else "is not locked to",
         with_uncertainty(off),
         " (if it is the spin: the drive's coil has a field of this frequency, too)" if run.line and locked else "",
