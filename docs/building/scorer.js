@@ -1,5 +1,11 @@
 // How the search of the site ranks pages: that of the typed word first, users' pages before those of developers.
 // The weights are those of Sphinx (searchtools.js); `score` adds the page's own factor.
+/** Words as they are typed → as the pages have them. */
+var typedAs = {wifi: "wi-fi", wlan: "wi-fi", karman: "kármán"};
+/** What is typed in the letters of the index: indices and powers as plain digits, ⁄ as /. */
+var folded = (typed) => typed.normalize("NFKC").replaceAll("⁄", "/").replace(/\p{Letter}+/gu, (word) => typedAs[word.toLowerCase()] ?? word);
+// in the place of Sphinx's own
+var splitQuery = (query) => folded(query).split(/[^\p{Letter}\p{Number}_\p{Emoji_Presentation}]+/gu).filter((term) => term);
 var Scorer = {
   // page → the words for which it is the first
   pages: {
@@ -7,13 +13,13 @@ var Scorer = {
     "class": ["students", "student", "teacher", "worksheet", "grading", "seed"],
     "sound-card": ["microphone", "sound card", "speaker"],
     "glossary": ["lock", "locked", "c3/2", "c32", "uncertainty", "aicc", "undecided", "gate"],
-    "phone": ["smartphone", "phyphox"], "notebook": ["jupyter", "python"], "messages": ["warning", "error"],
+    "phone": ["smartphone", "phyphox", "wi-fi"], "physics": ["von kármán", "kármán"], "notebook": ["jupyter", "python"], "messages": ["warning", "error"],
     "live": ["share", "qr code"], "install": ["windows", "mac"], "simulator": ["simulate"], "practise": ["virtual bench"],
     "report": ["pdf"], "tutorial": ["tutorial"], "video": ["film"], "animation": ["animation"],
     "instruments/oscilloscope": ["oscilloscope"], "experiments/washers": ["washers"], "experiments/spin": ["tape", "lamp"],
   },
   score: ([page, title, anchor, description, score, file]) => {
-    const asked = (new URLSearchParams(location.search).get("q") || "").trim();
+    const asked = folded(new URLSearchParams(location.search).get("q") || "").trim();
     const typed = asked.toLowerCase();
     if (Scorer.pages[page]?.includes(typed)) return 1000 + score;
     // a name of the reference that is typed whole, as of a function or a command

@@ -13,12 +13,12 @@ from support.paths import ROOT
 SITE = ROOT / "build/site"
 #: Page → what is typed, and it is the first.
 FIRST = {
-    "phone": ("phyphox", "smartphone"),
+    "phone": ("phyphox", "smartphone", "wifi"),
     "open-my-file": ("excel", "xlsx", "labview", "arduino", "logger pro", "csv", "audio"),
     "sound-card": ("microphone", "sound card", "speaker"),
     "install": ("windows", "install", "mac"),
     "class": ("grading", "worksheet", "seed", "teacher", "student"),
-    "glossary": ("lock", "C3/2", "c32", "uncertainty", "AICc", "undecided", "gate"),
+    "glossary": ("lock", "C3/2", "C₃/₂", "c32", "uncertainty", "AICc", "undecided", "gate"),
     "live": ("share", "QR code"),
     "messages": ("warning", "error"),
     "experiments/washers": ("washers",),
@@ -26,7 +26,7 @@ FIRST = {
     "instruments/oscilloscope": ("oscilloscope",),
     "pymeasure": ("pymeasure",), "animation": ("animation",), "report": ("pdf",), "notebook": ("jupyter",),
     "simulator": ("simulate",), "practise": ("virtual bench",),
-    "tutorial": ("first experiment",), "tutorial-de": ("Präzession",),
+    "tutorial": ("first experiment",), "physics": ("von karman",), "tutorial-de": ("Präzession",),
     "reference/python-simulator": ("simulate_many",),
     "reference/python-analyses": ("spin_at_fall",),
     "reference/python-spin": ("SpinDown",),
