@@ -20,9 +20,8 @@ _ALIKE = 0.65
 #: What others call an option → names that it may have here.
 _OTHERS = {
     **dict.fromkeys(("sigma", "yerr", "dy", "u"), ("reading_u",)),
-    "t": ("time", "x"),
-    "x": ("time",),
-    **dict.fromkeys(("f", "y"), ("frequency",)),
+    **dict.fromkeys(("t", "x"), ("time", "x")),
+    **dict.fromkeys(("f", "y", "freq", "frequency"), ("frequency", "spin_frequency_hz")),
     **dict.fromkeys(("model", "law"), ("laws",)),
 }
 #: The same, where the value is another one.
@@ -52,11 +51,8 @@ def meant(name: str, known: Iterable[str]) -> str:
     if other in names:
         return f"take {other}, {how}"
     others = [one for one in _OTHERS.get(name, ()) if one in names]
-    near = (
-        others
-        or [one for one in names if {*name.split("_")} <= {*one.split("_")}]
-        or get_close_matches(name, names, n=3, cutoff=_ALIKE)
-    )
+    whole = [one for one in names if {*name.split("_")} <= {*one.split("_")}]
+    near = others or whole or get_close_matches(name, names, n=3, cutoff=_ALIKE)
     if near:
         return f"did you mean {' or '.join(near)}?"
     more = f" and {len(names) - _MOST_NAMES} more, which dir() lists" * (len(names) > _MOST_NAMES)
@@ -144,8 +140,7 @@ class Helpful:
             if name in self._contents:
                 return self._contents[name]
             advice = type(self).instead.get(name) or self._elsewhere(name)
-            public = [one for one in dir(self) if not one.startswith("_")]
-            text = f"take {advice}" if advice else meant(name, public)
+            text = f"take {advice}" if advice else meant(name, (one for one in dir(self) if not one.startswith("_")))
             with border:
                 raise NoSuchAttribute(f"{type(self).__name__} has no {name!r}: {text}")
 

@@ -524,7 +524,7 @@ class AnalysisResult(Exportable):
         of_panel = ax is not None or title is not None or model is not None or logy
         what = what or ("fit" if of_panel else "all")
         if what not in {"all", "fit", "residuals"}:
-            raise UsageError("what", "all, fit or residuals is expected", value=what)
+            raise UsageError("what", meant(what, ("all", "fit", "residuals")), value=what)
         if what == "all":
             if of_panel:
                 raise UsageError("what", "ax, title, model and logy go with one panel: fit or residuals", value=what)

@@ -71,6 +71,7 @@ class RecordedRun(Exportable, Run):
     instead: ClassVar[Mapping[str, str]] = {
         "to_csv": "df.to_csv(path), or export('run.csv')",
         "values": "df.to_numpy(), or analyze().values",
+        "truth": "record.synthetic_how",
     }
 
     @bare
