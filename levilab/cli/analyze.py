@@ -34,6 +34,8 @@ class AnalyzeGroup(NamedLast):
         """Insert the name `each` unless the first word is, or was meant as, the name of an analysis."""
         if args[:1] not in [[name] for name in ctx.help_option_names]:
             args = self.with_name_first(args) or [_EACH, *args]
+        if Path(args[0]).exists() and all(word.startswith("-") for word in args[1:]):
+            message(Text("{name:s} is the analysis; levilab analyze ./{name:s} reads what has its name", name=args[0]))
         return super().parse_args(ctx, args)
 
 

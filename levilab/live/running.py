@@ -102,7 +102,8 @@ def fit_so_far(
     try:
         found = method(by_name, groups.size, settings, events)
     except TooFewReadings as error:
-        why = text_of(error) if ended else "it begins after some readings"
+        so_far = Text("it begins with {needed} readings; so far {seen}", error.needed, error.seen)
+        why = text_of(error) if ended else so_far
         return Running("no fit" if ended else "no fit yet", (why,))
     except (AnalysisError, KeyError) as error:
         missing = Text("there is no column {name}", name=str(error))

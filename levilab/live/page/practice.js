@@ -208,6 +208,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     write("answers-wrong", "");
     write("task-title", phrase(row.title));
     for (const place of ["task-does", "goal"]) write(place, phrase(row.does));
+    if (row.measures) Object.assign(by("experiment"), {value: row.measures}).dispatchEvent(new Event("change"));
     const answers = Object.entries(row.answers);
     put(by("task-share"), {hidden: answers.length > 0});
     by("answers").replaceChildren(...answers.map(([text, value]) => {

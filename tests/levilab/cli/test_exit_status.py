@@ -186,6 +186,11 @@ def test_only_titles_of_the_analysis_that_was_asked_for_are_named(tmp_path):
     assert "(height_m, flux_density_t, z [mm], B [mT] …)" in command("analyze", "field", "odd.csv", cwd=tmp_path).err
 
 
+def test_what_has_the_name_of_an_analysis_is_no_path_without_its_folder(tmp_path):
+    (tmp_path / "limit").touch()
+    assert "levilab analyze ./limit reads" in command("analyze", "limit", "--json", cwd=tmp_path).err
+
+
 def test_the_virtual_bench_is_no_advice_to_those_who_use_it(place):
     advice = ", or try --mock"
     assert advice in command("acquire", "spin", "--bench", "other.toml", cwd=place).err

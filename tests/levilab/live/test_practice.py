@@ -138,8 +138,10 @@ def change_what_if(page):
     page.click("#usual")
     until(page, f"levilab.data.bench.what_if.washers_g === 0.2 && {slider}.value === '0.2'")
     page.get_by_role("tab", name="Measure").press("ArrowLeft")  # the last one
-    page.get_by_role("button", name="Hold it for three minutes").click()
+    page.get_by_role("button", name="Count the stem").click()
     until(page, "document.getElementById('guide').hidden && !levilab.data.bench.drive.output")  # each begins without it
+    assert page.input_value("#experiment") == "precession", "what the task asks for"
+    page.select_option("#experiment", "spin")
     page.click("#leave-task")
     until(page, "!document.getElementById('guide').hidden && document.getElementById('task').hidden")
     page.get_by_role("tab", name="Measure").click()

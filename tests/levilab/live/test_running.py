@@ -24,6 +24,8 @@ def test_the_forecast_is_of_the_law_and_does_not_run_into_the_resonance():
     noise = np.random.default_rng(2).normal(0, 0.005, time.size)
     found = spin_down({"time_s": time, "spin_frequency_hz": spin + noise}, 1)
     curve, last = found.curve, float(time[-1])
+    two = Groups(1, *[np.array([time, spin])[:, :2]] * 3)
+    assert fit_so_far("spin", ("time_s", "spin_frequency_hz"), two).lines == ("it begins with 3 readings; so far 2",)
     assert found.head.startswith(f"{found.look} law, the best so far   ω̇ = ")
     assert found.dashed == "dashed: the law alone; the count also sees the wobble"
     # under the drag of a disc ω^(−1/2) grows evenly, by C/2; 1 s: the fit's C is good to 1 %, of 25 to 30 s

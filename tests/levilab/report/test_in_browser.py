@@ -126,6 +126,8 @@ def test_on_a_telephone_the_page_is_not_moved_sideways(browser, report, script):
         assert background == "rgb(20, 24, 28)"
         card = page.locator(".card").first.evaluate("card => getComputedStyle(card).backgroundColor")
         assert card == "rgb(255, 255, 255)"  # figures are drawn in black
+        joined = page.locator("sup").first.evaluate("sup => getComputedStyle(sup, '::before').content")
+        assert joined == '"\u2060"', "no line ends between a unit and its power"
         covers = page.locator(".scroll").first.evaluate("table => getComputedStyle(table).backgroundAttachment")
         assert covers.startswith("local, local, scroll, scroll")  # the shades of what goes on beyond an edge
 
