@@ -31,13 +31,11 @@ class Origin(Generic[Opt]):
         options: how they were made.
         text: for people.
         budget: what the uncertainties of the input's numbers are made of; None: to be worked out from what was found.
-        lacks_result: whether it was analyzed since no result of it was found.
     """
 
     options: Opt
     text: str = NOW
     budget: tuple[Budget, ...] | None = None
-    lacks_result: bool = False
 
 
 @dataclass(frozen=True)

@@ -376,7 +376,7 @@ class Analysis(Needs[Any], Generic[A]):
             options = replace(self._options(earlier), **own)
         else:
             return self._read_one(source, earlier)
-        origin = Origin(options, Text(FOR_THIS_PAGE, why=why), lacks_result=earlier is None)
+        origin = Origin(options, Text(FOR_THIS_PAGE, why=why))
         return source, self.find_in(source, options), origin
 
     def _read_one(self, source: Source[Any], earlier: Earlier[Any]) -> Done:

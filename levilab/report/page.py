@@ -20,7 +20,6 @@ from levilab.pipelines.sources import SkippedRuns, data_files
 from levilab.pipelines.suits import recall_suiting, remarks, texts_of
 from levilab.present.clock import local
 from levilab.present.document.blocks import Document, in_language_of_reader
-from levilab.present.numbers import list_in_words
 from levilab.report.document import Results, document_of, notebook_blocks
 from levilab.report.html.page import fragment_of, page_of
 from levilab.report.kinds import KINDS, Kind
@@ -183,27 +182,10 @@ def _values(results: Results, others: Found, folder: Path) -> Iterator[Values]:
 
 
 def _remarks(results: Results, others: Found) -> Iterator[str]:
-    """Yield what lies there and is not in the report, and what has no result."""
+    """Yield what lies there and is not in the report."""
     reported = {kind.experiment for kind, _ in others}
     said = remarks([found.remarks for _, found in results])
     yield from texts_of([one for one in said if not (isinstance(one, SkippedRuns) and one.experiment in reported)])
-    yield from _without_result(results)
-
-
-def _without_result(results: Results) -> Iterator[str]:
-    """Yield what was analyzed for the page since it has no result where it lies."""
-    lacking = {
-        source.name: None
-        for _, found in results
-        for source, origin in zip(found.sources, found.origins, strict=True)
-        if origin.lacks_result
-    }
-    if lacking:
-        yield Text(
-            "no result lies beside {runs}: analyzed for the page; if levilab analyze wrote one elsewhere (`out`), give "
-            "that folder or file",
-            runs=list_in_words([*lacking]),
-        )
 
 
 def render(results: Results) -> str:
