@@ -16,6 +16,9 @@ from levilab.present.tables import Table, table
 from levilab.present.terminal import draw, terminal
 from levilab.texts.text import Sentences, Text, in_language
 
+#: Lines of the axis that the terminal shows; the report and --json have all.
+MOST_LINES = 8
+
 
 def print_motion(summary: Summary, console: Console | None = None) -> None:
     """Print the end of the motion, its numbers, the lines of the axis, the errors, and the warnings.
@@ -27,11 +30,13 @@ def print_motion(summary: Summary, console: Console | None = None) -> None:
     out = console or terminal()
     out.print(f"[bold]{escape(in_language(headline(summary)))}[/bold]")
     out.print(draw(table("", ("", ""), (*_motion_facts(summary), *_quality_facts(summary)))))
-    if summary.lines.lines:
+    if count := len(summary.lines.lines):
         out.print(draw(_lines_table(summary)))
         resolution, until = summary.lines.resolution, summary.lines.until
         of = Text(", of the first {s:.3g} s", s=until) if until < 0.99 * summary.end else ""
-        out.print(in_language(Text("resolution {hz:.2g} Hz{of}", hz=resolution, of=of)))
+        several = Text("; {shown} of {all} lines, the strongest; --json has all", shown=MOST_LINES, all=count)
+        more = several if count > MOST_LINES else ""
+        out.print(in_language(Text("resolution {hz:.2g} Hz{of}{more}", hz=resolution, of=of, more=more)))
     for note in summary.notes:
         out.print(f"[yellow]{in_language('note:')}[/yellow] {escape(in_language(note))}")
 
@@ -96,7 +101,7 @@ def _lines_table(summary: Summary) -> Table:
     heads = ("frequency [Hz]", "amplitude [mrad]", "identified as")
     rows = [
         (with_decimals(line.frequency, digits), f"{1000 * line.amplitude:.3g}", line.name or "not identified")
-        for line in summary.lines.lines
+        for line in summary.lines.lines[:MOST_LINES]
     ]
     return table("Lines of the axis, n_x + i n_y", heads, rows, numbers=heads[:2])
 

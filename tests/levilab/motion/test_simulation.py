@@ -155,10 +155,10 @@ def test_a_top_that_triggers_its_drive_has_bursts_and_no_lock(capsys):
 
 def test_the_table_says_what_its_numbers_are(capsys):
     found = summary(preset("undriven"), 5.0)
-    unknown = replace(found.lines, lines=(replace(found.lines.lines[0], name="", frequency=-1e-4),))
+    unknown = replace(found.lines, lines=(replace(found.lines.lines[0], name="", frequency=-1e-4),) * 9)
     print_motion(replace(found, lines=unknown, energy_change=0.0))
     shown = capsys.readouterr().out
-    for words in ("steps of at most ", "exactly constant", "not identified", "resolution 0.4 Hz", "mrad, 2"):
+    for words in ("steps of at most ", "exactly constant", "not identified", "0.4 Hz; 8 of 9 lines", "mrad, 2"):
         assert words in shown
     assert next(line for line in shown.splitlines() if "not identified" in line).split()[0] == "0.00", (
         "zero has no sign"
