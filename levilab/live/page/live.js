@@ -190,7 +190,7 @@ function markFall() {
   dirty.plot = true;
 }
 
-/** After a run that is over, a person puts the top back or switches the drive on: the last minutes show what it does. */
+/** After a run that is over, a person puts the top back, drives it or changes it: the last minutes show what it does. */
 function lookAtBench() {
   if (!practice || data.bench?.busy || data.about?.status === "running") return;
   by("drawn").value = "minutes";
@@ -666,7 +666,7 @@ async function begin() {
 /** Give a command to the bench for practice. */
 function give(wanted) {
   if (paused && wanted.do !== "analyze") return PAUSED;
-  if (wanted.do === "put the top back") lookAtBench();  // the bench itself puts it back after some runs, whose readings stay
+  if (["put the top back", "tune the drive", "change the bench"].includes(wanted.do)) lookAtBench();  // the bench itself puts it back after some runs, whose readings stay
   return command(wanted, token);
 }
 

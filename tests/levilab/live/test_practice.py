@@ -327,8 +327,10 @@ def test_after_a_run_the_last_minutes_show_what_a_person_does(starting, page, tm
     assert page.evaluate("document.getElementById('plot').clientHeight") >= 190
     assert page.evaluate("document.documentElement.scrollHeight") == 650
     page.route("**/do?*", lambda route: route.fulfill(json={"number": 1}))
-    page.click("#back")
-    until(page, f"{is_of_minutes} && document.body.dataset.state === 'idle'")
+    for button in ("back", "usual"):
+        page.evaluate(f"document.getElementById('{button}').click()")
+        until(page, f"{is_of_minutes} && document.body.dataset.state === 'idle'")
+        page.select_option("#drawn", "all")
 
 
 def test_a_result_that_was_closed_early_is_opened_again(starting, page, tmp_path, monkeypatch):
