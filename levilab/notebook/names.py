@@ -23,6 +23,7 @@ _OTHERS = {
     **dict.fromkeys(("t", "x"), ("time", "x")),
     **dict.fromkeys(("f", "y", "freq", "frequency"), ("frequency", "spin_frequency_hz")),
     **dict.fromkeys(("model", "law"), ("laws",)),
+    "n": ("exponent",),
 }
 #: The same, where the value is another one.
 _OTHER_VALUES = {"weights": ("reading_u", "the standard uncertainty, 1/weights, or a third array")}

@@ -99,12 +99,16 @@ class Compared:
 
     @property
     def truth(self) -> tuple[float, float] | None:
-        """The mean of the truths, and the distance of the class's mean from it in u; None where one is not known."""
-        known = [truth for use, truth in zip(self.used, self.truths, strict=True) if use]
-        if self.mean is None or None in known:
+        """The mean of the truths, and that of the distances from them in its u; None where one is not known.
+
+        How one top differs from another is in no distance.
+        """
+        rows = zip(self.estimates, self.truths, self.widths, self.used, strict=True)
+        used = [(one, truth, width) for one, truth, width, use in rows if use and one]
+        if self.mean is None or any(truth is None for _, truth, _ in used):
             return None
-        truth = sum(known) / len(known)  # type: ignore[arg-type]
-        return truth, (self.mean.value - truth) / self.mean.u  # type: ignore[operator]
+        values, truths, u = np.array([(one.value, truth, (one.u or 0.0) * width) for one, truth, width in used]).T
+        return float(truths.mean()), float((values - truths).sum() / np.linalg.norm(u))
 
     @cached_property
     def from_class(self) -> tuple[float | None, ...]:

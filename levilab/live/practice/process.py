@@ -356,10 +356,13 @@ class PracticeProcess:
         seed = seed_of_group(command.group, self._options.seed or 1) if command.seed is None else command.seed
         if seed is None or seed == self.top.seed:
             return
+        task = self.tasks.name
         self._leave_task()
         self.drive.lose()  # the other top was never held
         self.top.take_seed(seed)
         self._voice.message(Text("seed {seed} has drawn another top and another base: the top floats", seed=seed))
+        if task:
+            self._begin_task(ask.BeginTask(task=task))
 
     def _begin_task(self, command: ask.BeginTask) -> None:
         self._leave_task()
@@ -387,7 +390,7 @@ class PracticeProcess:
             mock=True,
             out=Path(self._options.out),
             seed=self.top.seed,
-            group=command.group.strip() or None,
+            group=self.tasks.label(command.group.strip()) or None,
             note=command.note,
             settings=settings_for(plan, scene),
         )

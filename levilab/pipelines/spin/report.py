@@ -234,7 +234,7 @@ def series_table(source: Source[Records], run: SpinRun, most: int) -> Table:
         (*clocks[k], with_decimals(series.time[k], 2), f"{series.frequency[k]:.4f}", plain(1e3 * float(series.u[k]), 2))
         for k in range(0, len(series), step)
     ]
-    which = "each" if step == 1 else Text("every {step}th", step=step)
+    which = "each" if step == 1 else Text("one in {step}", step=step)
     title = Text("Frequency against time, {which} of {n} {of}", which=which, n=len(series), of=f"{series.of}s")
     return table(title, heads, rows, numbers=heads)
 

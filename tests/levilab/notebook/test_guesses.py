@@ -314,6 +314,7 @@ REFUSED = {
     "levilab.analyze((t, f, 'u'))": "an array of u, …: numbers are expected",
     "levilab.analyze('none/*.csv')": "no file or folder in",
     "levilab.analyze(levilab.runs(folder))": "analyze each kind by itself",
+    "result.models['power']['n']": "did you mean exponent",
     "result.plot('residual')": "did you mean residuals?",
     "result.plot('fit', model='disk')": "known are stokes, newton, disc",
     "result.plot('all', ax=ax)": "go with one panel",

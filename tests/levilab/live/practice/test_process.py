@@ -470,8 +470,8 @@ def test_the_stem_is_counted_by_the_precession(tmp_path):
 
 
 def test_the_exponent_is_measured_and_neither_guessed_nor_found_by_elimination(tmp_path):
-    begin = (0.5, AnswerTask(value=1.0)), (1.0, BeginTask(task="guess")), (2.0, AnswerTask(value=1.0))
-    answers = [(4.0 + k, AnswerTask(value=2.0)) for k in range(9)]
+    begin = (0.5, AnswerTask(value=1.0)), (1.0, BeginTask(task="guess")), (1.5, TakeSeed(seed=7))
+    answers = [(time, AnswerTask(value=1.0)) for time in (2.0, *range(4, 13))]
     script = carry_out(tmp_path, *begin, *answers, (14.0, None), script=Measured)
     refused = [text.partition(" ")[0] for text in script.said("refused")]
     wrong = refused.count("n")
@@ -487,6 +487,13 @@ def test_each_hidden_drag_slows_the_top_as_the_usual_one_at_first(chance, n):
     drag = TASKS["guess"].hidden(chance)
     rate = drag["drag.coefficient"] * (2 * math.pi * 30.0) ** n
     assert rate == pytest.approx(0.70, rel=0.02)
+
+
+def test_a_run_with_a_hidden_top_is_none_of_its_groups_others():
+    tasks = Tasks(0)
+    assert tasks.label("Group 7") == "Group 7"
+    tasks.begin("guess")
+    assert [tasks.label("Group 7"), tasks.label("")] == ["Group 7: Find n", "Find n"]
 
 
 def test_a_goal_has_to_be_there_without_a_break():

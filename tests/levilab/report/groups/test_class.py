@@ -58,6 +58,8 @@ def test_each_group_is_beside_the_truth_of_its_seed(of_three):
     assert f"{np.std([1e2 * x.value for x in c32.estimates], ddof=1) / c32.mean.value:.2g} % (s.d.)" in agreement(of)
     assert c32.truths == tuple(random_scene(seed).constants[0] for seed in (3, 2, 1))
     assert all(abs(one) < 3 for one in c32.from_truth)  # each is so in 99.7 % of all seeds
+    u = np.array([one.u for one in c32.estimates])  # tops that differ by 10 % make no mean agree with the truth
+    assert c32.truth[1] == pytest.approx(u @ c32.from_truth / np.sqrt(u @ u))
     assert all(0 < group.statistics["rms_residual"] < 0.06 for group in of.groups)  # u of a reading is 0.03 Hz
     reported = of.found.combined.fit("disc").constants["c32"]
     assert (c32.mean.value, c32.mean.u) == pytest.approx((reported.value, reported.u), rel=1e-12)
