@@ -16,7 +16,7 @@ from levilab.present.tables import Table, table
 from levilab.present.terminal import draw, terminal
 from levilab.texts.text import Sentences, Text, in_language
 
-#: Lines of the axis that the terminal shows; the report and --json have all.
+#: Lines of the axis that the terminal shows; the report and the JSON have all.
 MOST_LINES = 8
 
 
@@ -34,7 +34,7 @@ def print_motion(summary: Summary, console: Console | None = None) -> None:
         out.print(draw(_lines_table(summary)))
         resolution, until = summary.lines.resolution, summary.lines.until
         of = Text(", of the first {s:.3g} s", s=until) if until < 0.99 * summary.end else ""
-        several = Text("; {shown} of {all} lines, the strongest; --json has all", shown=MOST_LINES, all=count)
+        several = Text("; {shown} of {all} lines, the strongest", shown=MOST_LINES, all=count)
         more = several if count > MOST_LINES else ""
         out.print(in_language(Text("resolution {hz:.2g} Hz{of}{more}", hz=resolution, of=of, more=more)))
     for note in summary.notes:
