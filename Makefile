@@ -30,11 +30,11 @@ demo: setup  ## the main job on the virtual bench: acquire, analyze, report (int
 	@echo 'open $(DEMO)/report.html in a browser'
 
 # mypy works beside the tests: alone it would leave a core idle
-test: setup  ## style, types, imports, and all tests but those of pages
+test: setup  ## style, types, imports, and all tests but those of pages; ALL=1: these, too
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports --no-cache
-	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest -m 'not pages' && tests=0 || tests=$$?; wait $$types && exit $$tests
+	@$(BIN)/mypy & types=$$!; $(BIN)/python -m pytest $(if $(ALL),,-m 'not pages') && tests=0 || tests=$$?; wait $$types && exit $$tests
 
 pages: setup  ## the tests in a browser, and all commands of README and docs/ one after another
 	$(BIN)/python -m pytest -m pages
