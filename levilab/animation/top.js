@@ -17,6 +17,10 @@ const SPIN = 0.05;          // half of the arrow's thickness, as a part of its r
 const AROUND = 96;          // facets around a part
 const LEAN_MOST = 1.2;      // a lean that is exaggerated goes no further [rad]
 const NEAREST = 6, FARTHEST = 120;  // distance of the camera, in drawn units
+const CLOSE_SHARE = 0.38;   // width of the close-up, as a part of the picture's
+const SEAM = 2;             // pixels of the page between the two
+const CLOSE_ASPECT = 1.6;   // of a narrower picture the close-up would take what the base needs
+const LEASH = 0.15;         // the close-up follows a top that moves further than this, as a part of half its length
 
 /**
  * Build everything that is drawn.
@@ -142,6 +146,10 @@ export function buildScene(THREE, parts, theme = "light") {
   let ribbon = RIBBON;
   const view = {
     scene, top, washers, base,
+    half: (up - lowest) / 2 * scale,
+
+    /** The middle between tip and end of the axis, into a vector. */
+    middle: (into) => into.set(0, 0, (up + lowest) / 2 * scale).applyQuaternion(leaning.quaternion).add(leaning.position),
 
     setPixel(size) {
       const radius = THINNEST / 2 * size;
@@ -246,12 +254,13 @@ export function drawnBySoftware() {
 /**
  * What is drawn on a canvas, with a camera that turns and comes nearer by mouse, touch and keys.
  *
- * Keys: arrows turn, + and − come nearer and go back, 0 puts the camera back.
+ * Keys: arrows turn, + and − come nearer and go back, 0 puts the camera back.  With a close-up the top is drawn once more
+ * on the right of a wide picture, large, from the side on which the camera is.
  *
  * @param {() => void} changed is called when the picture should be drawn again.
  * @param {number} ratio pixels of the picture in one of the page where the processor draws.
  * @returns {object} view (of buildScene), camera, theme(), and render(), reset(), orbit(around, up, nearer), resize(),
- *   setParts(parts).
+ *   setParts(parts), setCloseUp(wanted).
  */
 export function openStage(THREE, OrbitControls, canvas, parts, {changed, ratio = 1}) {
   const soft = drawnBySoftware(), dark = matchMedia("(prefers-color-scheme: dark)");
@@ -260,7 +269,11 @@ export function openStage(THREE, OrbitControls, canvas, parts, {changed, ratio =
   renderer.setPixelRatio(soft ? ratio : Math.min(devicePixelRatio || 1, 2));
   const camera = buildCamera(THREE, parts, 1), controls = new OrbitControls(camera, canvas);
   Object.assign(controls, {enablePan: false, zoomToCursor: true, minDistance: NEAREST, maxDistance: FARTHEST, maxPolarAngle: 1.62});
-  let view = buildScene(THREE, parts, theme()), placed = null;
+  const near = new THREE.PerspectiveCamera(camera.fov, 1, 1, 400), looksAt = new THREE.Vector3(), offset = new THREE.Vector3();
+  near.up.set(0, 0, 1);
+  let view = buildScene(THREE, parts, theme()), placed = null, closeUp = false;
+  /** The width of the close-up [pixels of the page]; 0: there is none. */
+  const closeWidth = (width, height) => (closeUp && width > CLOSE_ASPECT * height ? Math.round(CLOSE_SHARE * width) : 0);
 
   function reset() {
     placeCamera(THREE, camera, parts, camera.aspect);
@@ -273,12 +286,39 @@ export function openStage(THREE, OrbitControls, canvas, parts, {changed, ratio =
   function resize() {
     const [width, height] = [canvas.clientWidth, canvas.clientHeight];
     if (!width || !height) return;
+    const beside = closeWidth(width, height);
     renderer.setSize(width, height, false);
-    camera.aspect = width / height;
+    renderer.setClearColor(parts.colours[theme()].ground);
+    controls.zoomToCursor = !beside;
+    near.aspect = beside / height || 1;
+    near.updateProjectionMatrix();
+    camera.aspect = (width - beside) / height;
     if (!placed || camera.position.distanceTo(placed) < 1e-6) reset();  // a person has not moved it
     camera.updateProjectionMatrix();
     view.setPixel(pixelOf(camera, height * renderer.getPixelRatio()));
     changed();
+  }
+
+  /** Draw a part of the picture, from a place on its left edge on [pixels of the page]. */
+  function renderPart(from, width, height, seenBy) {
+    renderer.setViewport(from, 0, width, height);
+    renderer.setScissor(from, 0, width, height);
+    renderer.render(view.scene, seenBy);
+  }
+
+  function render() {
+    const [width, height] = [canvas.clientWidth, canvas.clientHeight], beside = closeWidth(width, height);
+    renderer.setScissorTest(false);
+    if (beside) renderer.clear();
+    renderer.setScissorTest(beside > 0);
+    renderPart(0, width - beside - (beside && SEAM), height, camera);
+    if (!beside) return;
+    const away = view.middle(offset).sub(looksAt).length();
+    if (away > LEASH * view.half) looksAt.add(offset.setLength(away - LEASH * view.half));
+    const distance = (1 + 2 * LEASH) * view.half / Math.tan(near.fov / 2 * TURN / 360) / Math.min(1, near.aspect);
+    near.position.copy(camera.position).sub(controls.target).setLength(distance).add(looksAt);
+    near.lookAt(looksAt);
+    renderPart(width - beside, beside, height, near);
   }
 
   /** Turn the camera by angles [rad] and come nearer by a factor. */
@@ -306,15 +346,18 @@ export function openStage(THREE, OrbitControls, canvas, parts, {changed, ratio =
   controls.addEventListener("change", changed);
   dark.addEventListener("change", () => {
     view.setTheme(theme());
-    changed();
+    resize();
   });
   new ResizeObserver(resize).observe(canvas);
   resize();
 
   return {
     get view() { return view; },
-    camera, theme, reset, orbit, resize,
-    render: () => renderer.render(view.scene, camera),
+    camera, theme, reset, orbit, resize, render,
+    setCloseUp(wanted) {
+      closeUp = wanted;
+      resize();
+    },
     setParts(described) {
       view.dispose();
       parts = described;

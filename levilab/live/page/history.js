@@ -16,19 +16,23 @@ const USUAL_HZ = [20, 35];
 const COUNTED_S = 2, JUMP_HZ = 1;
 /** The counts whose slope is shown [s]: a free top's is then known to some percent. */
 const TREND_S = 12;
+/** The chart stands still from this time after the last count on, while the top is down and the drive off [s]. */
+const RESTS_S = 60;
 /** Changes of the drive's frequency that are kept, to count its turns: a ramp makes two a second. */
 const MOST_CHANGES = 100;
 const LEFT = 58, LEAST_RIGHT_PX = 84, TOP = 10, BOTTOM = 34, GAP = 24;
 
 /** The last minutes: the drive, and each count at the middle of its gate, beside the drive of that moment. */
 export function openHistory() {
-  let drives = [], counts = [], marks = [], turns = [];  // turns of the drive: [time, turns by then, frequency]
+  let drives = [], counts = [], marks = [], rests = false, turns = [];  // turns of the drive: [time, turns by then, frequency]
   return {
     /** Each [time, drive]; NaN while it is off. */
     get drives() { return drives; },
     /** Each [time, spin, drive of that time, end of the gate]; NaN where there is a gap, or the drive was off. */
     get counts() { return counts; },
     get marks() { return marks; },
+    /** Whether the chart stands still. */
+    get rests() { return rests; },
 
     /** Take in a state of the bench, and whether no top floats.  Returns whether the chart has changed. */
     add(bench, isDown = false) {
@@ -36,9 +40,12 @@ export function openHistory() {
       if (last && now < last[0]) [drives, counts, marks, turns] = [[], [], [], []];  // another bench
       const drive = bench.drive?.output ? bench.drive.frequency_hz : NaN;
       countTurns(now, drive);
+      const rested = rests;
+      rests = isDown && !Number.isFinite(drive) && now - counts.at(-1)?.[3] > RESTS_S;
+      if (rests) return !rested;
       const changed = !last || !Object.is(last[1], drive) || now - last[0] >= NOTED_S;
       if (changed) drives.push([now, drive]);
-      const counted = !isDown && take(bench.count);
+      const counted = !isDown && take(bench.count, last ? now - last[0] : 0);
       drives = drives.filter(([time]) => time >= now - SHOWN_S);
       counts = counts.filter(([time]) => time >= now - SHOWN_S);
       marks = marks.filter(([time]) => time >= now - SHOWN_S);
@@ -81,13 +88,13 @@ export function openHistory() {
     mark(time, text) { marks.push([time, text]); },
   };
 
-  /** Take in a count that is new. */
-  function take(count) {
+  /** Take in a count that is new, a time after the state before [s]. */
+  function take(count, elapsed) {
     const last = counts.at(-1);
     if (!count || count.end_s === last?.[3]) return false;
     const middle = count.end_s - count.gate_s / 2;
     if (last && middle <= last[0]) return false;
-    if (last && (middle - last[0] > count.gate_s + COUNTED_S || Math.abs(count.frequency_hz - last[1]) > JUMP_HZ)) counts.push([middle, NaN, NaN, NaN]);
+    if (last && (middle - last[0] > count.gate_s + COUNTED_S + elapsed || Math.abs(count.frequency_hz - last[1]) > JUMP_HZ)) counts.push([middle, NaN, NaN, NaN]);
     counts.push([middle, count.frequency_hz, driveAt(middle), count.end_s]);
     return true;
   }
@@ -113,7 +120,7 @@ export function openHistory() {
  *
  * @returns the same as text.
  */
-export function drawHistory(paper, {drives, counts, marks, latest}) {
+export function drawHistory(paper, {drives, counts, marks, latest, rests}) {
   const paint = colours(), {context: c} = paper;
   const [width, height] = paper.fit();
   const right = Math.max(LEAST_RIGHT_PX, 10 + Math.max(...["top", "drive"].map((name) => c.measureText(`${phrase(name)} 00.00`).width)));
@@ -144,8 +151,8 @@ export function drawHistory(paper, {drives, counts, marks, latest}) {
   c.textAlign = "right";
   for (const mark of yMarks) c.fillText(fixed(mark, decimals(yMarks)), LEFT - 7, toY(mark));
   c.textAlign = "center";
-  for (const time of times) c.fillText(time ? `${fixed(time, 0)} s` : phrase("now"), toX(now + time), bottom + 11);
-  c.fillText(phrase("bench time before now"), (LEFT + width - right) / 2, height - 8);
+  for (const time of times) c.fillText(time ? `${fixed(time, 0)} s` : rests ? "" : phrase("now"), toX(now + time), bottom + 11);
+  c.fillText(rests ? phrase("bench time; the chart stands still while the top is down and the drive off") : phrase("bench time before now"), (LEFT + width - right) / 2, height - 8);
   upright(c, phrase("frequency [Hz]"), 11, (TOP + split) / 2);
   c.strokeStyle = paint.line;
   c.strokeRect(LEFT + 0.5, TOP + 0.5, width - LEFT - right - 1, split - TOP - 1);

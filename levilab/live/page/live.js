@@ -220,7 +220,7 @@ async function openTop() {
     for (const pieces of early) space.add(...pieces);
     window.levilab.space = space;
     space.setRate(Number(by("motion").value));
-    for (const set of [lookAtTop, leanTop, strobe]) set();
+    for (const set of [lookAtTop, closeUp, leanTop, strobe]) set();
   } catch (error) {
     space = {add: () => {}};
     put(by("no-space"), {hidden: false});
@@ -515,6 +515,7 @@ by("drawn").addEventListener("change", () => {
   dirty.plot = true;
 });
 const lookAtTop = () => space?.show?.(Object.fromEntries(["path", "spin", "height"].map((name) => [name, by(`show-${name}`).checked])));
+const closeUp = () => space?.setCloseUp?.(by("close").checked);
 const leanTop = () => space?.setLean?.(by("lean").checked ? 5 : 1);
 /** A lamp that flashes with the drive; a drive that is off leaves the light steady. */
 const strobe = () => space?.setStrobe?.(by("strobe").checked ? (time) => history.flash(time) : null);
@@ -523,6 +524,7 @@ function fillScreen() {
   else by("top").requestFullscreen?.().catch(() => {});
 }
 for (const name of ["path", "spin", "height"]) by(`show-${name}`).addEventListener("change", lookAtTop);
+by("close").addEventListener("change", closeUp);
 by("lean").addEventListener("change", leanTop);
 by("strobe").addEventListener("change", strobe);
 by("replay").addEventListener("click", () => space?.replay?.());

@@ -178,7 +178,7 @@ export async function openSpace(canvas, description) {
     },
     /** With a strobe lamp: a time → when the lamp flashed last [s]; null: in steady light. */
     setStrobe: (lamp) => { flashes = lamp; },
-    reset: stage.reset,
+    reset: stage.reset, setCloseUp: stage.setCloseUp,
     setRate: (value) => { rate = value; },
     setSpeed: (value, still) => { speed = still ? 0 : value || 1; },
     pause: (value) => { paused = value; },

@@ -1,11 +1,13 @@
 """The live view in a browser: it loads, updates, survives, and takes what a run contains for text."""
 
+import io
 import shutil
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from levilab.formats.table import read_table
 from levilab.formats.understanding import SPIN
@@ -255,6 +257,31 @@ def test_what_the_bench_publishes_is_drawn(served, page, tmp_path):
     assert until(page, f"{SAID}.includes('tape from 0 to 0 volts, laser from') && {SAID}").count("before the fall") == 1
 
 
+def test_a_wide_view_shows_the_top_from_near_too(served, page, tmp_path):
+    """It is seen half as large again and more, also where it has left the other picture."""
+    run = GrowingRun(tmp_path)
+    page.goto(address(served, run.folder.name))
+    until(page, "levilab.frames > 0")
+    space = page.locator("#space")
+
+    def widths(height, time):
+        """The widths of the blue body on the left and on the right of the picture [pixels]."""
+        pose = Poses(time, 1 / 400, np.array([[0.0, 0.0, height]]), np.array([[0.0, 0.0, 0.0, 1.0]]), np.ones(1, bool))
+        publish(served.watches[run.folder.name], pose)
+        until(page, f"levilab.space?.state && Math.abs(levilab.space.state.place[2] - {height}) < 1e-6")
+        red, _, blue = np.moveaxis(np.asarray(Image.open(io.BytesIO(space.screenshot())).convert("RGB"), int), -1, 0)
+        columns = np.flatnonzero(((blue - red > 60) & (blue > 100)).sum(axis=0) > 8)
+        return [int(np.ptp(part)) if part.size else 0 for part in np.split(columns, [np.searchsorted(columns, 400)])]
+
+    floats, close = widths(0.075, 1.0)
+    assert close > 1.5 * floats > 30
+    gone, followed = widths(0.2, 2.0)
+    assert gone == 0
+    assert followed == pytest.approx(close, abs=3)
+    page.uncheck("#close")
+    assert widths(0.075, 3.0)[0] == pytest.approx(floats, abs=3)
+
+
 #: Parts of a page that are written while it shows a number of frames.
 WRITTEN = """(frames) => new Promise((done) => {
   const written = new Set(), end = levilab.frames + frames;
@@ -422,6 +449,25 @@ def test_the_strobe_lamp_flashes_once_in_each_period_of_the_drive(shown):
     # 30.3 turns by 2.01 s: turn 31 comes 0.7/40 s later, and turn 50 at 2.5025 s
     ramp = [2.01 - 0.3 / 40, 2.01 + (49 - 30.3) / 40]
     assert found == pytest.approx([0.5, 1.0, 1.0 + 29 / 30, *ramp, 3.2], abs=1e-9)
+
+
+#: A free top of a bench at 10x on a busy computer, whose states come every 4 s; it falls after 20 s.
+FALL = """async () => {
+  const {openHistory} = await import("/page/history.js");
+  const history = openHistory(), found = [];
+  for (let time_s = 0; time_s <= 400; time_s += 4) {
+    const end_s = Math.min(time_s, 20), count = {frequency_hz: 30 - end_s / 9, end_s, gate_s: 0.5};
+    const changed = history.add({time_s, count, drive: {output: false}}, time_s > 20);
+    if (time_s === 84 || time_s === 400) found.push([changed, history.rests, history.drives.at(-1)[0]]);
+  }
+  return [history.counts.map((row) => row[1]), found];
+}"""
+
+
+def test_the_curve_of_a_top_that_fell_is_whole_and_stays(shown):
+    counts, found = shown.evaluate(FALL)
+    assert counts == pytest.approx([30 - end / 9 for end in range(0, 21, 4)])
+    assert found == [[True, True, 80], [False, True, 80]]  # drawn once more, with the reason, and then no more
 
 
 #: What is kept of a top that follows a ramp of 0.1 Hz/s, counted at first, then not, at states of a bench at 10x; then
