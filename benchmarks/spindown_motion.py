@@ -42,7 +42,6 @@ from analysis.spindown.tilt import THESIS_TOP, CountedLaw, count_of
 from analysis.spindown.verdict import CHANGED, EXCLUDED
 from instruments.clock import VirtualClock
 from instruments.virtual.bench.visa_library import library_for
-from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.subjects.motion import draw_scene
 from levilab.live.practice.seeds import keys_of_seed
@@ -53,12 +52,11 @@ from levilab.simulator.kernels.motion import R
 from levilab.simulator.laws import LAWS
 from levilab.simulator.model import base_field
 from levilab.simulator.start import start_of
-from levilab.world.bench import scene_world, virtual_bus, virtual_wiring
+from levilab.world.bench import scene_world, virtual_bus
 from levilab.world.motion_world import MotionWorld
 
 if TYPE_CHECKING:
     from analysis.spindown.tilt import Release
-    from levilab.acquisition.loop import AcquisitionRequest
     from levilab.simulator.scene import Scene
 
 RESULTS = Path(__file__).parent / "results" / "spindown_motion.json"
@@ -176,15 +174,9 @@ def driven(scenes: dict[int, Scene], settings: dict[str, Any], last: int | None 
 
 def _acquire(scene: Scene, seed: int, settings: dict[str, Any]) -> tuple[np.ndarray, np.ndarray, Release | None]:
     """Return times [s] and counts [Hz] of a run with the top of a scene, and how that was released."""
-
-    def in_world(request: AcquisitionRequest) -> AcquisitionRequest:
-        own: Any = settings_of(request.config, "spin")
-        config = with_settings(request.config, "spin", own.model_copy(update=settings))
-        world = scene_world(scene, VirtualClock, lambda _: None, seed=seed)
-        return replace(request, config=config, wiring=lambda: virtual_wiring(world, config.limits))
-
+    world = scene_world(scene, VirtualClock, lambda _: None, seed=seed)
     with tempfile.TemporaryDirectory() as folder:
-        run = acquire_mock("spin", seed, Path(folder), in_world)
+        run = acquire_mock("spin", seed, Path(folder), world, settings)
         readings = run.readings()
         return readings.column("time_s"), readings.column("spin_frequency_hz"), release_of(run.events())
 

@@ -142,16 +142,14 @@ def _about_laws(study: Study) -> Iterator[str]:
         )
     elif study.hypothesis and study.tested:
         chance = study.expected_share * study.tested
-        yield (
-            Text(
-                "The test excludes {hypothesis} in {excluded} of {tested} trials; chance alone does so in "
-                "{chance:.0f} ± {u:.0f}.",
-                hypothesis=study.hypothesis,
-                excluded=study.excluded,
-                tested=study.tested,
-                chance=chance,
-                u=math.sqrt(chance * (1 - study.expected_share)),
-            )
+        yield Text(
+            "The test excludes {hypothesis} in {excluded} of {tested} trials; chance alone does so in "
+            "{chance:.0f} ± {u:.0f}.",
+            hypothesis=study.hypothesis,
+            excluded=study.excluded,
+            tested=study.tested,
+            chance=chance,
+            u=math.sqrt(chance * (1 - study.expected_share)),
         )
 
 

@@ -193,10 +193,6 @@ def _acquire(driver):
     driver.acquire(timeout_s=1.0)
 
 
-def _has_record(pair, _):
-    return pair.has_new_record()
-
-
 @dataclass(frozen=True)
 class Reading:
     """How the scopes of a maker are read, after its manual.
@@ -271,7 +267,7 @@ def _scope(_driver):
     return {
         "prepare": Operation(PREPARE["oscilloscope"], _same_settings, remakes=True),
         "set level": _set("trigger_level", 0.3),
-        "acquire": Operation(_acquire, _has_record, remakes=True),
+        "acquire": Operation(_acquire, lambda pair, _: pair.has_new_record(), remakes=True),
         "trace": Operation(lambda driver: driver.trace(1), _is_trace, remakes=True),
         "blocks": Operation(
             lambda driver: b"".join(piece.tobytes() for piece in driver.blocks(1)), _are_blocks, remakes=True
@@ -389,7 +385,7 @@ class Pair:
         self._opened = contextlib.ExitStack()
         self.waiting = False
         device = hostile.instrument(name, self.room)
-        self.bench, transport = self._link(device)
+        self.bench, transport = self._within(device) if way in WITHIN else self._proxied(device)
         clock = {"clock": self.room.clock} if name in SCOPES else {}
         side = VirtualBench({NETWORK: device}, lock=self.bench.lock)
         self.side = self.kind.driver(VisaTransport(NETWORK, library=library_for(side)), **clock)
@@ -404,9 +400,6 @@ class Pair:
         self._opened.close()
 
     # --- links ---
-
-    def _link(self, device):
-        return self._within(device) if self.way in WITHIN else self._proxied(device)
 
     def _within(self, device):
         address = {"messages": NETWORK, "stream": SOCKET}.get(self.way, SERIAL)

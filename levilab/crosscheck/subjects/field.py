@@ -29,7 +29,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
 
     The truths of heights, masses, and spins are the simulator's, whose field is another formula.
     """
-    run = acquire_mock("field", seed, folder, lambda request: request)
+    run = acquire_mock("field", seed, folder)
     base, draw = random_base(seed), drawing("field", np.random.default_rng((seed, 4)))
     scene = Scene().changed(
         {

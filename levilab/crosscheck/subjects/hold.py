@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from levilab.acquisition.loop import AcquisitionRequest
-from levilab.acquisition.table import settings_of
+from instruments.clock import VirtualClock
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, pull_of
-from levilab.crosscheck.subjects.spindown import draw_scene, in_world
+from levilab.crosscheck.subjects.spindown import draw_scene
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.simulator.spin import DECAYS
+from levilab.world.spin_world import SpinWorld
 
 #: The time for which a spin is held [s].
 _HELD_S = 100.0
@@ -23,13 +23,8 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     """Try one held spin; the truth is the drag of the world's law at the mean of the readings."""
     scene = replace(draw_scene(seed), fall_hz=21.4)
     spin = drawing("hold", np.random.default_rng((seed, 25)))("spin")
-
-    def change(request: AcquisitionRequest) -> AcquisitionRequest:
-        settings = settings_of(request.config, "hold")
-        settings = settings.model_copy(update={"drive_frequency_hz": spin, "longest_s": _HELD_S})
-        return in_world(replace(request, config=request.config.model_copy(update={"hold": settings})), scene)
-
-    run = acquire_mock("hold", seed, folder, change)
+    settings = {"drive_frequency_hz": spin, "longest_s": _HELD_S}
+    run = acquire_mock("hold", seed, folder, SpinWorld(scene, VirtualClock()), settings)
     analysis = ANALYSES["hold"]
     (found,) = analysis.analyze([run.folder], analysis.options_from({})).runs
     held = found.spin.value or 0.0

@@ -8,15 +8,14 @@ from typing import Any
 import numpy as np
 
 from analysis.locked import Cause
-from levilab.acquisition.loop import AcquisitionRequest
-from levilab.acquisition.table import settings_of, with_settings
+from instruments.clock import VirtualClock
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
-from levilab.crosscheck.subjects.spindown import draw_scene, in_world
+from levilab.crosscheck.subjects.spindown import draw_scene
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.limit.analysis import Limits
-from levilab.world.spin_world import SpinScene
+from levilab.world.spin_world import SpinScene, SpinWorld
 
 #: Number of tops of a run.
 TOPS = 10
@@ -55,12 +54,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
 
 def _limits(seed: int, folder: Path, scene: SpinScene, changes: dict[str, Any]) -> Limits:
     """Return the limits of a run."""
-
-    def change(request: AcquisitionRequest) -> AcquisitionRequest:
-        settings = settings_of(request.config, "limit").model_copy(update={"hold_s": 1.0, **changes})
-        return in_world(replace(request, config=with_settings(request.config, "limit", settings)), scene)
-
-    run = acquire_mock("limit", seed, folder, change)
+    run = acquire_mock("limit", seed, folder, SpinWorld(scene, VirtualClock()), {"hold_s": 1.0, **changes})
     analysis = ANALYSES["limit"]
     found: Limits
     (found,) = analysis.analyze([run.folder], analysis.options_from({})).groups

@@ -1,7 +1,6 @@
 """The spin-down of a top in full motion, which the drive has brought to its spin: constant of the drag and fall."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,9 +8,6 @@ import numpy as np
 
 from analysis.spindown.fit import SpinDown
 from instruments.clock import VirtualClock
-from levilab.acquisition.loop import AcquisitionRequest
-from levilab.acquisition.table import settings_of, with_settings
-from levilab.bench.wiring import Wiring
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
@@ -21,7 +17,7 @@ from levilab.simulator.kernels.motion import R
 from levilab.simulator.scene import Scene, preset
 from levilab.simulator.single import simulate
 from levilab.simulator.start import nutating_start, start_of, steady_rates
-from levilab.world.bench import scene_world, virtual_wiring
+from levilab.world.bench import scene_world
 
 #: The disc's constant of the thesis's runs [(rad/s)^−½/s].
 USUAL = 2.34e-4
@@ -50,24 +46,15 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     """Try one spin-down of a drawn top."""
     scene = draw_scene(seed)
     coefficient: Any = scene.drag.coefficient
-    run = acquire_mock("spin", seed, folder, lambda request: _in_world(request, scene, seed))
+    world = scene_world(scene, VirtualClock, lambda _: None, seed=seed)
+    # without the stated u: that is of a top that only spins
+    run = acquire_mock("spin", seed, folder, world, {"reading_u_hz": None}, scene=scene)
     found = spindown_of(run.folder)
     return [
         pull_of("disc c32", found.fit("disc").parameters["c32"], coefficient),
         pull_of("exponent", found.fit("power").parameters["exponent"], 1.5),
         _fall(found, run, scene),
     ]
-
-
-def _in_world(request: AcquisitionRequest, scene: Scene, seed: int) -> AcquisitionRequest:
-    """Return the request in this world, without the stated u: that is of a top that only spins."""
-
-    def wiring() -> Wiring:
-        return virtual_wiring(scene_world(scene, VirtualClock, lambda _: None, seed=seed), request.config.limits)
-
-    settings: Any = settings_of(request.config, request.experiment)
-    config = with_settings(request.config, request.experiment, settings.model_copy(update={"reading_u_hz": None}))
-    return replace(request, config=config, wiring=wiring, scene=scene.as_table(), world=None)
 
 
 def _fall(found: SpinDown, run: Run, scene: Scene) -> Pull:

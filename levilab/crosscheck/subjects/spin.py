@@ -1,22 +1,18 @@
 """A record of the tape's light: frequency and chirp, by the pulses of some tenths of a second to some seconds."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from analysis.arrays import Array
 from instruments.clock import VirtualClock
-from levilab.acquisition.loop import AcquisitionRequest
-from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.runs.waveforms import run_waveforms
 from levilab.simulator.laws import LAWS
-from levilab.world.bench import virtual_wiring
 from levilab.world.light import Tape
 from levilab.world.spin_world import SpinScene, SpinWorld
 
@@ -53,7 +49,8 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     )
     world = _Watched(scene)
     duration = draw("length")
-    run = acquire_mock("trace", seed, folder, lambda request: _in_world(request, world, duration))
+    settings = {"records": 1, "duration_s": duration, "points": round(20_000 * duration)}
+    run = acquire_mock("trace", seed, folder, world, settings)
     (record,) = run_waveforms(run)
     start = world.looks.get(record.count)
     if start is None:
@@ -67,14 +64,6 @@ def trial(seed: int, folder: Path) -> list[Pull]:
         pull_of("frequency", found.spin.frequency, float(here)),
         pull_of("chirp", found.spin.chirp, float(after - before) / (2 * _APART_S)),
     ]
-
-
-def _in_world(request: AcquisitionRequest, world: _Watched, duration_s: float) -> AcquisitionRequest:
-    settings = settings_of(request.config, "trace").model_copy(
-        update={"records": 1, "duration_s": duration_s, "points": round(20_000 * duration_s)}
-    )
-    config = with_settings(request.config, "trace", settings)
-    return replace(request, config=config, wiring=lambda: virtual_wiring(world, config.limits))
 
 
 SUBJECT = Subject("spin", "a record of the light of a top that slows down: frequency and chirp", trial)

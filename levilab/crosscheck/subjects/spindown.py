@@ -1,7 +1,6 @@
 """The spin-down of a top that only spins: the law of drag, its constants and the fall."""
 
 import math
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,6 @@ import numpy as np
 
 from analysis.spindown.fit import SpinDown
 from instruments.clock import VirtualClock
-from levilab.acquisition.loop import AcquisitionRequest
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.priors import drawing
 from levilab.crosscheck.subject import Pull, Subject, TrialFailed, pull_of
@@ -19,7 +17,6 @@ from levilab.simulator.laws import LAWS
 from levilab.simulator.scene import Scene
 from levilab.simulator.single import simulate
 from levilab.simulator.spin import DECAYS
-from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
 
 #: The spin at which the drive goes off [Hz].
@@ -47,7 +44,7 @@ def trial(seed: int, folder: Path, counter: str | None = None, scope: str | None
     """Try one spin-down.  counter, scope: that counts in place of the bench's."""
     scene = draw_scene(seed)
     law, names, exponent = scene.drag, LAWS[scene.drag].names, LAWS[scene.drag].exponent
-    run = acquire_mock("spin", seed, folder, lambda request: in_world(request, scene), counter=counter, scope=scope)
+    run = acquire_mock("spin", seed, folder, SpinWorld(scene, VirtualClock()), counter=counter, scope=scope)
     found = spindown_of(run.folder, tilt="none")  # a count of this world is the spin
     pulls = [
         pull_of(f"{law} {name}", found.fit(law).parameters[name], truth)
@@ -59,12 +56,6 @@ def trial(seed: int, folder: Path, counter: str | None = None, scope: str | None
         pulls.append(pull_of("exponent", found.fit("power").parameters["exponent"], exponent))
     pulls.append(_fall(found, law, names, scene))
     return pulls
-
-
-def in_world(request: AcquisitionRequest, scene: SpinScene) -> AcquisitionRequest:
-    """Return a request for a run with the top of a scene."""
-    limits, named = request.config.limits, request.named
-    return replace(request, wiring=lambda: virtual_wiring(SpinWorld(scene, VirtualClock()), limits, named))
 
 
 def spindown_of(folder: Path, **options: Any) -> SpinDown:

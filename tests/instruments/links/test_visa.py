@@ -144,19 +144,13 @@ class SlowOnce(Slow):
 
     slow = 0
 
-    COMMON = (Ask("LIST", lambda d: d._list()), Ask("*IDN", lambda d: d._who()), *Slow.COMMON)
+    COMMON = (Ask("LIST", lambda d: d._late("1,2,1,1,1")), Ask("*IDN", lambda d: d._late(IDENTITY)), *Slow.COMMON)
 
     def _late(self, answer):
         if self.slow:
             self.slow -= 1
             self.busy_until(self.clock.now() + 5.0)
         return answer
-
-    def _list(self):
-        return self._late("1,2,1,1,1")
-
-    def _who(self):
-        return self._late(IDENTITY)
 
 
 @pytest.mark.parametrize("questions", [["LIST?"], ["*IDN?"], ["LIST?", "*IDN?"], ["*IDN?", "*IDN?"], ["SLOW?"]])

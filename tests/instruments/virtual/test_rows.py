@@ -81,17 +81,13 @@ def values(row, device):
     if isinstance(row, Text):
         return ['"A"', '""']
     if isinstance(row, Fields):
-        return [",".join(f"{limit:g}" for limit in limits) for limits in _limits(row)]
+        return [",".join(f"{getattr(field, end):g}" for field in row.fields) for end in ("low", "high")]
     return None
 
 
 def numbers(row, device):
     """The lowest and the highest number, or all of few."""
     return getattr(row, "values", ()) or row.range(device)
-
-
-def _limits(row):
-    return [field.low for field in row.fields], [field.high for field in row.fields]
 
 
 def is_same(row, sent, answer):

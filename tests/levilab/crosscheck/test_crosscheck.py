@@ -10,6 +10,7 @@ import pytest
 from scipy import stats
 
 from analysis.uncertainty import Estimate
+from instruments.clock import VirtualClock
 from levilab.crosscheck.catalogue import SUBJECTS
 from levilab.crosscheck.figure import crosscheck_figure
 from levilab.crosscheck.mock import acquire_mock
@@ -23,6 +24,7 @@ from levilab.present.style import as_png
 from levilab.simulator.scene import preset
 from levilab.simulator.single import simulate
 from levilab.simulator.start import nutating_start, steady_rates
+from levilab.world.spin_world import SpinScene, SpinWorld
 
 
 def made_up(off=0.0, scale=1.0):
@@ -104,14 +106,14 @@ def test_ctrl_c_in_a_trial_ends_the_cross_check():
     """It interrupts the run of the trial; the next trial would go on otherwise."""
     trials = []
 
+    class Interrupting(SpinWorld):
+        def motion(self, times):
+            signal.raise_signal(signal.SIGINT)
+            return super().motion(times)
+
     def trial(seed, folder):
         trials.append(seed)
-
-        def interrupted(request):
-            signal.raise_signal(signal.SIGINT)
-            return request.wiring()
-
-        acquire_mock("field", seed, folder, lambda request: replace(request, wiring=lambda: interrupted(request)))
+        acquire_mock("spin", seed, folder, Interrupting(SpinScene(), VirtualClock()))
         return [Pull("five", 5.0, 0.1, 5.0)]
 
     with pytest.raises(KeyboardInterrupt):
