@@ -82,7 +82,8 @@ def pytest_collection_modifyitems(items):
     )
     assert all(path.exists() for path in slow + versioned + longest), "tests/conftest.py names a file that is gone"
     is_slow, is_versioned = (
-        functools.cache(lambda file, paths=paths: any(map(file.is_relative_to, paths))) for paths in (slow, versioned)
+        functools.cache(lambda file, paths=frozenset(paths): not paths.isdisjoint((file, *file.parents)))
+        for paths in (slow, versioned)
     )
     for item in items:
         if "browser" in getattr(item, "fixturenames", ()):

@@ -251,7 +251,9 @@ def write_film(
     """Write pictures as a film with their times [s].  Raises NoFilm where the extra is not installed."""
     check_reader(path)
     import av
+    from av.video.reformatter import VideoReformatter
 
+    reformatter = VideoReformatter()  # one for all pictures, and one thread: others only wait for each other
     h264 = codec == "libx264"
     with av.open(str(path), "w", options={"movflags": "use_metadata_tags"}) as file:
         file.metadata.update(metadata or {})
@@ -264,7 +266,8 @@ def write_film(
                 stream.height, stream.width = picture.shape
                 stream.pix_fmt = "yuv420p" if h264 else "yuvj420p"
                 stream.time_base = stream.codec_context.time_base = CLOCK
-            frame = av.VideoFrame.from_ndarray(picture, format="gray").reformat(format=stream.pix_fmt)
+            gray = av.VideoFrame.from_ndarray(picture, format="gray")
+            frame = reformatter.reformat(gray, format=stream.pix_fmt, threads=1)
             frame.pts, frame.time_base = round(time / CLOCK), CLOCK
             file.mux(stream.encode(frame))
         file.mux(stream.encode())

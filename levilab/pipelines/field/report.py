@@ -227,16 +227,14 @@ def _meaning(analysis: FieldAnalysis) -> Iterator[str]:
     if not strength.value or not strength.u:
         return
     b, slope = (float(each[0]) for each in on_axis(scan.ring, np.array([_HEIGHT_M]))[:2])
-    yield (
-        Text(
-            "The base is as strong as ρ = {strength:n}, known to {percent:n} %; {height:g} cm up that is "
-            "{mt:n} mT, and {less:n} mT less for each centimetre higher.",
-            strength=with_uncertainty(QUANTITIES["strength"].show(strength)),
-            percent=digits(100 * strength.u / abs(strength.value)),
-            height=1e2 * _HEIGHT_M,
-            mt=plain(abs(1e3 * b)),
-            less=plain(abs(10 * slope)),
-        )
+    yield Text(
+        "The base is as strong as ρ = {strength:n}, known to {percent:n} %; {height:g} cm up that is "
+        "{mt:n} mT, and {less:n} mT less for each centimetre higher.",
+        strength=with_uncertainty(QUANTITIES["strength"].show(strength)),
+        percent=digits(100 * strength.u / abs(strength.value)),
+        height=1e2 * _HEIGHT_M,
+        mt=plain(abs(1e3 * b)),
+        less=plain(abs(10 * slope)),
     )
     yield "What the base holds up is in proportion to its strength: 1 % stronger, and the top weighs 1 % more."
     reduced = scan.statistics.reduced_chi_square
@@ -245,10 +243,8 @@ def _meaning(analysis: FieldAnalysis) -> Iterator[str]:
     elif all(remark.kind != "scan scatters" for remark in scan.remarks):
         yield Text("A uniform ring describes the readings to their uncertainties (χ²/dof = {chi:n}).", digits(reduced))
     else:
-        yield (
-            Text(
-                "A uniform ring leaves more than the uncertainties explain (χ²/dof = {chi:n}): the magnet is "
-                "not uniform, or the probe was off the axis, or a size is wrong.",
-                chi=digits(reduced),
-            )
+        yield Text(
+            "A uniform ring leaves more than the uncertainties explain (χ²/dof = {chi:n}): the magnet is "
+            "not uniform, or the probe was off the axis, or a size is wrong.",
+            chi=digits(reduced),
         )

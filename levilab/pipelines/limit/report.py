@@ -243,24 +243,20 @@ def _meaning(group: Limits) -> Iterator[str]:
     if mean.value is None:
         return
     if group.conditions.levels_off:
-        yield (
-            Text(
-                "The drive pulls no further than {spin:n}: there the drag of the air is as large as its "
-                "pull. This is no limit of the top; a stronger drive gets higher.",
-                spin=with_uncertainty(mean),
-            )
+        yield Text(
+            "The drive pulls no further than {spin:n}: there the drag of the air is as large as its "
+            "pull. This is no limit of the top; a stronger drive gets higher.",
+            spin=with_uncertainty(mean),
         )
         return
     yield Text("The {which} limit is {limit:n}: {why}.", group.which, with_uncertainty(mean), _WHY[group.which])
     yield from (_CAUSES[cause] for cause in _CAUSES if group.causes.get(cause))
     if group.which == "upper" and group.device.is_thesis and ISLANDS_HZ[0] < mean.value < ISLANDS_HZ[1]:
-        yield (
-            Text(
-                "From {low:g} to {high:g} Hz a simulated top without a drive is up or lost by its start "
-                "(islands), so a top that falls there has met no edge.",
-                low=ISLANDS_HZ[0],
-                high=ISLANDS_HZ[1],
-            )
+        yield Text(
+            "From {low:g} to {high:g} Hz a simulated top without a drive is up or lost by its start "
+            "(islands), so a top that falls there has met no edge.",
+            low=ISLANDS_HZ[0],
+            high=ISLANDS_HZ[1],
         )
     if found.scatter is None or not found.scatter.value or not mean.u:
         yield "How far another top's limit lies from that one top does not say."

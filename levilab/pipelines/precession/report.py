@@ -358,23 +358,19 @@ def _meaning(fit: SweepFit) -> Iterator[str]:
         )
         return
     if fit.locked:
-        yield (
-            Text(
-                "Each time the drive turns, the stem cuts the beam once: slope {slope:n} and intercept agree "
-                "with 1 and 0, as of a top that is locked to its drive (p = {p:n}).",
-                slope=slope,
-                p=plain(fit.p_locked, 2),
-            )
+        yield Text(
+            "Each time the drive turns, the stem cuts the beam once: slope {slope:n} and intercept agree "
+            "with 1 and 0, as of a top that is locked to its drive (p = {p:n}).",
+            slope=slope,
+            p=plain(fit.p_locked, 2),
         )
     else:
-        yield (
-            Text(
-                "The stem does not cut the beam once in each period of the drive: slope {slope:n} and "
-                "intercept together exclude 1 and 0 (p = {p:n}). A top that is not locked, or a counter that "
-                "misses or doubles pulses, does that; the free precession does not follow the drive at all.",
-                slope=slope,
-                p=plain(fit.p_locked, 1),
-            )
+        yield Text(
+            "The stem does not cut the beam once in each period of the drive: slope {slope:n} and "
+            "intercept together exclude 1 and 0 (p = {p:n}). A top that is not locked, or a counter that "
+            "misses or doubles pulses, does that; the free precession does not follow the drive at all.",
+            slope=slope,
+            p=plain(fit.p_locked, 1),
         )
     theirs = published("thesis")["measured.slope"]  # printed without an uncertainty
     away = abs(line.slope - theirs.value) / line.u_slope
@@ -385,13 +381,11 @@ def _meaning(fit: SweepFit) -> Iterator[str]:
             away=digits(away),
         )
     else:
-        yield (
-            Text(
-                "The slope of {slope:n} that the thesis gives lies within {away:n} u: these points cannot "
-                "distinguish it from a locked top's.",
-                slope=theirs.text,
-                away=digits(away),
-            )
+        yield Text(
+            "The slope of {slope:n} that the thesis gives lies within {away:n} u: these points cannot "
+            "distinguish it from a locked top's.",
+            slope=theirs.text,
+            away=digits(away),
         )
     if fit.spin_offset is not None and fit.u_spin_offset:
         offset = abs(fit.spin_offset)

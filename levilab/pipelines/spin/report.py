@@ -73,15 +73,13 @@ def _sentences(run: SpinRun) -> Iterator[str]:
     yield Text(turns, spin=with_uncertainty(frequency), at=at, rpm=60 * frequency.value)
     if run.swing and run.swing[1] > _SEEN:
         far, units = run.swing
-        yield (
-            Text(
-                "That is one {of} of {n}: they scatter about a line by {hz:n} Hz, {times:n} times their "
-                "uncertainties, so the spin itself swings, as that of a driven top does.",
-                of=run.series.of,
-                n=len(run.series),
-                hz=digits(far),
-                times=digits(units),
-            )
+        yield Text(
+            "That is one {of} of {n}: they scatter about a line by {hz:n} Hz, {times:n} times their "
+            "uncertainties, so the spin itself swings, as that of a driven top does.",
+            of=run.series.of,
+            n=len(run.series),
+            hz=digits(far),
+            times=digits(units),
         )
     yield from _about_line(run)
     if (change := _change(run)) is None:
@@ -92,12 +90,10 @@ def _sentences(run: SpinRun) -> Iterator[str]:
         if ratio < _AT_BOUND:
             yield "With such noise no other method would find it much better."
         elif not run.line:
-            yield (
-                Text(
-                    "The uncertainty is {times:n} times the least that any method could reach with such noise: "
-                    "the pulses themselves scatter, or the samples lie far apart.",
-                    times=digits(ratio),
-                )
+            yield Text(
+                "The uncertainty is {times:n} times the least that any method could reach with such noise: "
+                "the pulses themselves scatter, or the samples lie far apart.",
+                times=digits(ratio),
             )
 
 
@@ -119,13 +115,11 @@ def _about_change(change: _Change, frequency: float) -> Iterator[str]:
     lost = with_uncertainty(Estimate(100 * abs(share), 100 * change.u / frequency, "%"))
     if abs(change.slope) < _SEEN * change.u:
         most = (abs(change.slope) + 2 * change.u) / frequency
-        yield (
-            Text(
-                "In {time:n} s no change of its spin shows beyond the uncertainty: it loses or gains less "
-                "than {percent:n} % a second.",
-                time=digits(change.lasts_s),
-                percent=digits(100 * most),
-            )
+        yield Text(
+            "In {time:n} s no change of its spin shows beyond the uncertainty: it loses or gains less "
+            "than {percent:n} % a second.",
+            time=digits(change.lasts_s),
+            percent=digits(100 * most),
         )
         yield (
             "A free top loses some 0.3 % a second to the air: a longer record shows that, or one more a while later."

@@ -177,12 +177,10 @@ def _exponent(analysis: SpinDownAnalysis) -> Iterator[str]:
 def _tilt(analysis: SpinDownAnalysis) -> Iterator[str]:
     tilt = analysis.combined.tilt
     if tilt and tilt.value and is_seen(tilt):
-        yield (
-            Text(
-                "The magnet's moment points {degrees:n}° off the axis of the top: it wobbles with its spin, "
-                "more and more towards the fall, and the counter counts a little more than the spin.",
-                degrees=digits(math.degrees(tilt.value)),
-            )
+        yield Text(
+            "The magnet's moment points {degrees:n}° off the axis of the top: it wobbles with its spin, "
+            "more and more towards the fall, and the counter counts a little more than the spin.",
+            degrees=digits(math.degrees(tilt.value)),
         )
 
 
@@ -204,15 +202,13 @@ def _runs(analysis: SpinDownAnalysis) -> Iterator[str]:
         ratio = scatter / math.sqrt(sum(u**2 for u in known) / len(known))
         percent = digits(100 * scatter / abs(mean.value))
         if ratio > _SCATTERS:
-            yield (
-                Text(
-                    "From one run to the next {symbol} differs by {percent:n} %, {times:n} times as much as the "
-                    "readings of each explain: the runs differ, and the mean is as good as their scatter lets it "
-                    "be.",
-                    symbol=SYMBOLS[name],
-                    percent=percent,
-                    times=digits(ratio),
-                )
+            yield Text(
+                "From one run to the next {symbol} differs by {percent:n} %, {times:n} times as much as the "
+                "readings of each explain: the runs differ, and the mean is as good as their scatter lets it "
+                "be.",
+                symbol=SYMBOLS[name],
+                percent=percent,
+                times=digits(ratio),
             )
         else:
             yield Text(
