@@ -409,18 +409,28 @@ def _wanted_columns(
         if name not in CANONICAL:
             what = "`columns` cannot set '{key:s}'; it sets {short:s} or {long:s}"
             raise TableError(path, what, shorten(key), ", ".join(SHORTHANDS), ", ".join(LISTED))
-        index = _find(header, title.strip())
-        if index is None and (with_unit := re.fullmatch(r"(.+?)\s*\[([^\[\]]+)\]\s*", title)):
-            index = _find(header, with_unit[1].strip())
-            stated[name] = _stated_unit(path, name, with_unit[2].strip())
-        if index is None:
-            what = "has no column '{title:s}'; it has {header:s}: correct `columns` = {key:s}=NAME or NUMBER"
-            raise TableError(path, what, shorten(title), quote_names(header), key)
+        index, unit = find_column(path, header, key, title)
+        stated |= {name: unit} if unit else {}
         if index in chosen.values():
             what = "`columns` names column '{title:s}' twice; each column holds one quantity"
             raise TableError(path, what, shorten(title))
         chosen[name] = index
     return chosen, stated
+
+
+def find_column(path: Path, header: Sequence[str], key: str, title: str) -> tuple[int, str]:
+    """Return the index of a column that the user names, and the unit that follows in brackets, empty without one.
+
+    Raises TableError: there is no such column, or no such unit.
+    """
+    index, unit = _find(header, title.strip()), ""
+    if index is None and (with_unit := re.fullmatch(r"(.+?)\s*\[([^\[\]]+)\]\s*", title)):
+        index = _find(header, with_unit[1].strip())
+        unit = _stated_unit(path, SHORTHANDS.get(key, key), with_unit[2].strip())
+    if index is None:
+        what = "has no column '{title:s}'; it has {header:s}: correct `columns` = {key:s}=NAME or NUMBER"
+        raise TableError(path, what, shorten(title), quote_names(header), key)
+    return index, unit
 
 
 def _stated_unit(path: Path, name: str, unit: str) -> str:

@@ -4,13 +4,19 @@
 analyzed.
 """
 
+import math
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from statistics import median
 
+import numpy as np
+
+from analysis.arrays import Array
+from analysis.numbers import digits
 from levilab.formats.beside import Part, parts_of
 from levilab.formats.columns import (
     SHORTHANDS,
@@ -63,10 +69,17 @@ TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: No such top floats far below or above these [Hz], linear theory says 21.65 to 80.6: the unit is in doubt there.
 #: 20 to 60 turns a second are 126 to 377 rad/s: taken for turns, they lie above.
 SLOWEST_SPIN_HZ, FASTEST_SPIN_HZ = 10.0, 100.0
+#: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, seconds that
+#: pass for minutes 5e-5, times in ms 3e-6; a brake of eddy currents lies between.
+FASTEST_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 1e-4
+#: A record whose spin falls by less than this part is no spin-down: in 6 s, a top that coasts loses twice as much.
+LEAST_FALL = 0.01
+#: Rank correlation with the number of the row above which spins are those of one top, and not limits of several.
+LEAST_TREND = 0.9
 #: What a title says of an uncertainty that is no standard one, or of a scatter that is not of the mean: f_std.
 _NO_U = re.compile(r"(?i)2 ?(σ|sigma)|k ?= ?2|fehler|error|unsicherheit|uncertaint|stdev|stabw|(?<![a-z])st?d(?![a-z])")
 #: Units in which the numbers of a file may be meant.
-_UNITS = ("Hz", "rpm", "rad/s", "°/s")
+_UNITS, _UNITS_OF_TIME = ("Hz", "rpm", "rad/s", "°/s"), ("s", "ms", "min", "h", "μs")
 #: Uncertainties of a spreadsheet, in % or without a unit, below which they may be parts of one, shown in %.
 _LEAST_PERCENT = 0.02
 #: Columns of a spin-down.
@@ -148,7 +161,9 @@ def understand(
     needed: Collection[str] = SPIN[:2],
     guess: bool = True,
 ) -> Understanding:
-    """Return how a file of readings is understood, without reading more than the first rows of its tables.
+    """Return how a file of readings is understood.
+
+    It reads the first rows of its tables, and all rows of those that leave the unit of the times open.
 
     It looks at the file with the same functions as `read_table`. A correction is another `columns`: the chosen
     answer's `Choice.columns`, or any {t, f, u, z, b or canonical name: title or 1-based number, a unit in brackets}.
@@ -179,10 +194,11 @@ def _shown(look: "_Look", request: "Request", *, alone: bool) -> UnderstoodRun:
     name = "" if alone else look.name
     if layout is None or part is None or isinstance(error, NoTable):
         return UnderstoodRun(look.path, name, 0, (), problem=text_of(error) if error else "")
-    used = {column.index: column for column in _known(look, layout, part, request) if not column.behind}
+    known = _known(look, layout, part, request)
+    used = {column.index: column for column in (known.columns if known else ()) if not column.behind}
     seen = [_column(k, layout, used.get(k)) for k in range(layout.width) if part.has(k, layout.header)]
     seen = [column for column in seen if column.title or any(column.values)]
-    doubts = [doubt for column in used.values() if (doubt := _unit_doubt(layout, column, used.values()))]
+    doubts = [doubt for column in used.values() if known and (doubt := _unit_doubt(known, column))]
     asked = error.doubt if isinstance(error, NoSuchColumn | Ambiguous) else None
     doubts += [asked] if asked and asked not in doubts else []
     problem = text_of(error) if error else ""
@@ -191,14 +207,14 @@ def _shown(look: "_Look", request: "Request", *, alone: bool) -> UnderstoodRun:
     )
 
 
-def _known(look: "_Look", layout: Layout, part: Part, request: "Request") -> tuple[Column, ...]:
-    """Return the columns that are read, or of a table that is not read those that are known."""
+def _known(look: "_Look", layout: Layout, part: Part, request: "Request") -> "Plan | None":
+    """Return how a table is read, or of one that is not read how its known columns would be."""
     if look.plan:
-        return look.plan.columns
+        return look.plan
     try:
-        return _plan(look.path, Text(look.path), layout, part, replace(request, needed=(), guess=False)).columns
+        return _plan(look.path, look.text, layout, part, replace(request, needed=(), guess=False))
     except TableError:
-        return ()
+        return None
 
 
 def _column(k: int, layout: Layout, used: Column | None) -> UnderstoodColumn:
@@ -227,6 +243,38 @@ def possible_spins(number: float) -> dict[str, float]:
     return {unit: spin for unit, spin in spins.items() if is_possible_spin(spin)}
 
 
+def is_possible_loss(loss: float) -> bool:
+    """Return whether a top in air loses such a part of its spin in a second [1/s]; else its times are in doubt."""
+    return SLOWEST_LOSS_PER_S <= loss <= FASTEST_LOSS_PER_S
+
+
+def possible_times(loss: float) -> dict[str, float]:
+    """Return the units [s] in which times may be meant between which a spin falls, by its loss while they grow by 1.
+
+    >>> possible_times(3e-6), possible_times(0.18)
+    ({'ms': 0.001}, {'min': 60})
+    """
+    units = {unit: unit_factor(unit, "time") or 1.0 for unit in _UNITS_OF_TIME}
+    return {unit: factor for unit, factor in units.items() if is_possible_loss(loss / factor)}
+
+
+def trend_of(values: Array) -> float:
+    """Return the rank correlation of values, shape (n,), with their order: -1 where each is below the one before."""
+    ordered = np.sort(values)
+    ranks = np.searchsorted(ordered, values) + np.searchsorted(ordered, values, "right")  # equal ones share one
+    return float(np.corrcoef(np.arange(len(values)), ranks)[0, 1]) if ordered[0] < ordered[-1] else 0.0
+
+
+def length_of(seconds: float) -> Said:
+    """Return a length of time for people.
+
+    >>> length_of(180), length_of(180e3)
+    ('3 min', '50 h')
+    """
+    unit, size = next((one for one in (("h", 3600), ("min", 60)) if seconds >= 2 * one[1]), ("s", 1))
+    return Said("{n:n} {unit:s}", digits(seconds / size, 3), unit)
+
+
 def _numbers(layout: Layout, index: int) -> list[float]:
     """Return the numbers among the first fields of a column."""
     fields = [row[index] for row in layout.sample if index < len(row) and layout.dialect.kind(row[index]) == "number"]
@@ -234,9 +282,9 @@ def _numbers(layout: Layout, index: int) -> list[float]:
 
 
 def _question(
-    layout: Layout, index: int, time: Column | None, *, what: str = "no unit", always: bool = False
+    layout: Layout, index: int, time: Column | None, given: Mapping[str, str], what: str = "", *, always: bool = False
 ) -> Doubt | None:
-    """Return the question in which unit a column is, None where it can be in none or, if not always, in Hz alone."""
+    """Return the question in which unit a spin is, None where it can be in none or, if not always, in Hz alone."""
     numbers = _numbers(layout, index)
     spins = possible_spins(median(numbers)) if numbers else {}
     total = _spins_of_total(layout, numbers, time)
@@ -248,29 +296,45 @@ def _question(
         spins = {per_reading: 0.0} | spins
     if not spins:
         return None
-    first, last = numbers[0], numbers[-1]
+    answers = dict[str, str]()
+    for unit in spins:
+        ends = total or [number * (unit_factor(unit, "frequency") or 1.0) for number in numbers]
+        of_total = "turns since the start ({first:.3g} to {last:.3g} Hz)"
+        range_ = of_total if total else "{unit:s} ({first:.3g} to {last:.3g} Hz)"
+        answers[unit] = Said(range_, unit=unit, first=ends[0], last=ends[-1])
     at = {"t": str(time.index + 1)} if time else {}
-    choices = []
-    for unit in (*spins, *(unit for unit in ("rpm", "Hz") if unit not in spins)):
-        factor = unit_factor(unit, "frequency") or 1.0
-        range_ = "{unit:s} ({first:.3g} to {last:.3g} Hz)"
-        text = Said(range_, unit=unit, first=first * factor, last=last * factor) if unit in spins else unit
-        if unit == TOTAL:
-            text = Said("turns since the start ({first:.3g} to {last:.3g} Hz)", first=total[0], last=total[-1])
-        choices.append(Choice(text, {**at, "f": f"{index + 1} [{unit}]"}))
-    title = f" '{shorten(layout.header[index])}'" if index < len(layout.header) else ""
-    *others, end = (choice.text for choice in choices)
-    asked = Said(
-        "column {n}{title:s} has the values {first:.4g} to {last:.4g} and {what}: {units} or {end}?",
-        n=index + 1,
-        title=title,
-        first=first,
-        last=last,
-        what=what,
-        units=(*others,),
-        end=end,
-    )
-    return Doubt("unit", asked, index, tuple(choices), open=len(spins) > 1)
+    said = what or "no unit", answers, ("rpm", "Hz")
+    return _ask(layout, index, "f", {**at, **given}, numbers=numbers, said=said)
+
+
+def _ask(
+    layout: Layout,
+    index: int,
+    key: str,
+    given: Mapping[str, str],
+    *,
+    numbers: Sequence[float] | Array,
+    said: tuple[str, Mapping[str, str], Sequence[str]],
+) -> Doubt:
+    """Return the question in which unit a column is.
+
+    Args:
+        layout: of its table.
+        index: of the column.
+        key: of its quantity in the option `columns`.
+        given: that option for the other columns.
+        numbers: in the column.
+        said: what is known of the unit; the likely units with their texts; others to choose from.
+    """
+    what, likely, others = said
+    answers = {**likely, **{unit: unit for unit in others if unit not in likely}}
+    choices = tuple(Choice(text, {**given, key: f"{index + 1} [{unit}]"}) for unit, text in answers.items())
+    title = "".join(layout.header[index : index + 1])
+    *some, end = answers.values()
+    ends = (digits(numbers[0], 4), digits(numbers[-1], 4))
+    asked = "column {n}{title:s} has the values {first:n} to {last:n} and {what}: {units} or {end}?"
+    text = Said(asked, index + 1, f" '{shorten(title)}'" if title else "", *ends, what, (*some,), end)
+    return Doubt("unit", text, index, choices, open=len(likely) > 1)
 
 
 def _spins_of_total(layout: Layout, numbers: Sequence[float], time: Column | None) -> list[float]:
@@ -302,8 +366,8 @@ def _turns_per_reading(layout: Layout, numbers: Sequence[float], time: Column | 
 def _unanswered(path: Path, doubt: Doubt) -> NoSuchColumn:
     """Return the error for a spin whose unit is asked for."""
     example = ",".join(f"{key}={to}" for key, to in doubt.choices[0].columns.items())
-    if doubt.open:
-        example = re.sub(r"\[.*\]$", "[UNIT]", example)
+    if doubt.open and doubt.column is not None:
+        example = re.sub(rf"={doubt.column + 1} \[[^\[\]]*\]", f"={doubt.column + 1} [UNIT]", example)
     return NoSuchColumn(path, '{question} say `columns` = "{example:s}"', doubt.text, example, doubt=doubt)
 
 
@@ -311,7 +375,7 @@ def _must_be_sure(plan: "Plan") -> "Plan":
     """Return a plan; raise NoSuchColumn for a unit in doubt, TableError for two, or for a formula without its value."""
     for column in plan.columns:
         plan.layout.must_have_one_unit(plan.path, column.index)
-        doubt = None if column.written else _unit_doubt(plan.layout, column, plan.columns)
+        doubt = None if column.written else _unit_doubt(plan, column)
         if doubt:
             raise _unanswered(plan.path, doubt)
     if UNVALUED.encode() in (plan.text.content or b""):
@@ -319,20 +383,57 @@ def _must_be_sure(plan: "Plan") -> "Plan":
     return plan
 
 
-def _unit_doubt(layout: Layout, column: Column, used: Iterable[Column]) -> Doubt | None:
-    """Return the question about a spin that is taken in a unit in which no top has it."""
+def _unit_doubt(plan: "Plan", column: Column) -> Doubt | None:
+    """Return the question about a spin or a time that is taken in a unit in which no top has it."""
+    what = Said("the unit {unit:s}" if column.written else "no unit, and would be in {unit:s}", unit=column.unit)
+    if column.name == "time_s":
+        return _doubt_about_times(plan, column, what)
     if column.name != _SPIN or column.inverse or column.is_total:
         return None
-    numbers = _numbers(layout, column.index)
+    numbers = _numbers(plan.layout, column.index)
     if not numbers or is_possible_spin(median(numbers) * column.factor):
         return None
-    time = next((one for one in used if one.name == "time_s"), None)
-    what = Said("the unit {unit:s}" if column.written else "no unit, and would be in {unit:s}", unit=column.unit)
-    return _question(layout, column.index, time, what=what)
+    return _question(plan.layout, column.index, plan.column("time_s"), plan.request.columns, what=what)
+
+
+def _doubt_about_times(plan: "Plan", column: Column, what: str) -> Doubt | None:
+    """Return the question about times in which no top loses its spin, if the first rows and then all rows say so."""
+    spin = plan.column(_SPIN)
+    if not spin or spin.is_total or not {*plan.request.quantities} <= {*SPIN}:
+        return None
+    times, spins = (np.array(_numbers(plan.layout, one.index)) for one in (column, spin))
+    if not len(times) or is_possible_loss(_loss(times, spins, inverse=spin.inverse) / column.factor):
+        return None
+    with suppress(TableError):
+        times, spins = read_rows(plan.text, plan.layout, (column, spin), skip_doubtful=True).values
+    loss = _loss(times, spins, inverse=spin.inverse)
+    units = possible_times(loss)
+    if is_possible_loss(loss / column.factor) or not units:
+        return None
+    times = times[np.isfinite(times)]
+    lasts = float(times[-1] - times[0])
+    fall, length = digits(100 - 100 * math.exp(-loss * lasts)), length_of(lasts * column.factor)
+    what = Said("{unit}, in which the spin falls by {fall:n} % in {length}", what, fall, length)
+    answers = {unit: Said("{unit:s} ({length})", unit, length_of(lasts * factor)) for unit, factor in units.items()}
+    of_run = {"f": str(spin.index + 1)} if column.index in plan.own else {}
+    given = {**plan.request.columns, **of_run}
+    return _ask(plan.layout, column.index, "t", given, numbers=times, said=(what, answers, (column.unit,)))
+
+
+def _loss(times: Array, spins: Array, *, inverse: bool) -> float:
+    """Return the part of a top's spin that is lost while the times grow by 1; 0 where it does not clearly fall."""
+    if len(times) != len(spins):
+        return 0.0
+    there = np.isfinite(times) & (spins > 0)
+    times, spins = times[there], 1 / spins[there] if inverse else spins[there]
+    if len(times) < 3 or times[-1] <= times[0] or trend_of(spins) > -LEAST_TREND:
+        return 0.0
+    fall = math.log(spins[0] / spins[-1])
+    return fall / float(times[-1] - times[0]) if fall > LEAST_FALL else 0.0
 
 
 def _by_values(
-    path: Path, layout: Layout, meant: Sequence[str], chosen: Sequence[Column], quantities: Collection[str]
+    path: Path, layout: Layout, meant: Sequence[str], chosen: Sequence[Column], request: "Request"
 ) -> tuple[Column | None, str]:
     """Return the only column left as the spin, where its values are those of a top in Hz, and a note.
 
@@ -340,7 +441,7 @@ def _by_values(
         NoSuchColumn: with the question in which unit it is.
     """
     time = next((column for column in chosen if column.name == "time_s"), None)
-    kinds = [name for name in quantities if name in QUANTITIES and dimension(name) == "frequency"]
+    kinds = [name for name in request.quantities if name in QUANTITIES and dimension(name) == "frequency"]
     if kinds != [_SPIN] or time is None or any(column.name == _SPIN for column in chosen):
         return None, ""
     used = {column.index for column in chosen}
@@ -353,7 +454,7 @@ def _by_values(
     if len(left) != 1:
         return None, ""
     (index,) = left
-    if doubt := _question(layout, index, time, always=_needs_unit(meant[index])):
+    if doubt := _question(layout, index, time, request.columns, always=_needs_unit(meant[index])):
         raise _unanswered(path, doubt)
     numbers = _numbers(layout, index)
     if "Hz" not in possible_spins(median(numbers) if numbers else 0.0):
@@ -412,6 +513,7 @@ class Plan:
         header: titles in the file, or numbers in their place.
         columns: those that are read, and for each quantity what may stand behind a ± in its fields.
         own: indices of the columns of this run alone; none where it stands by itself.
+        request: what is wanted of it, with `columns` as `Choice.columns` has them.
         warnings: about guesses.
     """
 
@@ -421,7 +523,12 @@ class Plan:
     header: tuple[str, ...]
     columns: tuple[Column, ...]
     own: frozenset[int]
+    request: Request
     warnings: tuple[str, ...]
+
+    def column(self, name: str) -> Column | None:
+        """Return the column of a quantity."""
+        return next((column for column in self.columns if column.name == name), None)
 
 
 @dataclass(frozen=True)
@@ -430,6 +537,7 @@ class _Look:
 
     path: Path
     name: str
+    text: Text
     layout: Layout | None = None
     part: Part | None = None
     plan: Plan | None = None
@@ -489,7 +597,7 @@ def _looks_at(file: Path, text: Text, request: Request) -> Iterator[_Look]:
         layout = sniff(text)
         tables, titles = tables_of(text, layout), layout.titles()
     except TableError as error:
-        yield _Look(text.path, name, error=error)
+        yield _Look(text.path, name, text, error=error)
         return
     if len(tables) > 1:
         yield from (look for table in tables for look in _looks_at(file, table, request))
@@ -502,9 +610,9 @@ def _looks_at(file: Path, text: Text, request: Request) -> Iterator[_Look]:
         try:
             plan = _must_be_sure(_plan(path, text, layout, part, request))
         except TableError as error:
-            yield _Look(path, here, layout, part, error=error)
+            yield _Look(path, here, text, layout, part, error=error)
         else:
-            yield _Look(path, here, layout, part, plan)
+            yield _Look(path, here, text, layout, part, plan)
 
 
 def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) -> Plan:
@@ -513,12 +621,12 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
     header, wanted, warnings = _titles(path, layout, request.columns, guess=request.guess)
     if text.lies:
         warnings.append(of_file("lies", Said("{path:s}: {what}", shorten(str(path), 200), LIES)))
-    meant = part.titles
+    meant, request = part.titles, replace(request, columns={_key(name): title for name, title in wanted.items()})
     if not {"t", "time_s"} & {*wanted}:
         _must_be_one_time(path, layout, meant)
     chosen, doubts = choose_columns(path, header, wanted, quantities, meant=meant)
     if request.guess and _SPIN in quantities:
-        spin, note = _by_values(path, layout, meant, chosen, quantities)
+        spin, note = _by_values(path, layout, meant, chosen, request)
         chosen, warnings = (*chosen, *([spin] if spin else [])), [*warnings, *([note] if note else [])]
     if not chosen:
         examples = [EXAMPLES[name] for name in quantities if name in EXAMPLES]
@@ -537,13 +645,13 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
         )
     for name in needed:
         if name not in {column.name for column in chosen}:
-            raise _total_of_turns(path, name, layout, chosen) or no_column(
+            raise _total_of_turns(path, name, layout, chosen, request) or no_column(
                 path, name, meant, _which_columns(layout, [name])
             )
     warnings += _notes_on_u(path, layout, chosen, wanted=companion(_SPIN) in quantities)
     chosen = tuple(sorted(chosen, key=lambda column: CANONICAL.index(column.name)))
     behind = [replace(one, name=companion(one.name), behind=True) for one in chosen if one.name in QUANTITIES]
-    return Plan(path, text, layout, header, (*chosen, *behind), part.own, (*warnings, *doubts))
+    return Plan(path, text, layout, header, (*chosen, *behind), part.own, request, (*warnings, *doubts))
 
 
 def _notes_on_u(path: Path, layout: Layout, chosen: Sequence[Column], *, wanted: bool) -> list[str]:
@@ -639,12 +747,14 @@ def _key(name: str) -> str:
     return next((short for short, long in SHORTHANDS.items() if long == name), name)
 
 
-def _total_of_turns(path: Path, name: str, layout: Layout, chosen: Sequence[Column]) -> NoSuchColumn | None:
+def _total_of_turns(
+    path: Path, name: str, layout: Layout, chosen: Sequence[Column], request: Request
+) -> NoSuchColumn | None:
     """Return the question for a table that has no spin but turns counted since the beginning, which only grow."""
     time = next((column for column in chosen if column.name == "time_s"), None)
     for k, title in enumerate(layout.header if name == _SPIN else ()):
         if nearly_a_frequency(title) == OVER_TIME and _spins_of_total(layout, _numbers(layout, k), time):
-            doubt = _question(layout, k, time, always=True)
+            doubt = _question(layout, k, time, request.columns, always=True)
             return _unanswered(path, doubt) if doubt else None
     return None
 

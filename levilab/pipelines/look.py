@@ -44,7 +44,7 @@ _TABLES = (
     (scan.QUANTITIES, scan.NEEDED),
     (precession.QUANTITIES, precession.NEEDED),
     (spindown.QUANTITIES, spindown.QUANTITIES[:2]),
-    (limit.QUANTITIES, limit.QUANTITIES[:1]),
+    (limit.QUANTITIES, limit.NEEDED),
     *((magnetometer.QUANTITIES, needed) for needed in magnetometer.NEEDED),
 )
 _SPIN_DOWN = _TABLES[2]

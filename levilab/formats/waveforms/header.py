@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from levilab.formats.columns import NoSuchColumn, TableError, quote_names, shorten
+from levilab.formats.columns import NoSuchColumn, TableError, find_column, quote_names, shorten
 from levilab.formats.dialect import Dialect, filled_count, find_dialect
 from levilab.formats.layout import SAMPLE, Layout, lay_out
 from levilab.formats.titles import (
@@ -464,7 +464,7 @@ def _recognise_plain(head: Head, dialect: Dialect, wanted: Mapping[str, str], *,
     width = len(layout.header) or layout.width
     if width < 2:
         raise NoWaveform(head.path, "has one column and no times beside it")
-    time = _time_column(head, layout, wanted, must_be=needs_times)
+    time, stated = _time_column(head, layout, wanted, must_be=needs_times)
     names = layout.header or tuple("t" if k == time else f"CH{k + (k < (time or 0))}" for k in range(width))
     columns, certain = [], bool(layout.header)
     for k in range(width):
@@ -478,7 +478,7 @@ def _recognise_plain(head: Head, dialect: Dialect, wanted: Mapping[str, str], *,
     kept = _with_samples(columns, rows, 0, dialect)[0] if rows else ()
     if not kept:
         raise NoWaveform(head.path, "has no samples beside its times, its columns are {names:s}", quote_names(names))
-    factor = 1.0 if time is None else _time_factor(head, layout, time)
+    factor = 1.0 if time is None else _time_factor(head, layout, time, stated)
     return Header("CSV", dialect, layout.first_line, kept, time=time, time_factor=factor, certain=certain)
 
 
@@ -494,29 +494,27 @@ def _without_unit(title: str) -> str:
     return shorten(bare.strip() or title)
 
 
-def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str], *, must_be: bool) -> int | None:
-    """Return the index of the column of times: by name, by its title, else the first where there are no titles."""
+def _time_column(head: Head, layout: Layout, wanted: Mapping[str, str], *, must_be: bool) -> tuple[int | None, str]:
+    """Return the index of the column of times by its name, with the unit stated there, or by its title, or the first.
+
+    Without times it is None.
+    """
     name = wanted.get("t") or wanted.get("time_s")
-    folded = [title.casefold() for title in layout.header]
     if name is not None:
-        if name.casefold() in folded:
-            return folded.index(name.casefold())
-        if name.isdecimal() and 1 <= int(name) <= layout.width:
-            return int(name) - 1
-        what = "has no column '{title:s}'; it has {header:s}: correct `columns`"
-        raise TableError(head.path, what, shorten(name), quote_names(layout.header))
+        return find_column(head.path, layout.header or [""] * layout.width, "t", name)
     if not layout.header:
-        return 0
+        return 0, ""
+    folded = [title.casefold() for title in layout.header]
     known = [k for k, text in enumerate(layout.header) if read_title(text).column == "time_s" or folded[k] in _TIMES]
     if len(known) > 1 or (must_be and not known):
         what = "no title is known to be a time among {titles:s}: say `columns` = t=NAME, or `rate` in Hz"
         raise NoWaveform(head.path, what, quote_names(layout.header))
-    return known[0] if known else None
+    return known[0] if known else None, ""
 
 
-def _time_factor(head: Head, layout: Layout, time: int) -> float:
+def _time_factor(head: Head, layout: Layout, time: int, stated: str) -> float:
     layout.must_have_one_unit(head.path, time)
-    unit = read_title(layout.titles()[time]).unit if layout.header else None
+    unit = stated or (read_title(layout.titles()[time]).unit if layout.header else "")
     factor = unit_factor(unit, "time") if unit else 1.0
     if factor is None:
         text = "'{unit:s}' is no unit of time: correct the title"

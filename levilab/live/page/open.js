@@ -110,7 +110,7 @@ function doubtOf({kind, text, choices}) {
   const row = make("div", "", "row");
   for (const choice of choices) {
     const button = make("button", choice.text);
-    button.addEventListener("click", () => correct({...look.options, ...kind === "rows" ? {skip_doubtful: true} : {columns: {...columnsNow(), ...canonical(choice.columns)}}}));
+    button.addEventListener("click", () => correct({...look.options, ...kind === "rows" ? {skip_doubtful: true} : {columns: canonical({...look.options.columns, ...choice.columns})}}));
     row.append(button);
   }
   box.append(row);

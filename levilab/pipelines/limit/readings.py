@@ -17,6 +17,7 @@ from levilab.formats.columns import NoSuchColumn, NoTable, TableError
 from levilab.formats.table import FEWEST, Table, must_be_positive, read_table
 from levilab.formats.texts import locate, texts_of
 from levilab.formats.titles import read_title, unit_factor
+from levilab.formats.understanding import LEAST_TREND, trend_of
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
@@ -26,14 +27,14 @@ from levilab.texts.note import of_file
 from levilab.texts.text import Text
 
 #: Columns that an analysis of limits looks at.
-QUANTITIES = ("spin_frequency_hz", "spin_frequency_u_hz")
-#: Read where there is one, so that what is wrong in it is not passed over: it is most likely a spin-down's.
-_TIME = "time_s"
+NEEDED = ("spin_frequency_hz",)
+#: Times, too, where there are any, so that a fault in them is not overlooked: they are most likely a spin-down's.
+QUANTITIES = ("time_s", *NEEDED, "spin_frequency_u_hz")
 #: Limits that differ by more than this part of their mean are none of one top: most likely a spin-down.
 _MOST_SPREAD = 0.25
-#: Rank correlation with the time above which a spin is that of one top, and the number of rows from which it counts:
-#: chance orders three limits in one file of three, whose times are then left out; a spin-down's are never limits.
-_TREND, _FEWEST = 0.9, 3
+#: Number of rows from which a trend counts: chance orders three limits in one file of three, whose times are then left
+#: out; a spin-down's are never limits.
+_FEWEST = 3
 #: A number on a line of its own, with a decimal point or comma, and what is read of a file that holds nothing else.
 _NUMBER, _MOST_BYTES = re.compile(r"[+-]?\d+(?:[.,]\d*)?(?:[eE][+-]?\d+)?"), 1 << 20
 
@@ -64,15 +65,15 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
     if field:
         return limits_in_field(path, field, options.near)
     try:
-        table = read_table(path, quantities=(_TIME, *QUANTITIES), needed=QUANTITIES[:1], **options.of_tables)
+        table = read_table(path, quantities=QUANTITIES, needed=NEEDED, **options.of_tables)
     except (NoTable, NoSuchColumn) as error:
         single = _single_column(path, guess=options.guess)
         if single is None:
             raise error from None
         table = single
     readings = limit_readings(table)
-    if _TIME in table.columns:
-        _must_be_of_several(path, table.column(_TIME), readings.limit)
+    if "time_s" in table.columns:
+        _must_be_of_several(path, table.column("time_s"), readings.limit)
     return readings
 
 
@@ -85,10 +86,8 @@ def _must_be_of_several(path: Path, time: Array, limit: Array) -> None:
         return
     if not np.ptp(limit):
         raise DoesNotSuit("{path:s}: the spin does not change with time: is the drive on? {do}", path, no_times)
-    ordered = np.sort(limit)
-    ranks = np.searchsorted(ordered, limit) + np.searchsorted(ordered, limit, "right")  # equal limits share one
-    trend = float(np.corrcoef(np.arange(len(limit)), ranks)[0, 1])
-    if abs(trend) > _TREND:
+    trend = trend_of(limit)
+    if abs(trend) > LEAST_TREND:
         way = "falls" if trend < 0 else "rises"
         raise DoesNotSuit("{path:s}: the spin {way} with time, as that of one top does; {do}", path, way, no_times)
 
@@ -138,15 +137,15 @@ def _single_column(path: Path, *, guess: bool) -> Table | None:
     if not numbers or len(titles) > 1 or not all(_NUMBER.fullmatch(line) for _, line in numbers):
         return None
     title = read_title(titles[0]) if titles else None
-    named = title is not None and title.column == QUANTITIES[0]
-    if title is not None and title.column not in {None, QUANTITIES[0]}:
+    named = title is not None and title.column == NEEDED[0]
+    if title is not None and title.column not in {None, NEEDED[0]}:
         return None
     factor = 1.0 if title is None or title.unit is None else unit_factor(title.unit, "frequency")
     if factor is None or not (guess or named):
         return None
     values = np.array([float(line.replace(",", ".")) for _, line in numbers])
     return Table(
-        path, {QUANTITIES[0]: values * factor}, (), tuple(titles), np.array([k for k, _ in numbers], dtype=np.int64)
+        path, {NEEDED[0]: values * factor}, (), tuple(titles), np.array([k for k, _ in numbers], dtype=np.int64)
     )
 
 

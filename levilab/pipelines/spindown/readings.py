@@ -1,5 +1,6 @@
 """What a table of readings must fulfil before an analysis may trust it."""
 
+import math
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -21,7 +22,14 @@ from analysis.spindown.tilt import Release
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, Table, read_table, refuse
-from levilab.formats.understanding import is_possible_spin, possible_spins
+from levilab.formats.understanding import (
+    LEAST_FALL,
+    is_possible_loss,
+    is_possible_spin,
+    length_of,
+    possible_spins,
+    possible_times,
+)
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
@@ -40,8 +48,6 @@ QUANTITIES = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: Length of a window of a record, in which its frequency is one reading [s].
 WINDOW_S = 2.0
 _NAMED = "{name:s}: {text}"
-#: A record whose spin falls by less than this part is no spin-down: in 6 s, a top that coasts loses twice as much.
-LEAST_FALL = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -268,11 +274,6 @@ def _without_rest(table: Table, fewest: int) -> Table:
     )
 
 
-#: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, seconds that
-#: pass for minutes 5e-5, times in ms 3e-6; a brake of eddy currents lies between.
-FASTEST_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 1e-4
-
-
 def _doubt(text: str) -> Note:
     return Note("unit", text, weight="doubt", names_input=True)
 
@@ -281,12 +282,9 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
     """Return doubts about units: a spin that no such top has, readings closer than a turn, turns counted twice."""
     middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
     if not is_possible_spin(middle):
-        meant = tuple(
-            Text("f=NAME [{unit:s}] ({spin:n} Hz)", unit=unit, spin=digits(spin, 3))
-            for unit, spin in possible_spins(middle / table.factors.get("spin_frequency_hz", 1.0)).items()
-        )
-        say = Text("; say the unit with the column: {columns}", columns=meant) if meant else ""
-        if not meant and is_possible_spin(1e3 * middle):
+        spins = possible_spins(middle / table.factors.get("spin_frequency_hz", 1.0)).items()
+        say = _say_unit(Text("f=NAME [{unit:s}] ({spin:n} Hz)", unit, digits(spin, 3)) for unit, spin in spins)
+        if not say and is_possible_spin(1e3 * middle):
             say = "; if its point stands behind the thousands, write the numbers without it"
         text = "{name:s}: the spin is about {spin:.4g} Hz, a Levitron spins at 20 to 60 Hz{say}"
         return [_doubt(Text(text, name=table.path.name, spin=middle, say=say))]
@@ -298,17 +296,14 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
         )  # fmt: skip
         return [_doubt(doubt)]
     lasts, first, last = float(time[-1] - time[0]), float(frequency[0]), float(frequency[-1])
-    loss = float(np.log(frequency[0] / frequency[-1])) / lasts
-    if loss > FASTEST_LOSS_PER_S or (0 < loss < SLOWEST_LOSS_PER_S):
-        minutes = loss < SLOWEST_LOSS_PER_S and table.factors.get("time_s", 1.0) > 1
-        written, unit = ("minutes", "s") if minutes else ("seconds", "min" if loss > FASTEST_LOSS_PER_S else "ms")
-        hours = Text(" ({hours:n} h)", digits(lasts / 3600)) if lasts > 3600 else ""
-        doubt = Text(
-            "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz in {lasts:n} s{hours}, in air it takes "
-            "minutes; if the times are not in {written}, say so, as t=NAME [{unit:s}]",
-            table.path.name, first, last, digits(lasts, 4), hours, written, unit,
-        )  # fmt: skip
-        return [_doubt(doubt)]
+    loss, factor = math.log(first / last) / lasts, table.factors.get("time_s", 1.0)
+    if loss > 0 and not is_possible_loss(loss):
+        units = possible_times(loss * factor).items()
+        say = _say_unit(
+            Text("t=NAME [{unit:s}] ({length})", unit, length_of(lasts / factor * of)) for unit, of in units
+        )
+        text = "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz in {length}, in air it takes minutes{say}"
+        return [_doubt(Text(text, table.path.name, first, last, length_of(lasts), say))]
     if first > FASTEST_BY_HAND_HZ and FALLS_BETWEEN_HZ[1] < last / 2 < FALLS_BETWEEN_HZ[0]:
         doubt = Text(
             "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz: is each turn counted twice? No hand starts a "
@@ -317,6 +312,12 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
         )  # fmt: skip
         return [_doubt(doubt)]
     return []
+
+
+def _say_unit(columns: Iterable[str]) -> str:
+    """Return the advice to say the unit of a column."""
+    meant = tuple(columns)
+    return Text("; say the unit with the column: {columns}", columns=meant) if meant else ""
 
 
 #: Beyond these a number is no measurement: 3000 years (a clock in ms since 1970 shows 1.8e12), and spins whose powers

@@ -33,6 +33,21 @@ def test_a_question_has_its_answers_as_commands(doubtful):
     assert ended.err == "levilab: my.csv: is not read before the question is answered, by --columns\n"
 
 
+def test_times_in_doubt_stay_out_of_a_folder_and_their_answer_is_kept(tmp_path):
+    """No run in doubt goes into a mean, and after the answer each analysis reads it."""
+    for k, unit in enumerate((1, 1, 1000)):
+        rows = "".join(f"{10 * n * unit},{40 * 0.97**n + 0.01 * (n % 3):.2f}\n" for n in range(15 + k))
+        (tmp_path / f"{k}.csv").write_text(f"t,f\n{rows}", "utf-8")
+    ended = command("analyze", "spindown", ".", "--json", "--no-save", cwd=tmp_path)
+    assert len(json.loads(ended.out)["inputs"]) == 2
+    asked = command("open", "2.csv", cwd=tmp_path)
+    assert (asked.status, '  ms (2.67 min): levilab open 2.csv --columns "t=1 [ms]"' in asked.out) == (1, True)
+    assert command("open", "2.csv", "--columns", "t=1 [ms]", "--keep", cwd=tmp_path).status == 0
+    assert 't = "1 [ms]"' in (tmp_path / "2.csv.levilab.toml").read_text("utf-8")
+    ended = command("analyze", "spindown", ".", "--json", "--no-save", cwd=tmp_path)
+    assert len(json.loads(ended.out)["inputs"]) == 3
+
+
 @pytest.mark.slow
 @pytest.mark.usefixtures("undrawn_figures")
 def test_numbered_pulses_may_be_turns_since_the_start(tmp_path):

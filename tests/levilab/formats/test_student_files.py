@@ -170,7 +170,7 @@ def test_tables_below_and_beside_one_another_are_runs(head, tmp_path):
 def test_a_column_in_which_some_rows_have_no_u_behind_the_number_says_so(count, without, tmp_path):
     path = tmp_path / "my.csv"
     lines = [f"{t},{40 - t / 1000}{'' if t in without else ' ± 0.03'}\n" for t in range(count)]
-    path.write_text("t,f [Hz]\n" + "".join(lines), encoding="utf-8")
+    path.write_text("t [s],f [Hz]\n" + "".join(lines), encoding="utf-8")
     table = read_table(path, quantities=SPIN, needed=SPIN[:2])
     assert table.column("spin_frequency_hz").size == count
     assert "spin_frequency_u_hz" not in table.columns
@@ -277,7 +277,7 @@ def test_an_angular_velocity_of_tracker_is_a_question_with_its_choices():
     (run,) = understand(FILES / "tracker.txt").runs
     (doubt,) = run.doubts
     assert (doubt.kind, doubt.column) == ("unit", 2)
-    assert "column 3 'ω' has the values 1.369e+04 to 7785 and no unit" in doubt.text
+    assert "column 3 'ω' has the values 13690 to 7785 and no unit" in doubt.text
     assert doubt.choices[0].text == "°/s (38 to 21.6 Hz)"
     assert {column.quantity for column in run.columns} == {"time_s", "spin_frequency_hz", None}
     with pytest.raises(
@@ -329,6 +329,41 @@ def test_a_column_without_name_and_unit_is_asked_about(write):
     assert "'Wert' hat keine Einheit und gilt als Drehfrequenz in Hz" in in_german(table.warnings)
     with pytest.raises(NoSuchColumn):  # of a folder nothing is guessed
         read_table(file, quantities=SPIN, needed=SPIN[:2], guess=False)
+
+
+@pytest.mark.parametrize(("rows", "unit", "columns"), [
+    ("t,f\n0,38\n60000,31\n120000,26\n180000,22\n", "ms (3 min)", {"t": "1 [ms]"}),
+    ("t,rpm\n0,2280\n1,1860\n2,1560\n3,1320\n", "min (3 min)", {"t": "1 [min]"}),
+    ("t,T [ms]\n0,26\n0.02,32\n0.03,38\n0.04,45\n", "h (2.4 min)", {"t": "1 [h]"}),
+    ("0,38,.1\n60000,31,.1\n120000,26,.1\n", "ms (2 min)", {"t": "1 [ms]", "f": "2", "u": "3"}),
+    ("t,f 1,f 2\n0,38,39\n60000,31,31\n120000,26,27\n", "ms (2 min)", {"t": "1 [ms]"}),
+    ("t1,f1,t2,f2\n0,38,0,39\n60000,31,50000,31\n120000,26,90000,27\n", "ms (2 min)", {"t": "1 [ms]", "f": "2"}),
+    ("t,f\n" + "".join(f"{25 * k},{40 - k / 2000 :.4f}\n" for k in range(3001)), "ms (75 s)", {"t": "1 [ms]"}),
+])  # fmt: skip
+def test_times_in_which_no_spin_falls_are_asked_about(rows, unit, columns, write):
+    file = write(rows, "mine.csv")
+    run, *others = understand(file).runs
+    assert "and no unit, and would be in s, in which the spin falls by " in run.problem
+    assert [(choice.text, choice.columns) for choice in run.doubts[0].choices] == [
+        (unit, columns), ("s", {**columns, "t": "1 [s]"}),
+    ]  # fmt: skip
+    read = understand(file, columns=columns).runs
+    assert len(read) == 1 + len(others) * (len(columns) == 1)
+    assert not any(one.problem or one.doubts for one in read)
+    table = read_table(read[0].path, columns=columns, quantities=SPIN, needed=SPIN[:2])
+    assert 75 <= table.column("time_s")[-1] <= 180
+    (run,) = understand(file, columns=run.doubts[0].choices[1].columns).runs[:1]  # in s, as a person says: with a note
+    assert (run.problem, len(run.doubts)) == ("", 1)
+
+
+@pytest.mark.parametrize("rows", [
+    "t,f\n0,22.1\n600,21.7\n1200,22\n1800,21.8\n",  # limits of a top, one every ten minutes
+    "t,f\n" + "".join(f"{k},{40 - max(0, k - 150) / 10}\n" for k in range(300)),  # after a drive has held it
+    "t,f\n0,22\n600000,38\n900000,44\n", "t,f\n0,40\n10,38\n20,\n30,36\n", "t,f\n0:00,38\n0:02,30\n0:03,22\n",
+])  # fmt: skip
+def test_times_that_may_be_seconds_are_not_asked_about(rows, write):
+    (run,) = understand(write(rows, "mine.csv")).runs
+    assert (run.problem, run.doubts) == ("", ())
 
 
 def test_limits_in_one_column_of_a_spreadsheet_are_read(tmp_path):

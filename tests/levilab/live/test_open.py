@@ -23,9 +23,9 @@ TIME = 10.0 * np.arange(19)
 SPIN = 38 * (1 + 2.34e-4 * np.sqrt(2 * np.pi * 38) * TIME / 2) ** -2
 FIGURE = Path(__file__).parents[3] / "docs" / "pictures" / "spindown.png"
 SAMPLES = Path(__file__).parents[3] / "sample_data"
-#: Angular velocities under a title that says nothing.
+#: Angular velocities under a title that says nothing, over times in ms.
 OMEGA = "Zeit;Wert\n" + "".join(
-    f"{t:g};{2 * math.pi * f:.3f}\n".replace(".", ",") for t, f in zip(TIME, SPIN, strict=True)
+    f"{1000 * t:.0f};{2 * math.pi * f:.3f}\n".replace(".", ",") for t, f in zip(TIME, SPIN, strict=True)
 )
 DROP = """([name, text]) => {
     const carried = new DataTransfer();
@@ -59,13 +59,15 @@ def test_a_file_is_dropped_corrected_kept_and_analyzed(hall, watched, monkeypatc
     assert page.is_hidden("#command")  # it would be refused, too
     assert "no unit" in page.get_by_role("group").first.inner_text()
     page.get_by_role("button", name="rad/s (38").press("Enter")
+    until(page, "levilab.look.options.columns?.f")
+    page.get_by_role("button", name="ms (3 min)").press("Enter")
     until(page, "levilab.look.plots['0']")
     assert page.evaluate("levilab.look.plots['0'].y[0]") == pytest.approx(38, abs=0.01)
     assert page.get_by_label("unit of Wert").input_value() == "rad/s"
-    assert '--columns "t=1,f=2 [rad/s]"' in page.inner_text("#command")
+    assert '--columns "t=1 [ms],f=2 [rad/s]"' in page.inner_text("#command")
     page.get_by_role("button", name="Keep for the next time").press("Enter")
     until(page, "document.getElementById('news').textContent.startsWith('kept in')")
-    assert read_correction(file)["columns"] == {"t": "1", "f": "2 [rad/s]"}
+    assert read_correction(file)["columns"] == {"t": "1 [ms]", "f": "2 [rad/s]"}
     page.get_by_role("button", name="Analyze").press("Enter")
     until(page, "!document.getElementById('report').hidden")
     assert "disc law" in page.inner_text("#verdict")
@@ -74,7 +76,7 @@ def test_a_file_is_dropped_corrected_kept_and_analyzed(hall, watched, monkeypatc
         page.click("#report")
     assert "spin-down" in opened.value.inner_text("body").lower()
     found = json.loads((file.parent / f"{file.name}.result.json").read_text("utf-8"))
-    assert found["settings"]["columns"] == {"t": "1", "f": "2 [rad/s]"}
+    assert found["settings"]["columns"] == {"t": "1 [ms]", "f": "2 [rad/s]"}
 
 
 @pytest.mark.parametrize(("name", "file", "same"), [

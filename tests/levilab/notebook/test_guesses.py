@@ -194,8 +194,8 @@ GUESSES = {
     "levilab.analyze(frame).inputs": lambda names: names == ("DataFrame",),
     "levilab.analyze(str(folder / 'spin-down-[12]')).inputs": lambda names: names == ("spin-down-1", "spin-down-2"),
     "levilab.analyze(levilab.runs(folder), 'limit').inputs": lambda names: "lower-limits" in names,
-    "repr(levilab.analyze((1000 * t, f))).splitlines()[1]": lambda line: "if the times are not in seconds" in line,
-    "levilab.analyze((1000 * t, f)).warnings[0]": lambda text: "if the times are not in seconds" in text,
+    "repr(levilab.analyze((1000 * t, f))).splitlines()[1]": lambda line: "in 52.8 h, in air it takes minutes" in line,
+    "levilab.analyze((1000 * t, f)).warnings[0]": lambda text: text.endswith("with the column: t=NAME [ms] (3.17 min)"),
     "levilab.analyze((1000 * t, f)).summary()": lambda text: text.startswith("Before you use the numbers. "),
     # the other commands
     "levilab.__version__": lambda text: text[0].isdigit(),

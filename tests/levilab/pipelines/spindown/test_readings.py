@@ -73,7 +73,10 @@ def test_readings_closer_than_a_turn_are_doubted(tmp_path):
     said = {u: spin_readings(table_of(tmp_path, f"T [{u}],f [Hz]\n{rows}")).warnings for u in ("ms", "s", "h")}
     assert ": the readings lie 10 ms apart, the top needs 25.9 ms for a turn;" in said["ms"][0]
     assert said["s"] == ()
-    assert " from 40 to 37.2 Hz in 108000 s (30 h), in air it takes minutes;" in said["h"][0]
+    assert (
+        " from 40 to 37.2 Hz in 30 h, in air it takes minutes; say the unit with the column: t=NAME [s] (30 s)"
+        in said["h"][0]
+    )
 
 
 def test_points_behind_thousands_are_named_where_they_pass_for_decimals(tmp_path):
