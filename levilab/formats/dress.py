@@ -7,7 +7,6 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import count
 from math import inf
 
 from levilab.formats.dialect import Dialect, find_dialect
@@ -135,29 +134,38 @@ def _cassy(lines: Sequence[str]) -> Dressed:
 
 # --- LabVIEW ------------------------------------------------------------------------------------------
 
-_SETTINGS = re.compile(r"(?:Multi_Headings\WYes|X_Columns\WNo)\b")
-_NUMBER = r"[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?"
+_SETTINGS = re.compile(r"(?:Multi_Headings(?=\WYes\b)|X_Columns(?=\WNo\b))(\W)")
+#: The first field of a row: its time, or nothing where X0 and Delta_X say it.
+_TIME = re.compile(r"(?:[-+]?\d+(?:\.\d*)?(?:[eE][-+]?\d+)?)?")
 
 
 def _labview(lines: Sequence[str]) -> Dressed:
-    """Packets below a header each: one header above rows that go on, and times where X0 and Delta_X alone tell them."""
-    text, last = _content(lines).decode(), -inf
-    text = text.replace(",", ".") if "\nDecimal_Separator\t," in text else text
+    """Packets below a header each, whose units go into the titles; these stand again where times begin again."""
+    mark = next(found[1] for line in lines if (found := _SETTINGS.match(line)))
+    if any(line.startswith("Decimal_Separator\t,") for line in lines):
+        lines = [line.replace(",", ".") for line in lines]
+    plain, head = [""] * len(lines), dict[str, list[str]]()
+    titles, place, grid, rows, last = "", 0, list[float](), 0, inf
+    for k, line in enumerate(lines):
+        key, *cells = line.split(mark)
+        if key == "X_Value":
+            units = iter(head.get("Y_Unit_Label", ()))
+            named = [cell if cell in {"X_Value", "Comment"} else _with_unit(cell, next(units, "")) for cell in cells]
+            titles, place, rows = mark.join((key, *named)), k, 0
+            given = [text for name in ("X0", "Delta_X") for text in head.get(name, ())[:1]]
+            grid = [float(text) for text in given if text and _TIME.fullmatch(text)]
+        elif titles and any(cells) and _TIME.fullmatch(key) and (key or len(grid) == 2):
+            time = float(key) if key else grid[0] + rows * grid[1]
+            plain[place] = titles if rows == 0 and time <= last else plain[place]
+            plain[k] = mark.join((key or f"{time:.12g}", *cells))
+            rows, last = rows + 1, time
+        else:
+            head[key] = cells
+    return Dressed(_content(plain))
 
-    def joined(packet: str) -> str:
-        nonlocal last
-        settings = (re.search(rf"(?m)^{key}\W({_NUMBER})", packet) for key in ("X0", "Delta_X"))
-        values, titles = [float(found[1]) for found in settings if found], re.search(r"(?m)^X_Value.*\n", packet)
-        if len(values) < 2 or not titles:
-            return packet
-        head, rows, n = packet[: titles.end()], packet[titles.end() :], count()
-        rows = re.sub(r"(?m)^(?=[\t,][^\w\n]*\d)", lambda _: f"{values[0] + values[1] * next(n):.12g}", rows)
-        times = [last, *map(float, re.findall(f"(?m)^{_NUMBER}", rows)), inf]
-        blank = "\n" * (head.count("\n") - 1) + ("\n" if last < times[1] else titles[0])
-        last, begun = times[-2], last > -inf
-        return (blank if begun else head) + rows
 
-    return Dressed("".join(map(joined, re.split(r"(?m)^(?=Channels\b)", text))).encode())
+def _with_unit(title: str, unit: str) -> str:
+    return f"{title} [{unit}]" if unit and not read_title(title).unit else title
 
 
 #: How a dress is taken off, and who wears it.

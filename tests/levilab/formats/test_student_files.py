@@ -558,11 +558,11 @@ def test_minutes_beside_other_seconds_are_the_times(titles, seconds, columns, tm
 def test_packets_of_labview_are_one_run_where_their_times_go_on(begins, times, write):
     text = f"Separator\tTab\nDecimal_Separator\t,\nMulti_Headings\tYes\nX_Columns\t{times}\n"
     for start, k in zip(begins, (0, 3), strict=True):
-        text += f"Channels\t1\nY_Unit_Label\tHz\nX0\t{start}\nDelta_X\t1,0E+1\nX_Value\tUntitled\tComment\n"
-        packet = [(start + 10 * n if times == "One" else "", SPINS[k + n]) for n in range(3)]
+        text += f"Channels\t1\nY_Unit_Label\trpm\nX0\t{start}\nDelta_X\t1,0E+1\nX_Value\tUntitled\tComment\n"
+        packet = [(start + 10 * n if times == "One" else "", 60 * SPINS[k + n]) for n in range(3)]
         text += "".join(f"{t}\t{f}\t\n".replace(".", ",") for t, f in packet) + "\n"
     tables = [read_table(run.path, quantities=SPIN) for run in understand(write(text, "my.lvm")).runs]
-    assert [f for table in tables for f in table.column("spin_frequency_hz")] == [*SPINS]
+    assert [f for table in tables for f in table.column("spin_frequency_hz")] == pytest.approx(SPINS, rel=1e-14)
     assert [t for table in tables for t in table.column("time_s")] == [t + k for t in begins for k in (0, 10, 20)]
     assert len(tables) == (1 if begins[1] else 2)
 
