@@ -134,11 +134,12 @@ def fit_sweep(sweep: Sweep, *, orthogonal: bool = False, keep_miscounts: bool = 
     chosen = _part(sweep, used)
     line = _fit(chosen, orthogonal=orthogonal)
     spin_offset, u_spin_offset = _spin_offset(chosen)
+    u = _weight(chosen, line) ** -0.5  # of the points, as the fit uses them [Hz]
     fit = SweepFit(
         line=line,
         robust=robust,
         p_locked=line.p_against(),
-        power=power_of(line, float(np.ptp(chosen.drive)), _median_u(chosen, line)),
+        power=power_of(line, float(np.ptp(chosen.drive)), line.scale * float(np.median(u))),
         points=_points(sweep, used, found, line),
         spin_offset=spin_offset,
         u_spin_offset=u_spin_offset,
@@ -217,11 +218,6 @@ def _weight(sweep: Sweep, line: Line) -> Array:
         return np.asarray(u**-2.0)
     u_drive = u if sweep.u_drive is None or sweep.u is None else sweep.u_drive
     return np.asarray(1 / (u**2 + line.slope**2 * u_drive**2))
-
-
-def _median_u(sweep: Sweep, line: Line) -> float:
-    """Return the median of the points' u, as the fit uses them [Hz]."""
-    return line.scale * float(np.median(_weight(sweep, line) ** -0.5))
 
 
 def _points(sweep: Sweep, used: NDArray[np.bool_], found: list[Miscount], line: Line) -> tuple[Point, ...]:

@@ -4,7 +4,7 @@ The constants of one top differ from run to run by much more than their u by one
 each good to 0.1 %; PHYSICS.md §5). So the u of a mean over runs comes from their scatter, and the mean is unweighted.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import hypot
 
@@ -105,7 +105,7 @@ def combine(runs: Sequence[SpinDown]) -> Combined:
     Raises:
         NothingToCombine: no run, or no law common to all.
     """
-    names = [name for name in LAWS if runs and all(name in _names(run) for run in runs)]
+    names = [name for name in LAWS if runs and all(any(fit.name == name for fit in run.fits) for run in runs)]
     if not names:
         raise NothingToCombine(runs=len(runs))
     joint = joint_exponent(runs)
@@ -159,10 +159,6 @@ def _about_number(runs: Sequence[SpinDown]) -> list[Remark]:
 FEW_RUNS = 5
 
 
-def _names(run: SpinDown) -> set[str]:
-    return {fit.name for fit in run.fits}
-
-
 def _statistics(runs: Sequence[SpinDown], name: str, joint: JointExponent | None) -> Statistics:
     fits = [run.fit(name) for run in runs]
     known = [fit.statistics.chi_square for fit in fits if fit.statistics.chi_square is not None]
@@ -204,11 +200,8 @@ def _combine_law(name: str, fits: Sequence[LawFit], stats: Statistics) -> Combin
         for constant in LAWS[name].constants
         for remark in _remarks(name, constant, [fit.parameters[constant] for fit in fits], constants[constant])
     ]
-    return CombinedLaw(name, constants, _means(lines, tuple(lines[0])) if lines else None, stats, tuple(said))
-
-
-def _means(runs: Sequence[Mapping[str, Estimate]], names: Sequence[str]) -> dict[str, Mean]:
-    return {name: mean([run[name] for run in runs]) for name in names}
+    linearised = {constant: mean([line[constant] for line in lines]) for constant in lines[0]} if lines else None
+    return CombinedLaw(name, constants, linearised, stats, tuple(said))
 
 
 def mean(estimates: Sequence[Estimate], shared_u: Sequence[float] = ()) -> Mean:

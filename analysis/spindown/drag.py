@@ -163,7 +163,7 @@ class DragLaw:
         >>> [LAWS[name].equation for name in ("disc", "mixed", "power")]
         ['ω̇ = −C₃/₂ω^(3/2)', 'ω̇ = −C₁ω − C₂ω^(2)', 'ω̇ = −cω^(n)']
         """
-        powers = [str(_fraction(m + 1)) for m in self.orders] or [self.symbols[1]]
+        powers = [str(Fraction(m + 1).limit_denominator(100)) for m in self.orders] or [self.symbols[1]]
         terms = zip(self.symbols, powers, strict=False)
         return "ω̇ = −" + " − ".join(f"{symbol}ω" + (f"^({n})" if n != "1" else "") for symbol, n in terms)
 
@@ -212,10 +212,6 @@ class DragLaw:
         rates = slice(1, 1 + max(len(self.orders), 1))
         q[rates] *= duration * (2 * np.pi * reference_hz) ** np.array(self.orders or q[2:])
         return q
-
-
-def _fraction(x: float) -> Fraction:
-    return Fraction(x).limit_denominator(100)
 
 
 _LOW = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")

@@ -186,7 +186,7 @@ class Session(Generic[S]):
             clock.sleep(left * _NAP_S / wall if wall > _NAP_S else left)
 
     def begin(
-        self, start: Callable[[], None], *, resumed: str = "without driving again", reading_s: float = 0.0
+        self, start: Callable[[], object], *, resumed: str = "without driving again", reading_s: float = 0.0
     ) -> None:
         """Bring the top to where reading begins: that moment is time zero.
 

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -129,12 +128,8 @@ def check_request(request: AnimationRequest, scene: Scene, duration: float) -> N
             value=request.playing_speed,
         )
     chosen.check()
-    with _writing(request.path):
+    with writing(request.path, "choose another place with `animate`"):
         check_writable(request.path)
-
-
-def _writing(path: Path) -> AbstractContextManager[None]:
-    return writing(path, "choose another place with `animate`")
 
 
 def _check_pictures(chosen: _Format, span: float, speed: float) -> None:

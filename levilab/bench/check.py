@@ -131,7 +131,8 @@ def _check(kind: str, wiring: Wiring, light: Light) -> Checked:
         return Checked(kind, address, **seen, trouble=error.reason)
     except ConfigError as error:
         return Checked(kind, address, **seen, trouble=str(error))
-    return Checked(kind, address, **seen, reading=reading, value=_finite(value), unit=unit)
+    finite = value if value is not None and math.isfinite(value) else None
+    return Checked(kind, address, **seen, reading=reading, value=finite, unit=unit)
 
 
 #: Fields of an identity: of an instrument (IEEE 488.2, 10.14), and behind an address with a scheme of its own.
@@ -143,7 +144,3 @@ def _identity(answer: str, names: tuple[str, ...]) -> dict[str, str]:
     """Return the four fields of an identity by name; those that are missing are empty."""
     fields = [*(field.strip() for field in answer.split(",", 3)), "", "", ""]
     return dict(zip(names, fields, strict=False))
-
-
-def _finite(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None

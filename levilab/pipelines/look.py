@@ -188,7 +188,7 @@ def _with_known_columns(
 
 def _plot_of_table(run: UnderstoodRun, given: Mapping[str, Any], wanted: tuple[Any, Any]) -> Plot | None:
     """Return the first two quantities of a table, one against the other; None: too large.  Raises LevilabError."""
-    if run.problem or _size_of(run.path) > _LARGEST:
+    if run.problem or (run.path.is_file() and run.path.stat().st_size > _LARGEST):
         return None
     table = read_table(run.path, quantities=wanted[0], needed=wanted[1], **given)
     names = [name for name in wanted[0] if name in table.columns and name in QUANTITIES]
@@ -199,10 +199,6 @@ def _plot_of_table(run: UnderstoodRun, given: Mapping[str, Any], wanted: tuple[A
     step = max(1, -(-len(y) // _POINTS))
     axes = [(QUANTITIES[name][0], QUANTITIES[name][1][0]) for name in names[:2]]
     return Plot(tuple(x[::step].tolist()), tuple(y[::step].tolist()), *([("reading", ""), *axes][-2:]))
-
-
-def _size_of(path: Path) -> int:
-    return path.stat().st_size if path.is_file() else 0
 
 
 def _look_at_record(path: Path, record: Waveform | PulseTimes, channel: str | None) -> Look:

@@ -109,7 +109,7 @@ def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> 
         numbers: those that are aligned to the right.
     """
     table = _Table(
-        box=box.SIMPLE_HEAD if _is_unicode(sys.stdout.encoding) else _ASCII_HEAD,
+        box=box.SIMPLE_HEAD if for_encoding("─", sys.stdout.encoding) == "─" else _ASCII_HEAD,
         padding=(0, 1, 0, 0),
         pad_edge=False,
         title=title,
@@ -168,7 +168,3 @@ def draw(table: Table) -> RichTable:
         drawn.add_row(*map(escape, row.cells))
         before = row.kind
     return drawn
-
-
-def _is_unicode(encoding: str | None) -> bool:
-    return for_encoding("─", encoding) == "─"

@@ -234,10 +234,6 @@ def _narrowest(heads: list[str], rows: list[list[str]]) -> int:
     return sum(max(cell_len(word) for text in set(column) for word in text.split()) + 2 for column in columns)
 
 
-def _seconds(length: float | None) -> str:
-    return "—" if length is None else f"{length:.0f} s"
-
-
 def _cells(run: Listed, above: str, room: int, *, groups: bool) -> list[str]:
     """Return a row of the list.
 
@@ -250,7 +246,8 @@ def _cells(run: Listed, above: str, room: int, *, groups: bool) -> list[str]:
     when = (run.started_utc or "—")[:16].replace("T", " ")
     scene = f" {run.scene}" if run.scene not in {"", run.experiment} else ""
     what = run.experiment + scene + (in_language(", synthetic") if run.synthetic else "")
-    cells = [when, _below(run.path, above), what, in_language(run.status), run.size, _seconds(run.length_s)]
+    length = "—" if run.length_s is None else f"{run.length_s:.0f} s"
+    cells = [when, _below(run.path, above), what, in_language(run.status), run.size, length]
     if groups:
         cells.append(run.group)
     if room:

@@ -115,6 +115,7 @@ def _facts_table(found: Stability) -> Table:
     beside = is_thesis_device(found.scene)
     lower, upper = found.floating.spins[0] if found.floating.spins else (math.nan, math.nan)
     small, lacks = "{hz:.2f} for small motions", "{hz:.3f}, lacks the factor 2√(I₁/I₃)"
+    modes = Text("{texts}", texts=tuple(map(_mode, found.modes)))
     rows = [
         ("height [cm]", Text("{cm:.3f}", cm=100 * found.floating.height), THESIS["height"]),
         ("mass [g]", Text("{g:.2f}", g=1000 * found.scene.top.mass_kg), THESIS["mass"]),
@@ -122,15 +123,11 @@ def _facts_table(found: Stability) -> Table:
         ("fastest spin [Hz]", Text(small, hz=upper), THESIS["upper"]),
         ("sleeping top's limit [Hz]", Text("{hz:.2f}", hz=found.sleeping), ""),
         ("the thesis's estimate [Hz]", Text(lacks, hz=found.thesis_estimate), "14.005, lacks it, too"),
-        (Text("modes at {hz:g} Hz [Hz]", hz=found.scene.start.spin_hz), _modes(found), ""),
+        (Text("modes at {hz:g} Hz [Hz]", hz=found.scene.start.spin_hz), modes, ""),
         ("up-and-down mode [Hz]", Text("{hz:.3f}", hz=found.vertical), ""),
     ]
     heads = ("", "here", "in the thesis")
     return table("The floating top", heads if beside else heads[:2], [row if beside else row[:2] for row in rows])
-
-
-def _modes(found: Stability) -> str:
-    return Text("{texts}", texts=tuple(map(_mode, found.modes)))
 
 
 def _mode(mode: complex) -> str:

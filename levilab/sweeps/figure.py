@@ -470,7 +470,7 @@ def _headline(found: Map, column: str) -> str:
 
 
 def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) -> list[str]:
-    wide, high = (_step(axis) for axis in (view.x, view.y))
+    wide, high = (step_in_words(one.key, one.values, logarithmic=one.scale == "log") for one in (view.x, view.y))
     cell = Text(
         "Each cell is one top, simulated for {seconds:g} s, and spans {wide} × {high}: a limit is known no better.",
         seconds=found.plan.duration_s, wide=wide, high=high,
@@ -482,10 +482,6 @@ def _caption(found: Map, view: _View, sentences: Sequence[str], width: float) ->
         said.append(Text("{left} of {all} points are not computed yet.", left=left, all=found.computed.size))
     text = in_language(Sentences(*said)).replace(" %", "\N{NO-BREAK SPACE}%")
     return textwrap.wrap(text, round(15.6 * width))
-
-
-def _step(axis: Axis) -> str:
-    return step_in_words(axis.key, axis.values, logarithmic=axis.scale == "log")
 
 
 def _reading_sentences(plan: Plan, view: _View, column: str, lines: Sequence[Artist]) -> list[str]:

@@ -87,12 +87,10 @@ class Publisher:
                 break
             except OSError:  # Windows: a view has gone, ConnectionResetError; or a datagram is too long
                 continue
-            if self.address and is_wish(data, self.address.token) and (view in self._views or self._has_room()):
+            has_room = view in self._views or len(self._views) < _MOST_VIEWS
+            if has_room and self.address and is_wish(data, self.address.token):
                 self._views[view] = now
         self._views = {view: asked for view, asked in self._views.items() if now - asked < FORGOTTEN_AFTER_S}
-
-    def _has_room(self) -> bool:
-        return len(self._views) < _MOST_VIEWS
 
     def send(self, message: Message) -> None:
         """Send a message to all views; one that cannot be sent is lost."""

@@ -53,7 +53,8 @@ def run(session: Session[SwaySettings]) -> None:
     """Let a person float and push the top, and read spin and film until it falls or the time is over."""
     settings = session.settings
     prepare_counter(session)
-    session.begin(lambda: _float_top(session), resumed="the film goes on")
+    task = FloatTop("the virtual bench spins the top, lets it float, and pushes it sideways by half a millimetre")
+    session.begin(lambda: session.ask(task), resumed="the film goes on")
     top, frame = free_top(session, session.rows[-3:]), _frames_kept(session)
     for _ in session.readings_every(settings.interval_s, settings.longest_s):
         reading = top.read()
@@ -63,10 +64,6 @@ def run(session: Session[SwaySettings]) -> None:
         elif end := top.fall():
             session.event(RunEvent.FELL, end)
             return
-
-
-def _float_top(session: Session[SwaySettings]) -> None:
-    session.ask(FloatTop("the virtual bench spins the top, lets it float, and pushes it sideways by half a millimetre"))
 
 
 def _frames_kept(session: Session[SwaySettings]) -> int:

@@ -28,7 +28,7 @@ _OF_BASE, _OF_TOP = "base_", "top_"
 def known_of(source: Source[FieldReadings], device: Device | None) -> Known:
     """Return what is known of the base and the instrument: what the file says, else the run.  Raises DataError."""
     of_run = source.settings("field")
-    base = _base(source, of_run, device)
+    base = _merged(source, BaseTable, _OF_BASE, of_run, device.base if device else None)
     if base.inner_radius_m is None or base.outer_radius_m is None:
         raise DataError(
             "{path:s}: the radii of the base are not known: write [base] with inner_radius_m and outer_radius_m into a "
@@ -50,10 +50,6 @@ def known_of(source: Source[FieldReadings], device: Device | None) -> Known:
         Prior(0.0, background),
         gain if source.readings.has_own_u or device else 0.0,
     )
-
-
-def _base(source: Source[FieldReadings], of_run: dict[str, Any], device: Device | None) -> BaseTable:
-    return _merged(source, BaseTable, _OF_BASE, of_run, device.base if device else None)
 
 
 def _merged(

@@ -228,10 +228,6 @@ def _fold(signal: Array, turns: Array) -> tuple[Array, Array]:
 # --- the panels ----------------------------------------------------------------------------------------
 
 
-def _thin(n: int) -> slice:
-    return slice(None, None, max(n // MOST_POINTS, 1))
-
-
 def _draw_trace(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
     """Draw a few turns about the reference time, and where the fit has the pulses."""
     frequency = spin.frequency.value or 1.0
@@ -251,7 +247,7 @@ def _draw_trace(axes: Axes, excerpt: _Excerpt, spin: SpinFrequency) -> None:
 
 def _draw_folded(axes: Axes, excerpt: _Excerpt) -> None:
     """Draw all turns over each other."""
-    part = _thin(len(excerpt.turns))
+    part = slice(None, None, max(len(excerpt.turns) // MOST_POINTS, 1))
     off = excerpt.turns - np.rint(excerpt.turns)
     style: Any = {"marker": ".", "markersize": 2, "linestyle": "none", "color": FIT, "alpha": 0.4, "rasterized": True}
     axes.plot(off[part], excerpt.signal[part], **style)

@@ -91,12 +91,7 @@ def _law(analysis: SpinDownAnalysis) -> Iterator[str]:
             "something else."
         )
     elif verdict.decided:
-        yield _torque(verdict.best)
-
-
-def _torque(law: str) -> str:
-    """Return what the drag's torque depends on, as a sentence."""
-    return Text("The torque of the drag is proportional to {torque}.", torque=LAWS[law].torque)
+        yield Text("The torque of the drag is proportional to {torque}.", torque=LAWS[verdict.best].torque)
 
 
 def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
@@ -416,7 +411,7 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
         heading="Spin-down of a levitated top",
         lead=Text("{readings} used", readings=how_many(n, "reading")),
         result=(
-            *(() if analysis.is_doubtful else _meaning(analysis)),
+            *(() if analysis.is_doubtful else (Paragraph(Sentences(*meaning(analysis)), "What it means."),)),
             *_falls(analysis),
             *_laws(analysis),
             *_count(analysis),
@@ -444,14 +439,6 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
             verdict_of_run,
         ),
     )
-
-
-# --- what the fits mean --------------------------------------------------------------------------------
-
-
-def _meaning(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
-    """Return what takes the spin by the best law, how fast, and the meaning of the constants."""
-    return (Paragraph(Sentences(*meaning(analysis)), "What it means."),)
 
 
 def _falls(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:

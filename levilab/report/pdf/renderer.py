@@ -36,7 +36,7 @@ from levilab.present.document.blocks import (
     Warnings,
 )
 from levilab.present.document.typesetting import typeset
-from levilab.present.tables import Row, Table
+from levilab.present.tables import Table
 from levilab.software import how_to_install
 from levilab.texts.text import Text as Said
 from levilab.texts.text import how_many, in_language
@@ -375,12 +375,8 @@ def _table(table: Table, wraps: Collection[str] = ()) -> Drawn:
         "heads": [_lines(head) for head in table.heads],
         "numbers": [k in table.numbers for k in range(len(table.heads))],
         "wraps": [head in wraps for head in table.heads],
-        "rows": [_row(row) for row in table.rows],
+        "rows": [{"kind": row.kind, "cells": [_lines(cell) for cell in row.cells]} for row in table.rows],
     }
-
-
-def _row(row: Row) -> Drawn:
-    return {"kind": row.kind, "cells": [_lines(cell) for cell in row.cells]}
 
 
 def _picture(block: Picture, drawing: _Drawing) -> Drawn:

@@ -326,7 +326,7 @@ def test_two_arrays_need_no_brackets():
 FOUR = [40.0, 41.0, 42.0, 43.5]
 #: Wrong calls: the argument that the UsageError names, or the class of another error.
 WRONG = {
-    "several suit": (lambda: levilab.analyze(SAMPLE_DATA), "kind"),
+    "several suit": (lambda: levilab.analyze(SAMPLE_DATA / "sway"), "kind"),
     "no such kind": (lambda: levilab.analyze(spin_down(), "spin-down"), "kind"),
     "no such data": (lambda: levilab.analyze(5), "data"),
     "frequencies before times": (lambda: levilab.analyze(([9.0, 7.0, 6.0], [1, 2, 3])), "data"),
