@@ -7,6 +7,7 @@ writes the same bytes each time.
 
 import json
 import math
+import struct
 import zipfile
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -275,6 +276,45 @@ def ods(path: Path, sheets: Mapping[str, Rows]) -> None:
     archive(path, {"mimetype": kind, "content.xml": content, "META-INF/manifest.xml": manifest})
 
 
+def xls(path: Path, name: str, rows: Rows) -> None:
+    """Write a sheet as Excel 97 does: records ([MS-XLS]) in the stream Workbook of a compound file ([MS-CFB])."""
+
+    def record(kind: int, content: bytes) -> bytes:
+        return struct.pack("<HH", kind, len(content)) + content
+
+    def cell(row: int, column: int, value: Cell) -> bytes:
+        place = struct.pack("<HHH", row, column, 0)
+        if not isinstance(value, str):
+            return record(0x0203, place + struct.pack("<d", value))
+        return record(0x0204, place + struct.pack("<HB", len(value), 1) + value.encode("utf-16-le"))
+
+    def begin(kind: int) -> bytes:
+        return record(0x0809, struct.pack("<HHHHII", 0x0600, kind, 0, 0, 0, 0))
+
+    end, sheet = record(0x000A, b""), struct.pack("<BB", len(name), 0) + name.encode("ascii")
+    start = len(begin(5)) + len(record(0x0085, struct.pack("<IH", 0, 0) + sheet)) + len(end)
+    book = begin(5) + record(0x0085, struct.pack("<IH", start, 0) + sheet) + end
+    cells = (cell(k, n, value) for k, row in enumerate(rows) for n, value in enumerate(row))
+    book = (book + begin(0x10) + b"".join(cells) + end).ljust(4096, b"\0")  # smaller streams lie elsewhere
+    sectors = -(-len(book) // 512)
+    free, last, none = 0xFFFFFFFF, 0xFFFFFFFE, b"\xff" * 4
+    table = [0xFFFFFFFD, last, *range(3, sectors + 2), last]  # of the table itself, the directory, the stream
+
+    def entry(title: str, kind: int, child: int, first: int, size: int) -> bytes:
+        text = title.encode("utf-16-le")
+        length = len(text) + 2 if title else 0
+        head = text.ljust(64, b"\0") + struct.pack("<HBB", length, kind, 1) + none * 2 + struct.pack("<I", child)
+        return head + b"\0" * 36 + struct.pack("<IQ", first, size)
+
+    head = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1" + b"\0" * 16
+    head += struct.pack("<HHHHH6xIIIIIIIIII", 0x3E, 3, 0xFFFE, 9, 6, 0, 1, 1, 0, 4096, last, 0, last, 0, 0)
+    directory = (
+        entry("Root Entry", 5, 1, last, 0) + entry("Workbook", 2, free, 2, len(book)) + entry("", 0, free, 0, 0) * 2
+    )
+    fat = b"".join(struct.pack("<I", one) for one in table).ljust(512, b"\xff")
+    path.write_bytes(head.ljust(512, b"\xff") + fat + directory + book.ljust(512 * sectors, b"\0"))
+
+
 def write_workbooks(folder: Path) -> None:
     """Write the spreadsheets and the zip."""
     name = "excel.xlsx"
@@ -283,6 +323,8 @@ def write_workbooks(folder: Path) -> None:
     titled = [("Messreihe vom 23.11.2026", ""), ("", ""), ("Zeit t in s", "Drehzahl n in 1/min")]
     measured = block([*titled, *((t, 60 * f) for t, f in data)], "C", 4) | {"G7": "Mittelwert", "H7": 28.4}
     xlsx(folder / name, {"Notizen": notes, "Messung": measured}, {"Messung": "C4:D4"})
+    name = "excel-97.xls"
+    xls(folder / name, "Messung", [("Zeit [s]", "Drehzahl [1/min]"), *((t, 60 * f) for t, f in readings(name))])
     name = "excel-times.xlsx"
     rows = [(START + timedelta(seconds=t), f) for t, f in readings(name)]
     xlsx(folder / name, {"Tabelle1": block([("Datum", "Frequenz [Hz]"), *rows])})

@@ -59,6 +59,7 @@ KINDS = (
     _program("a PicoScope file", ".psdata .pssettings", "PicoScope", "File, Save As, CSV"),
     _program("a WaveForms workspace", ".dwf3work .dwf3scope", "WaveForms", "Scope, File, Export, CSV"),
     _program("a Saleae capture", ".sal .logicdata", "Logic", "File, Export Raw Data, CSV"),
+    _program("a DSView capture", ".dsl", "DSView", "File, Export, CSV"),
     _program("a LabVIEW TDMS file", ".tdms .tdms_index", "LabVIEW", "Write To Measurement File, Text (LVM)"),
     _program("a MATLAB file", ".mat", "MATLAB", "writematrix([t f], 'run.csv')"),
     _program("a Numbers spreadsheet", ".numbers", "Numbers", "File, Export To, Excel"),

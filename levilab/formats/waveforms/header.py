@@ -8,8 +8,9 @@ Headers as the scopes write them (each found in public files):
     Tektronix TDS        Record Length,2.5e+03,,-0.02,0.04   the header beside the first 18 rows
     OWON, Hantek, others Time interval  :,100.00uS  …  index,CH1_Voltage(mV);  #CLOCK=50.0uS;  XInc:,1e-4
     sigrok, PulseView    ; Channels (2/8): D0, D1  /  ; Samplerate: 8 MHz;  nanoseconds,logic,logic
+    DSView, of DSCope    ; Channels (2/2)  /  ; Sample rate: 1 MHz;   0 (Unit: mV), 1 (Unit: V)
 
-Plain tables with titles, as PicoScope, Analog Discovery, Red Pitaya, DSView and Saleae write them, have no part here.
+Plain tables with titles, as PicoScope, Analog Discovery, Red Pitaya, DSLogic and Saleae write them, have no part here.
 """
 
 import re
@@ -375,11 +376,13 @@ def _recognise_sigrok(head: Head, dialect: Dialect, rows: Sequence[Sequence[str]
     names = said.get("channels", "").split(",")
     columns = []
     for place, k in enumerate(range(int(timed), filled_count(rows[first]))):
-        unit = titles[k].partition(" ")[0] if k < len(titles) else ""
-        name = names[place].strip() if place < len(names) else ""
+        title = titles[k] if k < len(titles) else ""
+        of_dsview = re.fullmatch(r"(.+) \(Unit: (.+)\)", title)
+        unit = of_dsview[2] if of_dsview else title.partition(" ")[0]
+        name = _signal(of_dsview[1]) if of_dsview else names[place].strip() if place < len(names) else ""
         of_unit = ("logic", 1.0) if unit in {"", "logic"} else _unit(unit if _is_unit_word(unit) else "V")
         columns.append(SampleColumn(shorten(name or f"CH{place + 1}"), of_unit[0], k, of_unit[1]))
-    rate = re.fullmatch(r"(\S+) ?([kMG]?)Hz", said.get("samplerate", ""))
+    rate = re.fullmatch(r"(\S+) ?([kMG]?)Hz", said.get("samplerate") or said.get("sample rate", ""))
     known = printed(rate[1], dialect) if rate else None
     scale = {"k": 1e3, "M": 1e6, "G": 1e9}.get(rate[2], 1.0) if rate else 1.0
     step = Printed(1 / (known.value * scale), 0.0) if known and known.value > 0 else None

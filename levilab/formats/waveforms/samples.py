@@ -248,8 +248,9 @@ def _printed_times(head: Head, header: Header, survey: _Survey, rate: float | No
     if rate is not None:
         return _Times(first, 1 / rate, tuple(about_rate(path, header.step.value if header.step else mean, rate)))
     if not mean > 0:
-        what = "its times do not increase, from {first:g} s to {last:g} s: sort the rows, or say `rate`"
-        raise TableError(path, what, first, last)
+        spacing = Text(" = {rate:.6g}, if the rows follow one another", rate=-1 / mean) if mean else ""
+        what = "its times do not increase, from {first:g} s to {last:g} s: sort the rows, or say `rate`{spacing}"
+        raise TableError(path, what, first, last, spacing)
     largest = max(abs(first), abs(last))
     allowed = max(1.01 * clock.resolution * unit, min(SINGLE * largest, mean / 4)) + 1e-9 * mean
     if max(clock.longest[0] * unit - mean, mean - clock.shortest[0] * unit) > allowed:

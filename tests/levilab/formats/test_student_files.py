@@ -444,6 +444,7 @@ def test_a_damaged_locked_or_foreign_file_says_what_to_do(tmp_path):
         "run.json": (b'{"schema": "levilab-run/1"}', "name the folder of the run"),
         "words.json": (b'{"a": "b"}', "JSON file without a table"),
         "exp.cmbl": (b"<?xml?>", "in Logger Pro: File, Export As, CSV"),
+        "logic.dsl": (whole, "in DSView: File, Export, CSV"),
         "exp.cap": (whole, "in Capstone: File, Export Data"),
     }
     for name, (content, says) in cases.items():

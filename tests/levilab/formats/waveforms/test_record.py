@@ -49,6 +49,7 @@ SCOPE_FILES = {
     "hantek-dso5102p.csv": ("Hantek CSV", 0.0, "CH1", "V"),
     "rigol-mso5000.csv": ("Rigol CSV", START, "CH1", "V"),
     "pulseview.csv": ("sigrok CSV", 0.0, "A0", "V"),
+    "dsview-dscope.csv": ("sigrok CSV", 0.0, "CH0", "V"),
     "samples-4000hz.npy": ("NumPy array", 0.0, "CH1", "V"),
     "recording.wav": ("WAV", 0.0, "mono", "full scale"),
 }
@@ -66,6 +67,16 @@ def test_a_record_reads_the_same_from_every_makers_scope(name, sample_data):
     scale = 2.0 if unit == "full scale" else 1.0
     step = 2 / 32768 if unit == "full scale" else 1e-6  # of a 16-bit WAV, and of single precision
     np.testing.assert_allclose(scale * record.samples(), written, atol=step, rtol=0)
+
+
+def test_times_that_fall_are_refused_with_the_rate_that_they_have(sample_data):
+    path = sample_data / "scope-files" / "red-pitaya.csv"
+    with pytest.raises(
+        TableError, match=r"from 0.25 s to -0.249512 s: sort the rows, or say `rate` = 2048, if the rows"
+    ):
+        read_record(path)
+    record = waveform(path, rate=2048.0)
+    assert (record.count, record.signals[0].name, record.samples()[:3].tolist()) == (1024, "IN1", [0.13, 0.11, 0.08])
 
 
 def test_times_that_lost_digits_give_the_step_by_a_line_and_say_so(sample_data):

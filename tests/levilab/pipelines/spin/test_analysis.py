@@ -35,7 +35,7 @@ from support.paths import ROOT, SAMPLE_DATA
 
 def true_frequency(name, time):
     """Of the sample files, as sample_data/make.py makes them: 30 Hz at time 0 of scopes, 0.25 s into other files."""
-    others = ("recording", "samples", "phone", "pulseview", "owon", "hantek", "microcontroller")
+    others = ("recording", "samples", "phone", "pulseview", "owon", "hantek", "microcontroller", "dsview-dscope")
     from_middle = time - 0.25 if name.startswith(others) else time
     return 30.0 - 0.095 * from_middle
 
@@ -55,7 +55,7 @@ def scope_files():
 
 def test_every_sample_file_gives_the_spin_that_it_was_made_with(scope_files):
     analysis = scope_files
-    assert len(analysis.runs) == 21  # the array needs a rate
+    assert len(analysis.runs) == 27  # the array and times that fall need a rate
     for source, run in zip(analysis.sources, analysis.runs, strict=True):
         frequency, chirp = run.spin.frequency, run.spin.chirp
         truth = true_frequency(source.name, run.spin.reference_time)
@@ -255,7 +255,7 @@ def test_each_analysis_takes_its_own_out_of_a_folder(sample_data, tmp_path):
     down, spin = found["spindown"], found["spin"]
     assert [source.name for source in down.sources][:2] == ["spin-down-1", "spin-down-2"]
     assert [source.name for source in down.sources][4:] == ["long.wav"]
-    assert len(spin.sources) == 24  # 21 files, the long one, two runs with traces of a tape
+    assert len(spin.sources) == 30  # 27 files, the long one, two runs with traces of a tape
     quiet = [text for each in (down, spin) for text in each.warnings]
     assert not [text for text in quiet if any(name in text for name in ("notes", "field.csv", "no titles"))]
     assert {one.kind.name for one in down.remarks if "npy" in str(one)} == {"a NumPy array"}
