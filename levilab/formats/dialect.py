@@ -26,6 +26,8 @@ MISSING = frozenset((
 ))  # fmt: skip
 #: Mark of a formula without its value, in the place of a number.
 UNVALUED = "=?"
+#: What PicoScope writes, with its sign, for a sample beyond the range of its input.
+OFF_RANGE = "\N{INFINITY}"
 #: A number with marks between its thousands: 2.394,0 and 2,394.0, of which 2.394 alone could be either; 2 394, 2'394.
 _THOUSANDS = re.compile(r"[+-]?\d{1,3}(?P<mark>[.,'’ ])\d{3}(?:(?P=mark)\d{3})*(?P<decimals>[.,]\d+)?")
 #: A power of ten as people write it.
@@ -108,7 +110,7 @@ class Dialect:
         """
         with contextlib.suppress(ValueError):
             return self._plain_number(text)
-        text = re.sub(r"[^\S\t]", " ", text).replace("\N{MINUS SIGN}", "-")
+        text = re.sub(r"[^\S\t]", " ", text).replace("\N{MINUS SIGN}", "-").replace(OFF_RANGE, "inf")
         text = _POWER.sub(lambda m: "e" + unicodedata.normalize("NFKC", m[1]).replace("\N{MINUS SIGN}", "-"), text)
         if found := _THOUSANDS.fullmatch(text):
             mark, decimals = found["mark"], found["decimals"] or ""

@@ -10,7 +10,7 @@ import numpy as np
 
 from analysis.arrays import Array
 from levilab.formats.columns import TableError, shorten
-from levilab.formats.dialect import MISSING, Dialect
+from levilab.formats.dialect import MISSING, OFF_RANGE, Dialect
 from levilab.formats.layout import EXPORT, HEAD, encoding_of, lines_of, refuse_other_kinds
 from levilab.formats.rows import EXPECTED, FIELDS, left_out
 from levilab.formats.texts import Text
@@ -92,7 +92,7 @@ class Block:
     """Rows in order.
 
     Attributes:
-        numbers: shape (rows, columns that are used), all finite.
+        numbers: shape (rows, columns that are used), infinite where a sample is beyond the range of its input.
         line: 1-based line that the piece begins with; text: the piece.
         torn: a last line that was cut off and is left out, if there is one.
     """
@@ -182,7 +182,7 @@ def _number(path: Path, text: str, line: int, dialect: Dialect) -> float:
     except ValueError:
         what = "'{cell:s}' stands where {expected} is expected: correct it, or remove the line"
         raise TableError(path, what, shorten(text), EXPECTED[dialect.decimal], line=line) from None
-    if not abs(value) < HIGHEST:
+    if not (abs(value) < HIGHEST or OFF_RANGE in text):
         what = "'{cell:s}' is a missing sample, but samples are evenly spaced: export again, or cut the file there"
         raise TableError(path, what, shorten(text), line=line)
     return value

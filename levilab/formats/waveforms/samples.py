@@ -107,11 +107,22 @@ class _Times:
 
 @dataclass
 class _Survey:
-    """What one pass over the rows finds.  torn: of a last line that was cut off."""
+    """What one pass over the rows finds.  torn: of a last line that was cut off.
+
+    off_range: number of samples beyond the range of their input; lowest, highest: of the others, of each column.
+    """
 
     count: int = 0
+    off_range: int = 0
+    lowest: Array = field(default_factory=lambda: np.array(np.inf))
+    highest: Array = field(default_factory=lambda: np.array(-np.inf))
     clock: _Clock = field(default_factory=_Clock)
     torn: str | None = None
+
+    def clip(self, values: Array, column: int) -> Array:
+        """Return samples of a column with those beyond the range at the ends of the others, at 0 without others."""
+        low, high = (ends[column] if self.off_range else 0.0 for ends in (self.lowest, self.highest))
+        return values if not self.off_range else values.clip(low, high) if low <= high else np.zeros_like(values)
 
 
 def read_samples(
@@ -146,7 +157,7 @@ def read_samples(
     def read(signal: int) -> Iterator[Array]:
         column, left = header.columns[signal], survey.count  # a last line may be torn in another column
         for block in read_blocks(head, header.dialect, header.first_line, [column.index]):
-            values = block.numbers[:left, 0]
+            values = survey.clip(block.numbers[:left, 0], header.used.index(column.index))
             left -= len(values)
             if values.size:
                 yield values * column.factor if column.factor != 1 else values
@@ -197,6 +208,12 @@ def _rising_edges(
 
 def _about_count(path: Path, header: Header, survey: _Survey) -> Iterator[str]:
     """Yield warnings about the end of the file."""
+    if survey.off_range:
+        said = (
+            "{name:s}: {n} samples lie beyond the range of the input (∞): they are taken at the ends of the others, as "
+            "clipped: choose a larger range"
+        )
+        yield of_file("off range", Text(said, path.name, survey.off_range))
     if survey.torn:
         yield of_file("torn", Text("{name:s}, {text}", path.name, survey.torn))
     if header.count is not None and header.count != survey.count:
@@ -211,6 +228,10 @@ def _look_over(head: Head, header: Header) -> _Survey:
     for block in read_blocks(head, header.dialect, header.first_line, header.used):
         survey.count += len(block.numbers)
         survey.torn = survey.torn or block.torn
+        off_range = np.isinf(block.numbers)
+        survey.off_range += int(off_range.sum())
+        survey.lowest = np.minimum(survey.lowest, block.numbers.min(axis=0, initial=np.inf, where=~off_range))
+        survey.highest = np.maximum(survey.highest, block.numbers.max(axis=0, initial=-np.inf, where=~off_range))
         if header.time is not None or header.sequence is not None:
             survey.clock.pass_by(header, block)
     return survey

@@ -69,6 +69,26 @@ def test_a_record_reads_the_same_from_every_makers_scope(name, sample_data):
     np.testing.assert_allclose(scale * record.samples(), written, atol=step, rtol=0)
 
 
+def test_samples_beyond_the_range_are_clipped_at_the_ends_of_the_others(sample_data, tmp_path):
+    """PicoScope writes ∞ and -∞ for them, here also in the first rows, and in all rows of another channel."""
+    path, written = tmp_path / "pico.csv", sample_data / "scope-files" / "picoscope.csv"
+    lines = [line.split(",") for line in written.read_text("utf-8").splitlines()]
+    values = np.array([float(row[1]) for row in lines[3:]])
+    values[:2] = 1.0, 0.0
+    cells = [f"{v}" if 0.055 < v < 0.795 else "∞" if v > 0.5 else "-∞" for v in values]
+    rows = [f"{t},{cell},∞\r\n" for (t, _), cell in zip(lines[3:], cells, strict=True)]
+    path.write_text("Time,Channel A,Channel B\r\n(ms),(V),(V)\r\n\r\n" + "".join(rows), "utf-8", newline="")
+    record = waveform(path)
+    np.testing.assert_allclose(record.samples(), values.clip(0.06, 0.79), atol=1e-12)
+    assert not record.samples("Channel B").any()
+    (note,) = record.warnings
+    beyond = sum("∞" in cell for cell in cells) + COUNT
+    assert f"pico.csv: {beyond} samples lie beyond the range of the input (∞): they are taken at the ends" in note
+    path.write_text(path.read_text("utf-8").replace("-249.75000000,", "∞,"), "utf-8")
+    with pytest.raises(TableError, match="its time goes back by inf s"):
+        read_record(path)
+
+
 def test_times_that_fall_are_refused_with_the_rate_that_they_have(sample_data):
     path = sample_data / "scope-files" / "red-pitaya.csv"
     with pytest.raises(
