@@ -225,6 +225,7 @@ def _look_over(head: Head, header: Header) -> _Survey:
     survey = _Survey()
     if not header.columns:
         raise TableError(head.path, "its header names channels, but none has samples: export a channel that is on")
+    timed = header.time is not None or header.sequence is not None
     for block in read_blocks(head, header.dialect, header.first_line, header.used):
         survey.count += len(block.numbers)
         survey.torn = survey.torn or block.torn
@@ -232,7 +233,10 @@ def _look_over(head: Head, header: Header) -> _Survey:
         survey.off_range += int(off_range.sum())
         survey.lowest = np.minimum(survey.lowest, block.numbers.min(axis=0, initial=np.inf, where=~off_range))
         survey.highest = np.maximum(survey.highest, block.numbers.max(axis=0, initial=-np.inf, where=~off_range))
-        if header.time is not None or header.sequence is not None:
+        if timed and off_range[:, 0].any():
+            line = block.line_of(int(off_range[:, 0].argmax()), header.dialect)
+            raise TableError(head.path, "a time is ∞: correct it, or remove the line", line=line)
+        if timed:
             survey.clock.pass_by(header, block)
     return survey
 
