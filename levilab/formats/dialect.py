@@ -42,6 +42,14 @@ _SPELT = re.compile(
 #: Date and time: ISO 8601, or day, month and year with points or slashes.
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")
 _DATE = re.compile(r"(\d\d?)([./])(\d\d?)\2(\d{4}|\d\d),?[T ]+(\d\d?:\d\d)(:\d\d(?:[.,]\d+)?)?" + _HALF)
+#: A date with the name of its month, of which three letters suffice, as 23. November 2026 or Nov 23, 2026.
+_NAMED = re.compile(
+    r"(?:(\d\d?)\.?[ -]([a-zä]{3})[a-z]*\.?[ -]|([a-zä]{3})[a-z]*\.? (\d\d?),? )(\d{4})(?=\D)", re.IGNORECASE
+)
+_MONTHS = {
+    "jan": 1, "feb": 2, "mar": 3, "mär": 3, "mrz": 3, "apr": 4, "may": 5, "mai": 5, "jun": 6, "jul": 7, "aug": 8,
+    "sep": 9, "oct": 10, "okt": 10, "nov": 11, "dec": 12, "dez": 12,
+}  # fmt: skip
 #: What phyphox writes for a cell that a spreadsheet would take for a formula: '-1.5.
 GUARDED = re.compile(r"'[=+@-]")
 #: A number and the unit behind it.
@@ -177,7 +185,16 @@ def _without_unit(text: str) -> str:
 
 def is_dated(text: str) -> bool:
     """Return whether a field is a date with its time."""
-    return bool(_ISO.fullmatch(text) or _DATE.fullmatch(text))
+    return bool(_ISO.fullmatch(text) or _dated(text))
+
+
+def _dated(text: str) -> re.Match[str] | None:
+    """Return the parts of a date with points, slashes or the name of its month, English or German, and its time."""
+    found = _NAMED.match(text)
+    month = _MONTHS.get((found[2] or found[3]).casefold()) if found else None
+    if found and month:
+        text = f"{found[1] or found[4]}.{month}.{found[5]}{text[found.end() :]}"
+    return _DATE.fullmatch(text)
 
 
 def _year(text: str) -> int:
@@ -190,7 +207,7 @@ def slashed_date(text: str) -> tuple[int, int, int] | None:
     >>> slashed_date("12/31/2025 10:00 PM")
     (12, 31, 2025)
     """
-    found = _DATE.fullmatch(text)
+    found = _dated(text)
     return (int(found[1]), int(found[3]), _year(found[4])) if found and found[2] == "/" else None
 
 
@@ -203,6 +220,8 @@ def clock_time(text: str, *, month_first: bool = False) -> float:
     (62.5, 62.0)
     >>> clock_time("24.11.2026 9:05:12,5") - clock_time("2026-11-23 09:05:12")
     86400.5
+    >>> clock_time("24. November 2026 9:05") == clock_time("Nov 24, 2026 9:05:00 AM") == clock_time("24-Nov-2026 09:05")
+    True
 
     Raises:
         ValueError: it is none of the three.
@@ -217,7 +236,7 @@ def clock_time(text: str, *, month_first: bool = False) -> float:
     if text and (found := _SPELT.fullmatch(text)):
         hours, minutes, seconds = (float((part or "0").replace(",", ".")) for part in found.groups())
         return 3600 * hours + 60 * minutes + seconds
-    if found := _DATE.fullmatch(text):
+    if found := _dated(text):
         first, _, second, year, minute, rest, half = found.groups()
         month, day = (first, second) if month_first and found[2] == "/" else (second, first)
         start = datetime(_year(year), int(month), int(day), tzinfo=UTC).timestamp()

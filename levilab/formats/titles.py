@@ -64,7 +64,7 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "time_s": ("time", (
         "time", "t", "zeit", "elapsed", "elapsed_time", "timestamp", "seconds", "sekunden", "milliseconds", "minutes",
         "ms", "millis", "micros", "x_value", "clock", "uhrzeit", "temps", "tiempo", "tempo", "tid", "laufzeit",
-        "messzeit", "gesamtzeit", "zeitpunkt", "zeitstempel", "ts", "datetime", "heure",
+        "messzeit", "gesamtzeit", "zeitpunkt", "zeitstempel", "ts", "datetime", "epoch", "heure",
         "hora", "tidpunkt", "secondes", "segundos", "sekunder")),
     "spin_frequency_hz": ("frequency", (
         "spin_frequency", "f", "freq", "frequency", "frequenz", "nu", "ν", "nu3", "ν3", "f3", "ν_3", "nu_3", "f_3",
@@ -382,14 +382,19 @@ def nearly_a_frequency(text: str) -> str | None:
 
 
 def as_a_period(text: str) -> Title | None:
-    """Return the title of a T, perhaps with an index, in a unit of time as that of a period, which it is beside a time.
+    """Return the title of a T in a unit of time as that of a period, which it is beside a time.
 
-    >>> as_a_period("T_A1 [ms]").inverse, as_a_period("T")
-    (True, None)
+    It may have an index; a number above 9 is one of turns.
+
+    >>> as_a_period("T_A1 [ms]").turns, as_a_period("T_50 in s").turns, as_a_period("T")
+    (1, 50, None)
     """
-    form = re.fullmatch(r"T(?:_?[A-Z]?\d)?\s*(?:[/_,]|in\b)?\s*[\[(]?([^\[\]()]+)[\])]?", text.strip())
-    unit = form and form[1].strip()
-    return Title("spin_frequency_hz", unit, inverse=True) if unit and unit_factor(unit, "time") else None
+    index = r"(?:_?[A-Z]?\d(?!\d)|_?(?P<turns>[1-9]\d{1,3}))?"
+    form = re.fullmatch(rf"T{index}\s*(?:[/_,]|in\b)?\s*[\[(]?(?P<unit>[^\[\]()]+)[\])]?", text.strip())
+    unit = form and form["unit"].strip()
+    if not form or not unit or not unit_factor(unit, "time"):
+        return None
+    return Title("spin_frequency_hz", unit, inverse=True, turns=int(form["turns"] or 1))
 
 
 def foreign_unit(text: str, kind: str) -> str | None:

@@ -87,6 +87,19 @@ TABLES = {
     "noon of half days": ("Time,f\n11:59 am,61.5\n12:00 PM,61.25\n12:01 PM,61\n", PLAIN | {T: [43140, 43200, 43260]}),
     "a year of two digits": ("Zeit;f\n31.12.25 23:59:59;61.5\n01.01.26 00:00;61.25\n1.1.26 00:00:01;61\n", SECONDS),
     "month first": ("t,f\n12/31/2025 11:59:59 PM,61.5\n1/1/2026 12:00:00 AM,61.25\n1/1/2026 12:00:01 AM,61\n", SECONDS),
+    "names of months": (
+        "Datum;f\n28. Februar 2026 23:59:59;61.5\n1. März 2026 00:00;61.25\n1-Mar-2026 0:00:01;61\n",
+        SECONDS,
+    ),
+    "names of months before days": (
+        't,f\n"Dec. 31, 2025 11:59:59 PM",61.5\n"Jan 1, 2026 12:00:00 AM",61.25\n1 Jan 2026 00:00:01,61\n',
+        SECONDS,
+    ),
+    "seconds since 1970": (
+        "epoch,f\n1795442712,61.5\n1795442713,61.25\n1795442714,61\n",
+        PLAIN | {T: [1795442712 + k for k in range(3)]},
+    ),
+    "time of 50 turns": ("t [s],T_50 [s]\n0,1\n1,1.25\n2,2\n", {T: [0, 1, 2], F: [50, 40, 25]}),
     "one day": ("Date/Time,f\n1/2/2026 9:59:59,61.5\n1/2/2026 10:00,61.25\n1/2/2026 10:00:01,61\n", SECONDS),
     "percent": ("t,f,u [%]\n0,50,1\n1,40,1\n2,20,5\n", {T: [0, 1, 2], F: [50, 40, 20], U: [0.5, 0.4, 1]}),
     "scatter": ("t,rpm,Std. Dev. [rpm]\n0,3000,6\n1,2400,6\n2,1200,6\n", {T: [0, 1, 2], F: [50, 40, 20], U: [0.1] * 3}),
