@@ -184,8 +184,9 @@ class Flight:
             self._state, self._step, self._known_until = self._put_by_hand(time), None, time
 
     def take_away(self, time: float) -> None:
-        """Let no top be up from this time on, as after a fall."""
-        if isinstance(self._piece_at(time), _Flying):
+        """Let no top be there from this time on, neither up nor where it fell."""
+        piece = self._piece_at(time)
+        if isinstance(piece, _Flying) or piece.state is not None:
             self._pieces.cut(time)
             self._fall(time)
 

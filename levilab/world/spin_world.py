@@ -80,7 +80,7 @@ class World(Protocol):
         """
 
     def take_top(self) -> None:
-        """Take the top out of the air by hand, if it floats: none is up until the next one is put there."""
+        """Take the top away by hand, from the air or from where it lies: none is up until the next one is put there."""
 
     def coil_field(self, start: float, step: float, n: int) -> Array:
         """Return the coil's field at start + step·k, shape (n,) [T]."""

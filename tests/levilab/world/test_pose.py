@@ -103,6 +103,16 @@ def test_a_top_that_fell_is_not_up_until_it_is_put_back():
     assert not steps[-200:].any()  # it lies
 
 
+def test_a_top_that_lies_there_can_be_taken_away():
+    world = MotionWorld(preset("practice").changed({"start.spin_hz": 15.0}), VirtualClock())
+    world.clock.sleep(1.0)
+    assert world.poses(0.99, 0.01, 1).position[0, 2] > 0
+    world.take_top()
+    taken = world.poses(0.99, 0.01, 3)
+    assert taken.position[0, 2] > 0
+    np.testing.assert_array_equal(taken.position[1:], 0)
+
+
 def test_a_top_that_only_spins_stands_upright_and_turns_by_its_phase():
     world = SpinWorld(SpinScene(fall_hz=29.9), VirtualClock())
     poses = world.poses(0.0, 0.001, 500)
