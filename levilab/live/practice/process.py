@@ -370,6 +370,8 @@ class PracticeProcess:
         if hides := self.tasks.hidden:
             self.top.hide(hides)
         if command.task:
+            if self.drive.output_hz is not None:
+                self._voice.message("the drive is switched off: a task begins without it")
             self.drive.switch(None, on=False)
         if hides or (command.task and not self.top.floats()):
             self.top.put_back()

@@ -461,12 +461,13 @@ class Measured(Script):
 
 
 def test_the_stem_is_counted_by_the_precession(tmp_path):
-    begin = (1.0, BeginTask(task="stem")), (2.0, AnswerTask(value=1.0))
+    begin = (0.5, SwitchDrive(on=True)), (1.0, BeginTask(task="stem")), (2.0, AnswerTask(value=1.0))
     script = carry_out(
         tmp_path, *begin, (4.0, AnswerTask(value=2.0)), (5.0, AnswerTask(value=1.0)), (6.0, None), script=Measured
     )
     assert [text.partition(":")[0] for text in script.said("refused")] == ["that would be a guess", "b = 2 is not it"]
     assert script.states[-1].tasks_done == ("stem",)
+    assert script.said("message").count("the drive is switched off: a task begins without it") == 1
 
 
 def test_the_exponent_is_measured_and_neither_guessed_nor_found_by_elimination(tmp_path):
