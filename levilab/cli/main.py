@@ -67,6 +67,11 @@ _MEANT = {
     **dict.fromkeys(("gui", "demo", "app", "start"), "live --mock"),
 }
 
+#: Options of other programs → the same here.
+_MEANT_OPTIONS = dict.fromkeys(
+    ("--format", "--pdf", "--html", "--xlsx"), "The ending of a file's name chooses the format: -o report.pdf"
+)
+
 
 #: Wrong words on the command line; typer has no public name for them.
 _WRONG_WORDS: Any = typer.BadParameter.__base__
@@ -114,6 +119,8 @@ def _as_text(message: str, what: str = "") -> str:
     """
     if isinstance(message, Text):
         return message
+    if (option := message.removeprefix("No such option: ").partition(" ")[0]) in _MEANT_OPTIONS:
+        return Text("No such option: {name:s}. {meant}", option, Text(_MEANT_OPTIONS[option]))
     for template in _TEMPLATES:
         pattern = re.sub(r"\\\{(\w+)(?::s)?\\\}", r"(?P<\1>.+?)", re.escape(template))
         if found := re.fullmatch(pattern, message, re.DOTALL):

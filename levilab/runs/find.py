@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from levilab.errors import DataError
-from levilab.formats.texts import SPREADSHEETS, TEXTS, locate, name_files
+from levilab.formats.texts import locate, name_files
 from levilab.texts.text import Text
 
 RECORD = "run.json"
@@ -64,10 +64,10 @@ def no_such_path(path: Path) -> DataError:
     folder = next(place for place in (path.parent, *path.parent.parents) if place.is_dir())
     wanted = path.relative_to(folder).parts[0] if folder != path.parent else path.name
     near = difflib.get_close_matches(wanted, sorted(one.name for one in folder.iterdir()), n=1, cutoff=0.8)
-    ends = (*TEXTS, *SPREADSHEETS)
-    files = name_files(folder, ends) if path.suffix.casefold() in ends else ""
-    check = "check the name; levilab runs lists the runs of a folder"
-    there = Text("its data files are {files:s}", files=files) if files else check
+    ending = path.suffix.casefold()
+    files = name_files(folder, (ending,)) if ending else ""
+    check = "check the name" if ending else "check the name; levilab runs lists the runs of a folder"
+    there = Text("its {ending:s} files are {files:s}", ending, files) if files else check
     advice = Text("did you mean {path}?", path=folder / near[0]) if near else there
     said = "{path}: there is no such file or folder in {folder}: {advice}"
     return DataError(Text(said, path=path, folder=folder.resolve(), advice=advice))

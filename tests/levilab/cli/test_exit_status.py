@@ -124,6 +124,8 @@ FAILURES = {
     f"analyze spindown {LIMITS}": f"spindown needs a spin run; levilab analyze limit {LIMITS} reads it",
     f"analyze limit {SCOPE}": f"levilab analyze spin {SCOPE} reads it",
     "analyze spindown nowhere": "nowhere: there is no such file or folder in ",
+    "analyze spindown nowhere.toml": "its .toml files are bench.toml",
+    "analyze spindown nowhere.csv": ": check the name",
     "analyze spindown --columns f=2 [rpm]": 'in quotation marks: --columns "f=2 [rpm]"',
     "analyze spindown bench.tml": "did you mean bench.toml?",
     f"report {SAMPLE} -o file/page.html": "file: is a file, a folder is expected",
@@ -184,6 +186,10 @@ def test_only_titles_of_the_analysis_that_was_asked_for_are_named(tmp_path):
     spins = command("analyze", "spindown", "odd.csv", cwd=tmp_path).err
     assert "(time_s, spin_frequency_hz, t, f [Hz], rpm …) among 'p', 'q'" in spins
     assert "(height_m, flux_density_t, z [mm], B [mT] …)" in command("analyze", "field", "odd.csv", cwd=tmp_path).err
+
+
+def test_an_option_of_other_programs_is_answered_with_ours(place):
+    assert "No such option: --format. The ending of a file" in command("report", "--format", "pdf", cwd=place).err
 
 
 def test_what_has_the_name_of_an_analysis_is_no_path_without_its_folder(tmp_path):
