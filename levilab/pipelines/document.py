@@ -317,7 +317,7 @@ class Analysis(Needs[Any], Generic[A]):
         given = _given_options(options)
 
         def reading(path: Path) -> Any:
-            earlier = archive.earlier(path, path)
+            earlier = archive.earlier(path, path / self.data if path.is_dir() else path)
             return replace(self._options(earlier), **{**read_correction(path), **given}) if earlier else options
 
         return reading

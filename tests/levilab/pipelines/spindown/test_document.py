@@ -124,6 +124,13 @@ def test_a_run_is_recalled_from_the_result_of_its_folder(runs, fitted):
     assert differences(after.runs[0], SPINDOWN.analyze([runs / "run-3"], SpinDownOptions()).runs[0]) == []
 
 
+def test_a_part_of_a_run_is_recalled_as_that_part(runs, fitted):
+    before = analyzed(runs / "run-1", between=(24.0, 30.0))
+    after = recall_spindowns([runs / "run-1"], SpinDownOptions())
+    assert fitted == []
+    assert differences(after.sources[0].readings, before.sources[0].readings) == []
+
+
 @pytest.mark.parametrize("given", [{"reading_u": 0.05}, {"keep_outliers": True}])
 def test_other_options_analyze_anew_with_the_rest_as_before(tmp_path, fitted, given):
     path = spin_down_csv(tmp_path / "my.csv")
