@@ -1,7 +1,7 @@
 """Spin-downs → their figure."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -46,7 +46,7 @@ _SEEN, _MOST_NAMED = 1 / 120, 6
 #: it does has a scale of its own; a scale is so many times as long as the residuals reach, for the markers.
 _LEAST_SCALE, _BEYOND, _ROOM = 3.2, 1.1, 1.12
 #: Places [inch]: left edge and width of the panels; height of the figure, and of the short one.
-_LEFT, _FULL, _HEIGHT, _SHORT_HEIGHT = 0.66, 6.26, 9.15, 4.1
+_LEFT, _FULL, _HEIGHT, _SHORT_HEIGHT, _LINES_TOP = 0.66, 6.26, 9.15, 4.1, 7.2
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,8 @@ class _Unit:
 def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
     """Draw readings and best law, the other laws less the best one, residuals of each, and the straight lines."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDE, _HEIGHT))
+        straight = [law for law in laws_of(analysis) if law in STRAIGHT_LINES]
+        figure = Figure(figsize=(WIDE, _HEIGHT if straight else _LINES_TOP - 0.4))
         headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
         unit = _unit(analysis)
         _draw_spin(panel(figure, _LEFT, 0.62, 4.3, 1.75), analysis)
@@ -79,7 +80,8 @@ def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
             _draw_weights(panel(figure, _LEFT + 4.6, 0.62, 1.4, 1.75), analysis)
         _draw_differences(panel(figure, _LEFT, 2.98, 4.3, 1.5), analysis, unit)
         _draw_residuals(figure, 5.34, analysis, unit)
-        _draw_straight_lines(figure, 7.2, analysis)
+        if straight:
+            _draw_straight_lines(figure, straight, analysis)
     return figure
 
 
@@ -378,17 +380,17 @@ def _tilt_in_words(analysis: SpinDownAnalysis) -> str:
 # --- straight lines ------------------------------------------------------------------------------------
 
 
-def _draw_straight_lines(figure: Figure, top: float, analysis: SpinDownAnalysis) -> None:
+def _draw_straight_lines(figure: Figure, laws: Sequence[str], analysis: SpinDownAnalysis) -> None:
     """Draw the straight lines: where a law holds, points lie on its line, and the strip below shows noise about 0."""
     write(
-        figure, 0.08, top - 0.3, "Straight lines as drawn on paper, and below each how far the points lie from it",
-        fontsize=9,
+        figure, 0.08, _LINES_TOP - 0.3,
+        "Straight lines as drawn on paper, and below each how far the points lie from it", fontsize=9,
     )  # fmt: skip
-    lines = [(law, STRAIGHT_LINES[law]) for law in laws_of(analysis) if law in STRAIGHT_LINES]
-    (width, gap), strips = _share(len(lines), 0.61), []
-    for place, (law, straight) in enumerate(lines):
+    (width, gap), strips = _share(len(laws), 0.61), []
+    for place, law in enumerate(laws):
+        straight = STRAIGHT_LINES[law]
         left = _LEFT + place * (width + gap)
-        above, strip = panel(figure, left, top, width, 0.95), panel(figure, left, top + 1.03, width, 0.45)
+        above, strip = panel(figure, left, _LINES_TOP, width, 0.95), panel(figure, left, _LINES_TOP + 1.03, width, 0.45)
         strips.append(strip)
         _draw_straight(above, strip, analysis, straight.transform, law)
         above.set_ylabel(straight.axis, fontsize=8)

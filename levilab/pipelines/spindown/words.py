@@ -298,7 +298,7 @@ def _no_law(found: SpinDown | Combined, runs: Sequence[SpinDown], rms: str) -> s
         what = Text("none describes the runs {numbers} of {n}", numbers=enumeration(numbers), n=len(runs))
     else:
         what = Text(
-            "they {way} by {hz:n} Hz beyond any drag between {first:.4g} s and {last:.4g} s, or bend there",
+            "they {way} by {hz:n} Hz beyond each fitted law between {first:.4g} s and {last:.4g} s, or bend there",
             way="rise" if change.size > 0 else "fall", hz=digits(abs(change.size)),
             first=float(runs[0].time[change.first]), last=float(runs[0].time[change.last]),
         )  # fmt: skip

@@ -39,6 +39,14 @@ def page(figure):
     return as_svg(figure, "x")
 
 
+def test_laws_without_a_straight_line_have_no_panel_for_one(tmp_path, figure):
+    path = spin_down_csv(tmp_path / "a.csv")
+    drawn = spindown_figure(SPINDOWN.analyze([path], SpinDownOptions(laws=("mixed", "power"), tilt="none")))
+    assert len(drawn.axes) == 3 + 2
+    assert drawn.get_figheight() < figure.get_figheight()
+    assert not faults(drawn)
+
+
 def panels(figure):
     """The spin, the residuals, the straight lines and the strips below them."""
     spin, _, _, *others = figure.axes
