@@ -330,9 +330,9 @@ def facts_of(run: Run | None, path: Path, results: Results = ()) -> dict[str, st
         facts |= {"source": source, "history": f"read by levilab {version('levilab')}"}
         return {name: text for name, text in facts.items() if text}
     record = run.record
-    models = [str(about.get("identity", "")) for about in record.instruments.values()]
+    models = "; ".join(filter(None, (str(about.get("identity", "")) for about in record.instruments.values())))
     facts |= {
-        "source": record.synthetic_how or "synthetic" if record.synthetic else "; ".join(filter(None, models)),
+        "source": record.synthetic_how or "synthetic" if record.synthetic else models or f"the run {path.name}",
         "synthetic": str(record.synthetic).lower(),
         "history": "\n".join(
             [

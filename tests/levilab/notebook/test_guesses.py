@@ -71,6 +71,8 @@ GUESSES = {
     "run.to_xarray().attrs['synthetic'] + result.to_xarray().attrs['synthetic']": lambda said: said == "truetrue",
     "result.to_xarray().result_spindown_disc_c32.item() == result.models['disc']['c32'].value": bool,
     "levilab.analyze((t, f)).to_xarray().attrs['source']": lambda said: said == "arrays",
+    # a run of a real bench that names no instrument
+    "levilab.analyze(folder / 'lower-limits').to_xarray().attrs['source']": lambda said: said == "the run lower-limits",
     "levilab.crosscheck('spin', trials=2)[0].name": lambda name: name == "spin",
     "result.to_xarray()": lambda data: data["residual_hz"].attrs["units"] == "Hz",
     "pickle.loads(pickle.dumps(result)) == result != levilab.analyze((t, f))": bool,
