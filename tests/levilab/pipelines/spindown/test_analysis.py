@@ -285,7 +285,7 @@ def test_times_in_a_unit_that_no_fall_has_are_doubted_and_stay_out_of_means(tmp_
     spin = (1 / np.sqrt(2 * np.pi * 40) + 2.34e-4 * seconds / 2) ** -2 / (2 * np.pi)
     file = tmp_path / "my.csv"
     rows = zip(seconds * factor, spin, strict=True)
-    file.write_text("t,f\n" + "".join(f"{t:.5f},{f:.3f}\n" for t, f in rows), encoding="utf-8")
+    file.write_text("t [s],f\n" + "".join(f"{t:.5f},{f:.3f}\n" for t, f in rows), encoding="utf-8")
     readings = read_spin_file(file, SpinDownOptions())
     assert readings.doubtful
     assert f"t=NAME [{unit}]" in readings.warnings[-1]
