@@ -47,7 +47,7 @@ def main() -> None:
             return track_of_record(record, None, 2.0, "auto")
 
         tasks = {
-            "as called": lambda: SPIN.analyze([path], SpinOptions()),
+            "as called": lambda: SPIN.analyze([path]),
             "read and analyzed": read_and_track,
             "wavfile.read and one FFT": lambda: np.abs(np.fft.rfft(wavfile.read(path)[1])),
         }

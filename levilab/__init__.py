@@ -344,7 +344,7 @@ def simulate(
     from levilab.notebook.motion import simulate_motion
     from levilab.notebook.scene import chosen_scene, in_seconds
 
-    chosen, lasts = chosen_scene(scene, settings or {}, changes), in_seconds("duration", duration)
+    chosen, lasts = chosen_scene(scene, settings or {}, changes), in_seconds(duration)
     return simulate_motion(chosen, lasts, tolerance=tolerance, rate=rate, out=out, animate=animate)
 
 

@@ -49,10 +49,7 @@ def study_results(names: Sequence[str], paths: Sequence[Path], trials: int | Non
         DataError: a path cannot be analyzed.
     """
     _check(names, OWN, "with `like` known are")
-    if names:
-        found = [(ANALYSES[name], ANALYSES[name].recall(paths, ANALYSES[name].options_from({}))) for name in names]
-    else:
-        found = recall_suiting(paths, {})
+    found = [(ANALYSES[name], ANALYSES[name].recall(paths)) for name in names] if names else recall_suiting(paths, {})
     done = []
     for analysis, result in found:
         progress = ShareBar(f"cross-checking {analysis.name}")

@@ -48,12 +48,12 @@ def _with_unit(key: str, value: Any) -> Any:
     return parse_setting(f"{key}={value}")[1] if isinstance(value, str) and unit_of_key(key) else value
 
 
-def in_seconds(name: str, value: float | str) -> float:
+def in_seconds(duration: float | str) -> float:
     """Return a duration [s] that may be typed with its unit, as "2min".  Raises UsageError."""
     try:
-        return read_number(value, "s") if isinstance(value, str) else value
+        return read_number(duration, "s") if isinstance(duration, str) else duration
     except ValueError as error:
-        raise UsageError(name, str(error)) from None
+        raise UsageError("duration", str(error)) from None
 
 
 def whole_key(scene: Scene, name: str) -> str:

@@ -204,7 +204,7 @@ def sweep_scene(
     spans = [] if named else [parse_axis(text) for text in ([axes] if isinstance(axes, str) else axes)]
     spans += [_axis(chosen, whole_key(chosen, key), values) for key, values in {**named, **by_name}.items()]
     names = observe.split(",") if isinstance(observe, str) else observe
-    lasts = in_seconds("duration", duration)
+    lasts = in_seconds(duration)
     request = SweepRequest(chosen, sweep=spans, settings=settings, observe=names, duration=lasts, **given)
     store = store_for(request, None if out is None else Path(out), resume=resume)
     carry_out = partial(run_adaptive if is_adaptive(store) else run, store)

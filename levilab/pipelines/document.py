@@ -150,14 +150,18 @@ class Analysis(Needs[Any], Generic[A]):
 
     # --- analyzing ---
 
-    def analyze(self, paths: Sequence[Path], options: Any) -> A:
+    def analyze(self, paths: Sequence[Path], options: Any = None) -> A:
         """Analyze the inputs at the paths.
+
+        Args:
+            paths: of the inputs.
+            options: of the analysis; None: all at their defaults.
 
         Raises:
             DataError: one of them cannot be used; it names the file.
             UsageError: names of columns are given, and all inputs are runs.
         """
-        paths, options = self.set_beside([find_run(path) for path in paths], options)
+        paths, options = self.set_beside([find_run(path) for path in paths], options or self.options())
         found = collect(paths, self, lambda _: options)
         refuse_columns_of_runs(found, options)
         return self.analyze_found(paths, found, options)
@@ -322,15 +326,15 @@ class Analysis(Needs[Any], Generic[A]):
 
         return reading
 
-    def recall(self, paths: Sequence[Path], options: Any) -> A:
+    def recall(self, paths: Sequence[Path], options: Any = None) -> A:
         """Read what `analyze` found from result.json; inputs without a result that holds are analyzed.
 
         A result holds as long as the readings are the same bytes, and it was made with the given options.  Those at
-        their defaults are not given.
+        their defaults are not given, nor any where `options` is None.
 
         Raises DataError for what cannot be used, a damaged result.json included.
         """
-        paths = [find_run(path) for path in paths]
+        paths, options = [find_run(path) for path in paths], options or self.options()
         archive = self.archive(paths)
         found = collect(paths, self, self.reading(archive, options))
         return self.recall_found(paths, found, archive, options)

@@ -153,7 +153,7 @@ class RunWriter:
 
     def _holds_readings(self) -> bool:
         """Return whether there are readings, in memory or on the disk; an unreadable file may have some."""
-        if self._lines_kept(READINGS) > 1:
+        if self._readings_kept:
             return True
         try:
             return bool((self.folder / READINGS).read_bytes().partition(b"\n")[2].strip())
@@ -162,8 +162,10 @@ class RunWriter:
         except OSError:
             return True
 
-    def _lines_kept(self, name: str) -> int:
-        return sum(block.count(b"\n") for block in self._kept.get(name, ()))
+    @property
+    def _readings_kept(self) -> int:
+        """The number of readings in memory; the first line is the header."""
+        return max(sum(block.count(b"\n") for block in self._kept.get(READINGS, ())) - 1, 0)
 
     def __enter__(self) -> Self:
         return self
@@ -384,8 +386,7 @@ class RunWriter:
 
     def _rescue(self) -> None:
         """Write the run again, beside.  Raises CannotWrite: what was removed is lost, and the message says so."""
-        readings = max(self._lines_kept(READINGS) - 1, 0)
-        with _explain_errors(f"write {readings} readings again that were removed", self.folder, safe=""):
+        with _explain_errors(f"write {self._readings_kept} readings again that were removed", self.folder, safe=""):
             self._write_again()
 
     def _write_again(self) -> None:
@@ -405,9 +406,8 @@ class RunWriter:
         self._write_record()
         computer().sync_folder(self.folder.parent)
         self._leave_readable(old, kept)
-        readings = self._lines_kept(READINGS) - 1
         text = (
-            f"{old} was removed, replaced or cut while it was being written: all {readings} readings "
+            f"{old} was removed, replaced or cut while it was being written: all {self._readings_kept} readings "
             f"are in {self.folder} now{', and the run goes on there' if self.record.status == 'running' else ''}"
             + (f"; {how_many(lost, 'record')} of the oscilloscope are gone" if lost else "")
         )

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from instruments.clock import VirtualClock
 from levilab.acquisition.experiments.spin import SpinSettings
-from levilab.acquisition.loop import AcquisitionRequest
+from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.table import Configuration, with_settings
 from levilab.present.progress import Display
@@ -71,7 +71,17 @@ def mock(out, seed=1, **changes):
     """A spin-down on the virtual bench, as the command line asks for it, but let go at once."""
     of_a_new_run = LET_GO_AT_ONCE if "scene" in changes else RAISED_QUICKLY
     settings = () if "resume" in changes else of_a_new_run
-    return request_for("spin", AcquisitionOptions(mock=True, out=out, seed=seed, settings=settings, **changes))
+    return asked("spin", out=out, seed=seed, settings=settings, **changes)
+
+
+def asked(experiment, **options):
+    """An experiment on the virtual bench, as the command line asks for it."""
+    return request_for(experiment, AcquisitionOptions(mock=True, **options))
+
+
+def acquired(experiment, show=None, **options):
+    """The run of an experiment on the virtual bench."""
+    return acquire(asked(experiment, **options), show or Silent())
 
 
 def kinds(run):
@@ -79,9 +89,14 @@ def kinds(run):
     return [event["kind"] for event in run.events()]
 
 
+def events(run, *kinds):
+    """The events of these kinds."""
+    return [event for event in run.events() if event["kind"] in kinds]
+
+
 def texts(run, *kinds):
     """The texts of the events of these kinds."""
-    return [event["text"] for event in run.events() if event["kind"] in kinds]
+    return [event["text"] for event in events(run, *kinds)]
 
 
 def in_world(request, world):

@@ -17,13 +17,13 @@ from instruments.virtual.generator.generator import VirtualGenerator
 from instruments.virtual.generator.rows import CHANNEL, Quantity, burst_cycles, pulses, waveforms
 
 
-def _family(sine: float, square: float, ramp: float) -> Family:
-    """Return a series with these highest frequencies [Hz]."""
+def _family(sine: float, square: float) -> Family:
+    """Return a series with these highest frequencies of sine and square [Hz]."""
     return Family(
         waveforms=(
             Waveform("SINusoid", sine, crest=2 * math.sqrt(2)),
             Waveform("SQUare", square),
-            Waveform("RAMP", ramp, crest=2 * math.sqrt(3)),
+            Waveform("RAMP", 1e6, crest=2 * math.sqrt(3)),
             Waveform("PULSe", square),
             Waveform("NOISe", sine, crest=6.6),
             Waveform("DC", sine),
@@ -41,7 +41,7 @@ def _family(sine: float, square: float, ramp: float) -> Family:
     )
 
 
-DG1062Z, DG832 = _family(60e6, 25e6, 1e6), _family(35e6, 10e6, 1e6)
+DG1062Z, DG832 = _family(60e6, 25e6), _family(35e6, 10e6)
 
 _BURST, _SOURCES = "[SOURce[n]:]BURSt", "INTernal EXTernal MANual"
 

@@ -26,7 +26,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     settings = {"drive_frequency_hz": spin, "longest_s": _HELD_S}
     run = acquire_mock("hold", seed, folder, SpinWorld(scene, VirtualClock()), settings)
     analysis = ANALYSES["hold"]
-    (found,) = analysis.analyze([run.folder], analysis.options_from({})).runs
+    (found,) = analysis.analyze([run.folder]).runs
     held = found.spin.value or 0.0
     return [pull_of("drag", found.drag, held * DECAYS[scene.drag].damping(2 * math.pi * held, *scene.constants))]
 

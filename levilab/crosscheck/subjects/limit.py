@@ -57,7 +57,7 @@ def _limits(seed: int, folder: Path, scene: SpinScene, changes: dict[str, Any]) 
     run = acquire_mock("limit", seed, folder, SpinWorld(scene, VirtualClock()), {"hold_s": 1.0, **changes})
     analysis = ANALYSES["limit"]
     found: Limits
-    (found,) = analysis.analyze([run.folder], analysis.options_from({})).groups
+    (found,) = analysis.analyze([run.folder]).groups
     return found
 
 

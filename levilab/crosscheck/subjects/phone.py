@@ -38,9 +38,7 @@ def _of_export(scene: SpinScene, path: Path) -> list[Pull]:
     world.clock.sleep(float(DECAYS[scene.drag].elapsed(from_, to, *scene.constants)) + _AFTER_S)
     answer = phone.execute("GET /export?format=1 HTTP/1.1")
     path.write_bytes(answer.data.partition(b"\r\n\r\n")[2] if answer else b"")
-    spin, limit = (
-        ANALYSES[name].analyze([path], ANALYSES[name].options_from({})).runs[0] for name in ("spin", "limit")
-    )
+    spin, limit = (ANALYSES[name].analyze([path]).runs[0] for name in ("spin", "limit"))
     if limit.which != "lower":
         raise TrialFailed(f"the limit is taken for the {limit.which} one")
     moment = begin + _SECOND * spin.spin.reference_time

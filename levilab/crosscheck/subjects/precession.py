@@ -12,7 +12,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     """Try one sweep of a top in full motion; the seed draws the phase at which the drive takes hold, and the noise."""
     run = acquire_mock("precession", seed, folder)
     analysis = ANALYSES["precession"]
-    (found,) = analysis.analyze([run.folder], analysis.options_from({})).runs
+    (found,) = analysis.analyze([run.folder]).runs
     return [pull_of("slope", slope_of(found.fit), 1.0), pull_of("intercept", intercept_of(found.fit), 0.0)]
 
 

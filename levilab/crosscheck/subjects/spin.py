@@ -56,7 +56,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     if start is None:
         raise TrialFailed("the oscilloscope took its record in several pieces: its time is not known")
     analysis = ANALYSES["spin"]
-    (found,) = analysis.analyze([run.folder], analysis.options_from({})).runs
+    (found,) = analysis.analyze([run.folder]).runs
     # the run's time counts from its own zero; the record has the same first sample in both
     moment = found.spin.reference_time - record.start + start
     before, here, after = world.motion(moment + np.array([-_APART_S, 0.0, _APART_S]))[0] / (2 * math.pi)

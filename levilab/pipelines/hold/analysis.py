@@ -12,7 +12,7 @@ from analysis.spindown.tilt import slowing_by_tilt
 from analysis.uncertainty import Estimate
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.hold.readings import HoldReadings
-from levilab.pipelines.options import HoldOptions, SpinDownOptions
+from levilab.pipelines.options import HoldOptions
 from levilab.pipelines.row import Quantity, columns_of
 from levilab.pipelines.sources import Source
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis
@@ -121,7 +121,7 @@ def fit_source(source: Source[HoldReadings], _: HoldOptions) -> Hold:
 
 def combine(_: Sequence[Source[HoldReadings]], runs: Sequence[Hold], options: HoldOptions) -> HeldTogether:
     """Return the laws through the drag, and their constants beside a spin-down's.  Raises DataError."""
-    beside = SPINDOWN.recall([options.spindown], SpinDownOptions()) if options.spindown else None
+    beside = SPINDOWN.recall([options.spindown]) if options.spindown else None
     spins = np.array([run.spin.value for run in runs])
     factors, u_factors = _tilt(beside, spins)
     known = [run.drag is not None for run in runs]

@@ -229,24 +229,23 @@ def _coasting(track: "Track | FieldTrack") -> tuple[int, int]:
     return (first, last) if last - first >= FEWEST else (0, len(track.time))
 
 
-def spin_readings(table: Table, *, fewest: int = FEWEST) -> SpinReadings:
+def spin_readings(table: Table) -> SpinReadings:
     """Return the readings of a spin-down: time, spin frequency and, if the table has it, its standard uncertainty.
 
     Args:
         table: with `time_s` and `spin_frequency_hz`.
-        fewest: readings that are needed.
 
     Raises:
         TableError: a column is missing, there are too few readings, times repeat or go back, the spin does not fall,
             or a frequency or an uncertainty is not positive; the line of the file is named.
     """
-    table = _without_rest(table, fewest)
+    table = _without_rest(table)
     time, frequency = table.column("time_s"), table.column("spin_frequency_hz")
     has_u = "spin_frequency_u_hz" in table.columns
     u = table.column("spin_frequency_u_hz") if has_u else None
-    if time.size < fewest:
+    if time.size < FEWEST:
         what = "holds {n}, at least {fewest} are needed: record longer"
-        raise TableError(table.path, Text(what, n=how_many(time.size, "reading"), fewest=fewest))
+        raise TableError(table.path, Text(what, n=how_many(time.size, "reading"), fewest=FEWEST))
     _must_be_ordinary(table, time, frequency)
     if u is not None:
         _must_be_possible(table, u, frequency)
@@ -258,11 +257,11 @@ def spin_readings(table: Table, *, fewest: int = FEWEST) -> SpinReadings:
     return SpinReadings(time, frequency, u, (*doubts, *table.warnings), doubtful=bool(doubts))
 
 
-def _without_rest(table: Table, fewest: int) -> Table:
+def _without_rest(table: Table) -> Table:
     """Return a table without its last rows of 0 Hz, which a counter writes once the top lies, with a note on them."""
     end = int(np.flatnonzero(table.column("spin_frequency_hz")).max(initial=-1)) + 1
     left_out = len(table.lines) - end
-    if not left_out or end < fewest:
+    if not left_out or end < FEWEST:
         return table
     rows = how_many(left_out, "row")
     note = (

@@ -213,4 +213,4 @@ def measure(sheet: Sheet, seeds: Mapping[str, int]) -> Class:
         for group, seed in seeds.items():
             options = AcquisitionOptions(mock=True, seed=seed, group=group, out=Path(folder), settings=sheet.settings)
             runs.append(acquire(request_for(sheet.experiment, options), Display()).folder)
-        return class_of(analysis, analysis.analyze(runs, analysis.options_from({})), sheet.asked)
+        return class_of(analysis, analysis.analyze(runs), sheet.asked)

@@ -28,7 +28,7 @@ from levilab.interruption import Interrupted, Stop
 from levilab.runs.channel import Channel
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import Phase, SpinScene, SpinWorld
-from support.acquisitions import Silent, texts
+from support.acquisitions import Silent, events, texts
 
 CHANNELS = (Channel("time_s", "s", "bench clock"), Channel("drive_frequency_hz", "Hz", "generator"))
 #: Up to 30 Hz, where the top of a SpinScene begins, and on in quick steps; a top that has lost its lock is soon down.
@@ -81,7 +81,7 @@ def test_a_point_that_fails_is_recorded_and_the_sweep_goes_on(tmp_path, monkeypa
     assert "try 2 of 2" in texts(run, "lock lost")[1]
     (left_out,) = texts(run, "left out")
     assert left_out == "the point of 32 Hz is left out: a spin of 31.20 Hz under a drive of 32.00 Hz"
-    locked = [event["frequency_hz"] for event in run.events() if event["kind"] == "locked"]
+    locked = [event["frequency_hz"] for event in events(run, "locked")]
     assert locked == pytest.approx([30.0, 31.0, 31.0], abs=0.2)  # 0.06 Hz of noise
     at = "the top follows the drive at "  # where the drive is, and what was counted
     assert [text.split(":")[0] for text in texts(run, "locked")] == [f"{at}{hz}.00 Hz" for hz in (30, 31, 31)]
@@ -117,7 +117,7 @@ def test_a_top_that_no_drive_takes_up_again_ends_the_sweep_with_what_was_measure
 
     run = swept(tmp_path, monkeypatch, [31.0, 31.5, 32.0, 32.5, 33.0], forbid)
     assert (run.status, measured(run)) == ("finished", [31.0])
-    left_out = [event for event in run.events() if event["kind"] == "left out"]
+    left_out = events(run, "left out")
     assert [event["drive_frequency_hz"] for event in left_out] == [31.5, 32.0, 32.5]
     assert all("did not follow the drive to 31 Hz" in event["text"] for event in left_out)
     assert texts(run, "ended")[0].endswith("the sweep ends here; not tried: 33 Hz")

@@ -21,14 +21,12 @@ from instruments.virtual.generator.keysight_33500b import Virtual33500B
 from levilab.acquisition.counting import is_plausible
 from levilab.acquisition.experiments.spin import SpinSettings, time_left
 from levilab.acquisition.loop import AcquisitionRequest, acquire
-from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration
 from levilab.bench.bench import OutputMayBeOn
 from levilab.bench.wiring import Wiring
 from levilab.computer import Computer, at_another_computer
 from levilab.files import CannotWrite
-from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
@@ -37,7 +35,7 @@ from levilab.simulator.laws import LAWS
 from levilab.simulator.spin import DECAYS
 from levilab.world.bench import VIRTUAL, virtual_bus
 from levilab.world.spin_world import Phase, SpinScene, SpinWorld, random_scene
-from support.acquisitions import BEFORE, LET_GO_AT_ONCE, Impatient, Meanwhile, Silent, in_world, mock, of_scene
+from support.acquisitions import BEFORE, Impatient, Meanwhile, Silent, acquired, asked, events, in_world, mock, of_scene
 
 
 def watch_outputs(patch):
@@ -165,9 +163,9 @@ def test_a_top_that_does_not_follow_the_drive_is_an_error(tmp_path, outputs):
 @pytest.mark.parametrize("frequency", [5.0, 100.0])
 def test_a_drive_beyond_the_window_is_answered_with_the_window(tmp_path, frequency):
     """No ramp and no amplitude brings a top to where it does not float."""
-    asked = SpinSettings(drive_frequency_hz=frequency, ramp_hz_per_s=0.5)
+    given = SpinSettings(drive_frequency_hz=frequency, ramp_hz_per_s=0.5)
     with pytest.raises(ExperimentFailed, match=r"floats only between 21\.65 and 80\.60 Hz: ask for") as failed:
-        acquire(of_scene(tmp_path, SpinScene(), asked), Silent())
+        acquire(of_scene(tmp_path, SpinScene(), given), Silent())
     assert "ramp slower" not in str(failed.value)
 
 
@@ -176,7 +174,7 @@ def test_a_top_that_keeps_its_spin_is_noticed_once_while_it_is_read(tmp_path, us
     scene = SpinScene(fall_hz=1.0, constants=(1e-6,))
     run = acquire(of_scene(tmp_path, scene, SpinSettings(longest_s=150.0)), Silent())
     assert (run.status, run.count()) == ("finished", 16)
-    (seen,) = [event for event in run.events() if event["kind"] == "does not fall"]
+    (seen,) = events(run, "does not fall")
     assert seen["time_s"] == pytest.approx(66.0, abs=6.0)  # at the first reading after
     assert seen["text"].startswith("the spin does not fall: 4")
     assert seen["text"].endswith("is the drive still on, or does something else drive the top?")
@@ -184,11 +182,10 @@ def test_a_top_that_keeps_its_spin_is_noticed_once_while_it_is_read(tmp_path, us
 
 
 def test_a_scene_without_drag_is_named_as_the_reason(tmp_path):
-    settings = (*LET_GO_AT_ONCE, "drive_frequency_hz=31", "longest_s=80")
-    options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, scene="driven", settings=settings)
-    run = acquire(request_for("spin", options), Silent())
-    (text,) = [event["text"] for event in run.events() if event["kind"] == "does not fall"]
-    assert "the scene has no drag (drag.law); take one with drag" in text
+    settings = ("hold_s=0", "drive_frequency_hz=31", "longest_s=80")
+    run = acquired("spin", out=tmp_path, seed=1, scene="driven", settings=settings)
+    (seen,) = events(run, "does not fall")
+    assert "the scene has no drag (drag.law); take one with drag" in seen["text"]
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
@@ -263,7 +260,7 @@ def test_a_miscount_that_cannot_be_is_asked_again_and_not_kept(usual, tmp_path, 
     run = acquire(mock(tmp_path), Silent())
     frame = run.readings().frame
     assert run.status == "finished"
-    asked_again = [event for event in run.events() if event["kind"] == "asked again"]
+    asked_again = events(run, "asked again")
     assert len(asked_again) == 2  # at the miscount, and at the fall
     assert asked_again[0]["spin_frequency_hz"] == pytest.approx(
         factor * whole["spin_frequency_hz"].iloc[reading], rel=1e-12
@@ -413,7 +410,7 @@ def test_the_practice_benchs_top_falls_within_the_time_left_that_is_shown(tmp_pa
 
     between = []
     run = acquire(mock(tmp_path, 3, scene="practice"), Watching())
-    (fell,) = [event["time_s"] for event in run.events() if event["kind"] == "fell"]
+    (fell,) = [event["time_s"] for event in events(run, "fell")]
     for earliest, latest in between[len(between) // 2 :]:
         assert earliest < fell < latest
         assert latest - earliest > 30.0
@@ -483,7 +480,7 @@ def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion):
     assert 22.5 < spins.iloc[-1] < 26
     assert run.record.configuration["scene"] == preset("spindown").as_table()
     assert "full motion" in str(run.record.synthetic_how)
-    found = SPINDOWN.analyze([run.folder], SpinDownOptions()).runs[0]
+    found = SPINDOWN.analyze([run.folder]).runs[0]
     release = found.model.release
     assert release.spin_hz == pytest.approx(30, abs=1)
     assert 200 < release.driven_s < 300  # 10 Hz at 0.05 Hz/s, 20 s of holding, and as long to take hold
@@ -512,7 +509,7 @@ def test_a_drive_that_may_be_on_is_said_once(monkeypatch, error):
     said = [str(error)]
     monkeypatch.setattr("levilab.acquisition.loop._acquire", Mock(side_effect=error))
     monkeypatch.setattr(Silent, "message", lambda _, text: said.append(str(text)), raising=False)
-    request = dataclasses.replace(request_for("spin", AcquisitionOptions(mock=True)), synthetic_how=None)
+    request = dataclasses.replace(asked("spin"), synthetic_how=None)
     with pytest.raises(type(error)):
         acquire(request, Silent())
     assert " ".join(said).count("MAY STILL BE ON") == 1

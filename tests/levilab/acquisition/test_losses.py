@@ -15,7 +15,7 @@ from levilab.acquisition.table import settings_of, with_settings
 from levilab.runs.run import Run
 from levilab.world import bench as benches
 from levilab.world.bench import VIRTUAL, virtual_bus
-from support.acquisitions import BEFORE, Silent, kinds, mock
+from support.acquisitions import BEFORE, Silent, events, kinds, mock
 
 
 def acquired(folder, monkeypatch, *faults):
@@ -82,7 +82,7 @@ def test_a_fault_of_a_reading_is_reported_and_the_run_goes_on(what, times, whole
 
 def test_an_instrument_that_is_gone_for_a_while_is_tried_until_it_is_back(tmp_path, monkeypatch):
     run = acquired(tmp_path, monkeypatch, Fault("away for 5 s", question=r"READ\?", after=BEFORE + 6))
-    tries = [event for event in run.events() if event["kind"] == "not reached"]
+    tries = events(run, "not reached")
     assert len(tries) == 3  # at once, and 1 s and 3 s later; 7 s later it is back
     assert "try 3 of 6" in tries[-1]["text"]
     gaps = np.diff(run.readings().frame["time_s"])
@@ -107,7 +107,7 @@ def test_an_instrument_that_is_lost_again_and_again_is_given_up(tmp_path, monkey
 
 def test_settings_changed_by_hand_are_reported_by_name_and_set_again(tmp_path, monkeypatch):
     run = acquired(tmp_path, monkeypatch, Fault("reset", question=r"READ\?", after=BEFORE + 6))
-    (lost,) = [event for event in run.events() if event["kind"] == "instrument lost"]
+    (lost,) = events(run, "instrument lost")
     assert "gate_s = 0.1 instead of 1.0" in lost["text"]
     assert run.record.instruments["counter"]["settings_end"]["gate_s"] == 1.0
 

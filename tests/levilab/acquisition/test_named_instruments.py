@@ -11,7 +11,7 @@ from levilab.bench.config import ConfigError, InstrumentSettings
 from levilab.bench.kinds import COUNTER
 from levilab.errors import UsageError
 from levilab.world.spin_world import random_scene
-from support.acquisitions import Impatient, Silent, mock
+from support.acquisitions import Impatient, Silent, asked, mock
 
 BENCH = """
 [counter]
@@ -62,13 +62,13 @@ def test_the_named_model_of_the_bench_file_is_the_one_described():
 
 def test_a_counter_that_counts_no_laser_is_refused_before_a_top_is_driven_up():
     with pytest.raises(ConfigError, match="phyphox cannot count a laser beam: the precession needs another counter"):
-        request_for("precession", AcquisitionOptions(mock=True, counter="phyphox"))
+        asked("precession", counter="phyphox")
 
 
 @pytest.mark.parametrize("scope", ["sound", "DS1000Z"])
 def test_the_drive_or_a_pickup_coil_at_an_oscilloscope_is_not_counted_as_the_laser(scope):
     with pytest.raises(ConfigError, match="an oscilloscope cannot count the laser beside the spin: name a `counter`"):
-        request_for("precession", AcquisitionOptions(mock=True, scope=scope))
+        asked("precession", scope=scope)
     both = AcquisitionOptions(mock=True, scope=scope, counter="53230A", settings=("record_s=6",))
     assert request_for("precession", both).config.count_with == "counter"
 
@@ -76,14 +76,14 @@ def test_the_drive_or_a_pickup_coil_at_an_oscilloscope_is_not_counted_as_the_las
 @pytest.mark.parametrize("experiment", ["spin", "precession"])
 def test_an_oscilloscope_beside_a_counter_that_counts_is_refused(experiment):
     with pytest.raises(UsageError, match="the counter counts; leave out one of the two") as refused:
-        request_for(experiment, AcquisitionOptions(mock=True, scope="sound", counter="CNT-91"))
+        asked(experiment, scope="sound", counter="CNT-91")
     assert refused.value.value == "sound"
 
 
 @pytest.mark.parametrize("counter", ["34461A", "34401A", "53210A"])
 def test_a_counter_with_one_input_has_its_cable_changed_by_a_person(counter, tmp_path):
     with pytest.raises(ConfigError, match="virtual bench has no person who could change the counter's cable"):
-        request_for("precession", AcquisitionOptions(mock=True, counter=counter))
+        asked("precession", counter=counter)
     bench = tmp_path / "bench.toml"
     bench.write_text(BENCH.replace("53230A", counter), encoding="utf-8")
     assert request_for("precession", AcquisitionOptions(bench=bench)).config.precession.laser_input == 1
@@ -112,7 +112,7 @@ def test_an_instrument_that_cannot_be_named_so_is_refused(options, what, tmp_pat
 def test_a_multimeter_takes_the_nearest_gate_and_the_run_says_so(gate_s, taken):
     """A u of 0.5 s would be five times too small, and the time of a reading 0.2 s too early."""
     settings = (f"gate_s={gate_s}", "reading_u_hz=0.01")
-    request = request_for("spin", AcquisitionOptions(mock=True, counter="34461A", settings=settings))
+    request = asked("spin", counter="34461A", settings=settings)
     assert (request.config.spin.gate_s, request.config.spin.reading_u_hz) == (taken, 0.01)
-    stated = request_for("spin", AcquisitionOptions(mock=True, seed=1, counter="34461A", settings=settings[:1]))
+    stated = asked("spin", seed=1, counter="34461A", settings=settings[:1])
     assert stated.config.spin.reading_u_hz == pytest.approx(2**0.5 * random_scene(1).jitter / taken, abs=1e-6)

@@ -10,18 +10,17 @@ from instruments.drivers.oscilloscope import Trace
 from levilab.acquisition import onlooker
 from levilab.acquisition.loop import acquire
 from levilab.acquisition.onlooker import Onlooker, Sent, publishing, record_of
-from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.telemetry.address import FILE, read_address
 from levilab.telemetry.messages import Poses, Record, State
 from levilab.telemetry.publisher import LEAST_PAUSE_S, Publisher
 from levilab.telemetry.subscriber import Subscriber
-from support.acquisitions import Silent
+from support.acquisitions import Silent, asked
 
 SHORT = ("spin.drive_frequency_hz=30.5", "spin.hold_s=0", "spin.interval_s=2", "spin.longest_s=30")
 
 
 def request(out, experiment="spin", *settings, **options):
-    return request_for(experiment, AcquisitionOptions(mock=True, out=out, seed=3, settings=settings, **options))
+    return asked(experiment, out=out, seed=3, settings=settings, **options)
 
 
 def watched(out, experiment="spin", *settings):

@@ -26,7 +26,7 @@ from levilab.runs.run import Run
 from levilab.world.base import Base
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
-from support.acquisitions import Silent
+from support.acquisitions import Silent, acquired
 
 
 class ScanSettings(ExperimentSettings):
@@ -126,8 +126,7 @@ def test_what_is_left_at_least_and_at_most_is_kept_shown_and_seen_as_a_pair(requ
 
 def test_the_points_of_a_scans_values_stand_below_each_other(tmp_path):
     show = Silent()
-    options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, settings=("field.lowest_m=0.06",))
-    acquire(request_for("field", options), show)
+    acquired("field", show, out=tmp_path, seed=1, settings=("field.lowest_m=0.06",))
     assert len(show.readings) > 5
     assert len({tuple(k for k, c in enumerate(text) if c == ".") for text in show.readings}) == 1
 

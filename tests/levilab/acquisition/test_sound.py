@@ -16,15 +16,14 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.runs.run import Run
 from levilab.world.bench import PickupCoil
 from levilab.world.spin_world import SpinScene, SpinWorld
-from support.acquisitions import LET_GO_AT_ONCE, RAISED_QUICKLY, Impatient, Silent
+from support.acquisitions import LET_GO_AT_ONCE, RAISED_QUICKLY, Impatient, Silent, acquired, asked
 from support.wire import ask
 
 ADDRESS = "sound://oscilloscope.levilab"
 
 
 def request(experiment, out, *settings, seed=1, **changes):
-    options = AcquisitionOptions(mock=True, out=out, seed=seed, scope="sound", settings=settings, **changes)
-    return request_for(experiment, options)
+    return asked(experiment, out=out, seed=seed, scope="sound", settings=settings, **changes)
 
 
 def with_card(request, act):
@@ -53,7 +52,7 @@ def test_a_spin_down_is_counted_by_the_sound_card_with_a_u_of_each_reading(spin_
     assert 0.005 < np.median(u) < 0.05  # jitter of 0.021 turns, 25 to 35 pulses
     assert np.ptp(u) > 0
     analysis = ANALYSES["spindown"]
-    (run,) = analysis.analyze([spin_run.folder], analysis.options_from({})).runs
+    (run,) = analysis.analyze([spin_run.folder]).runs
     statistics = run.fit("disc").statistics
     # u predicts the scatter about the law: within three standard errors of χ² from the readings
     assert abs(statistics.reduced_chi_square - 1) < 3 * math.sqrt(2 / (len(u) - 2))
@@ -62,7 +61,7 @@ def test_a_spin_down_is_counted_by_the_sound_card_with_a_u_of_each_reading(spin_
 def test_the_clock_of_the_sound_card_is_a_line_of_the_budget(spin_run, tmp_path):
     run = acquire(request("trace", tmp_path, "trace.records=1", "trace.duration_s=2"), Silent())
     analysis = ANALYSES["spin"]
-    (origin,) = analysis.analyze([run.folder], analysis.options_from({})).origins
+    (origin,) = analysis.analyze([run.folder]).origins
     rows = {row.name: row for budget in origin.budget for row in budget.components}
     assert rows["time_base"].u == pytest.approx(1e-4 / math.sqrt(3))
     assert not rows["time_base"].included
@@ -123,7 +122,7 @@ def test_a_record_with_a_loss_is_kept_cut_and_taken_again(tmp_path):
     assert len(sizes) == 3
     assert sizes[0] < sizes[1] == sizes[2] == 96_000
     analysis = ANALYSES["spin"]
-    (found,) = analysis.analyze([run.folder], analysis.options_from({})).runs
+    (found,) = analysis.analyze([run.folder]).runs
     assert "jump" not in {one.name for one in found.spin.notes}
 
 
@@ -152,12 +151,11 @@ def test_the_voltage_of_the_pickup_coil_is_that_of_a_turning_dipole():
 
 def test_a_sound_card_that_is_named_for_a_counter_is_refused(tmp_path):
     with pytest.raises(UsageError, match="there is no virtual counter 'sound'"):
-        request_for("spin", AcquisitionOptions(mock=True, out=tmp_path, counter="sound"))
+        asked("spin", out=tmp_path, counter="sound")
 
 
 def test_any_oscilloscope_can_count(tmp_path):
-    options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, scope="DS1000Z", settings=RAISED_QUICKLY)
-    run = acquire(request_for("spin", options), Impatient(2))
+    run = acquired("spin", Impatient(2), out=tmp_path, seed=1, scope="DS1000Z", settings=RAISED_QUICKLY)
     assert run.record.instruments["counter"]["driver"] == "SampledCounter"
     frequency, u = (run.readings().column(name) for name in ("spin_frequency_hz", "spin_frequency_u_hz"))
     assert frequency[0] == pytest.approx(35.0, abs=0.3)
@@ -175,12 +173,11 @@ def test_a_top_that_is_spun_by_hand_needs_no_generator(experiment, tmp_path):
         fell = float(run.record.synthetic_how.rpartition("the first at ")[2].split()[0])
         assert limit == pytest.approx(fell, abs=4 * u)
     analysis = ANALYSES["limit" if more else "spindown"]
-    assert analysis.analyze([run.folder], analysis.options_from({})).runs
+    assert analysis.analyze([run.folder]).runs
 
 
 @pytest.mark.parametrize("settings", [("limit.which=upper",), ()])
 def test_what_needs_a_drive_is_refused_without_one(settings, tmp_path):
     experiment = "limit" if settings else "precession"
-    options = AcquisitionOptions(mock=True, out=tmp_path, settings=(*settings, f"{experiment}.drive_waveform=NONE"))
     with pytest.raises(UsageError, match=r"drive_waveform = NONE: th.* needs a drive"):
-        request_for(experiment, options)
+        asked(experiment, out=tmp_path, settings=(*settings, f"{experiment}.drive_waveform=NONE"))

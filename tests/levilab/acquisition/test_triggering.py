@@ -13,7 +13,6 @@ from instruments.virtual.generator.channel import Output, Triggered
 from levilab.acquisition import triggering
 from levilab.acquisition.experiments.spin import SpinSettings
 from levilab.acquisition.loop import acquire
-from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import DidNotFollow, NotHeld
 from levilab.acquisition.triggering import CYCLE, Motor, response, slope_of
 from levilab.bench.bench import open_bench
@@ -23,7 +22,7 @@ from levilab.runs.run import Run
 from levilab.world.bench import virtual_wiring
 from levilab.world.bursts import TriggerWire, mean_pull
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
-from support.acquisitions import Impatient, Silent, of_scene
+from support.acquisitions import Impatient, Silent, acquired, asked, events, of_scene
 
 TRIGGERED = SpinSettings(drive="triggered", drive_frequency_hz=34.0, hold_s=10.0, longest_s=60.0)
 SCENE = SpinScene(moment_turns=0.3)
@@ -46,10 +45,6 @@ def at(out, scene=SCENE, settings=TRIGGERED):
     world = Watched(scene, VirtualClock())
     request = of_scene(out, scene, settings)
     return replace(request, wiring=lambda: virtual_wiring(world, request.config.limits)), world
-
-
-def events(run, kind):
-    return [event for event in run.events() if event["kind"] == kind]
 
 
 def best_phase(scene, spin):
@@ -302,15 +297,13 @@ def test_a_bench_without_the_wire_has_no_triggered_drive():
     ],
 )
 def test_what_a_triggered_drive_cannot_do_is_refused_at_once(tmp_path, experiment, settings, says):
-    options = AcquisitionOptions(mock=True, out=tmp_path, settings=(f"{experiment}.drive=triggered", *settings))
     with pytest.raises(UsageError, match=says):
-        request_for(experiment, options)
+        asked(experiment, out=tmp_path, settings=(f"{experiment}.drive=triggered", *settings))
 
 
 def test_a_top_in_full_motion_triggers_its_drive_too(tmp_path):
     settings = ("drive=triggered", "drive_frequency_hz=32", "hold_s=30", "longest_s=20")
-    options = AcquisitionOptions(mock=True, out=tmp_path, scene="spindown", seed=3, settings=settings)
-    run = acquire(request_for("spin", options), Silent())
+    run = acquired("spin", out=tmp_path, scene="spindown", seed=3, settings=settings)
     assert run.status == "finished"
     assert run.readings().column("spin_frequency_hz")[0] == pytest.approx(32.0, abs=0.4)  # 0.14 too fast still
     assert events(run, "phase found")[0]["pull_hz_per_s"] == pytest.approx(0.71, abs=0.12)  # 4 u; 0.34 of a fixed axis

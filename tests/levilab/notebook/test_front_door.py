@@ -383,7 +383,7 @@ def test_a_natural_but_wrong_call_is_told_how_to_call(call, said):
 
 
 def test_numbers_are_taken_with_their_units_as_on_the_command_line():
-    assert in_seconds("duration", "2min") == 120
+    assert in_seconds("2min") == 120
     assert chosen_scene("undriven", {"start.spin_hz": "1800 rpm"}, {"mass_kg": "25 g", "law": "stokes"}).changed(
         {}
     ) == chosen_scene("undriven", {"start.spin_hz": 30.0}, {"mass_kg": 0.025, "law": "stokes"})

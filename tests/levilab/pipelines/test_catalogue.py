@@ -12,7 +12,6 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines import catalogue
 from levilab.pipelines.catalogue import ANALYSES, print_analysis
 from levilab.pipelines.document import Analysis
-from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Archive
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import analyze_suiting, recall_suiting, suiting
@@ -82,7 +81,7 @@ def test_a_result_in_a_given_folder_replaces_no_other_analysis(tmp_path, sample_
     for _ in range(2):
         for name, run in (("field", "field-scan"), ("limit", "lower-limits"), ("spindown", "spin-down-1")):
             analysis = ANALYSES[name]
-            save_found(analysis, analysis.analyze([sample_data / run], analysis.options_from({})), tmp_path)
+            save_found(analysis, analysis.analyze([sample_data / run]), tmp_path)
     held = {file.name: json.loads(file.read_text(encoding="utf-8"))["analysis"] for file in tmp_path.glob("*.json")}
     assert held == {"result.json": "field", "result.limit.json": "limit", "result.spindown.json": "spindown"}
 
@@ -106,11 +105,11 @@ def test_each_analysis_finds_its_own_result_again(tmp_path, runs, name):
 
 def test_result_json_belongs_to_the_first_row_for_the_experiment(monkeypatch, runs):
     use(monkeypatch, ANALYSES["field"], second_row("spin"), SPINDOWN)
-    found = SPINDOWN.analyze([runs / "run-1"], SpinDownOptions())
+    found = SPINDOWN.analyze([runs / "run-1"])
     rows = catalogue.ANALYSES
     assert save_found(rows["second"], found)[0].name == "result.json"
     assert save_found(rows["spindown"], found)[0].name == "result.spindown.json"
-    together = SPINDOWN.analyze([runs], SpinDownOptions())
+    together = SPINDOWN.analyze([runs])
     assert save_found(rows["second"], together)[0].name == "result.second.json"
 
 
@@ -118,9 +117,9 @@ def test_several_inputs_leave_the_result_of_the_present_run_alone(runs, monkeypa
     monkeypatch.chdir(runs / "run-1")
     paths = [Path(), Path("../run-2")]
     monkeypatch.setattr(Analysis, "png", lambda *_: b"")
-    written = save_found(SPINDOWN, SPINDOWN.analyze(paths, SpinDownOptions()))[0]
+    written = save_found(SPINDOWN, SPINDOWN.analyze(paths))[0]
     assert written.resolve() == runs / "result.json"
-    assert SPINDOWN.recall(paths, SpinDownOptions()).origins[1].text.endswith(str(written))
+    assert SPINDOWN.recall(paths).origins[1].text.endswith(str(written))
 
 
 @pytest.mark.usefixtures("two")
@@ -159,7 +158,7 @@ def test_of_several_paths_each_analysis_takes_those_that_suit_it(tmp_path, sampl
 
 def test_a_result_beside_a_run_of_another_kind_is_reported(tmp_path, sample_data):
     limit = ANALYSES["limit"]
-    save_found(limit, limit.analyze([sample_data / "lower-limits"], limit.options_from({})), tmp_path)
+    save_found(limit, limit.analyze([sample_data / "lower-limits"]), tmp_path)
     found = recall_suiting([sample_data / "spin-down-1", tmp_path], {})
     assert [row.name for row, _ in found] == ["spindown", "limit"]
 
@@ -203,7 +202,7 @@ def test_a_sweep_that_keeps_records_is_a_sweep_first(tmp_path, sample_data):
 
 def test_what_makes_an_answer_doubtful_comes_before_it():
     limit = ANALYSES["limit"]
-    found = limit.analyze([SAMPLE_DATA / "loose-washers"], limit.options())
+    found = limit.analyze([SAMPLE_DATA / "loose-washers"])
     shown = " ".join(as_text(lambda console: print_analysis(limit, found, console=console)).split())
     said = "What the data say. The drive lost the tops at 70.26(15) Hz on average: 8 upper limits"
     in_order = ("LOOSE WASHERS", said, "Limits of the spin, 1 run, SYNTHETIC", "Beside theory")

@@ -128,7 +128,7 @@ def test_doubtful_rows_are_refused_where_that_is_asked_for_and_a_correction_leav
 def test_each_file_of_a_folder_has_its_own(swapped):
     write_correction(swapped, READ)
     spin_down_csv(swapped.parent / "other.csv", seed=2)
-    found = ANALYSES["spindown"].analyze([swapped.parent], ANALYSES["spindown"].options_from({}))
+    found = ANALYSES["spindown"].analyze([swapped.parent])
     assert first(found, 0) == pytest.approx(first(found, 1), rel=1e-3)
     table = swapped.parent / "all.csv"
     assert write_table(ANALYSES["spindown"], [swapped], {}, table, cores=1).failed == 0
@@ -138,10 +138,10 @@ def test_a_report_follows_a_changed_correction(swapped):
     analysis = ANALYSES["spindown"]
     write_correction(swapped, {"columns": {"t": "2", "f": "1 [Hz]"}})
     assert command("analyze", "spindown", "my.csv", cwd=swapped.parent).status == 0
-    as_written = analysis.recall([swapped], analysis.options_from({}))
+    as_written = analysis.recall([swapped])
     assert as_written.origins[0].text.startswith("as levilab analyze found it")
     write_correction(swapped, READ)
-    again = analysis.recall([swapped], analysis.options_from({}))
+    again = analysis.recall([swapped])
     assert math.isclose(first(as_written), 60 * first(again), rel_tol=1e-6)
 
 

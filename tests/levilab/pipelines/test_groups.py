@@ -4,7 +4,6 @@ import json
 
 import pytest
 
-from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.report.document import document_of
@@ -13,6 +12,7 @@ from levilab.report.tables.values import of_analysis
 from levilab.runs.find import RECORD
 from levilab.runs.listing import list_runs
 from levilab.runs.run import READINGS
+from support.acquisitions import asked
 from support.paths import SAMPLE_DATA
 
 SPINDOWN = ANALYSES["spindown"]
@@ -29,7 +29,7 @@ def make(folder, sample, **record):
 
 
 def analyzed(*paths):
-    return SPINDOWN.analyze(paths, SPINDOWN.options_from({}))
+    return SPINDOWN.analyze(paths)
 
 
 @pytest.fixture(scope="module")
@@ -84,8 +84,8 @@ def test_runs_of_one_second_are_in_the_order_of_their_beginning(tmp_path):
 @pytest.mark.parametrize("odd", ["x" * 25, "a\x1bb"])
 def test_a_name_without_room_or_that_does_not_print_is_refused(odd):
     with pytest.raises(UsageError, match="24 letters"):
-        request_for("spin", AcquisitionOptions(mock=True, group=odd))
+        asked("spin", group=odd)
 
 
 def test_a_run_keeps_its_group():
-    assert request_for("spin", AcquisitionOptions(mock=True, seed=1, group=" Group \t 7")).group == "Group 7"
+    assert asked("spin", seed=1, group=" Group \t 7").group == "Group 7"

@@ -74,7 +74,7 @@ def test_notes_of_one_kind_stand_together_whatever_their_values(tmp_path):
     for k in range(2):
         rows = [f"{10 * n},{40 - n - 0.1 * k if n != 3 + k else '-'}" for n in range(12)]
         (tmp_path / f"run-{k}.csv").write_text("\n".join(["t,f", *rows, ""]), encoding="utf-8")
-    found = ANALYSES["spindown"].analyze([tmp_path], ANALYSES["spindown"].options())
+    found = ANALYSES["spindown"].analyze([tmp_path])
     (missed,) = [group for group in found.grouped_warnings if "left out as missed" in group[0]]
     assert [text.partition(".csv")[0][-5:] for text in missed] == ["run-0", "run-1"]
 

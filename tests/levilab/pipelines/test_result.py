@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from levilab.errors import DataError
 from levilab.files import replace_atomically
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.result import Place, beside, read_result, save
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import save as save_found
@@ -22,7 +21,7 @@ from support.spin_downs import spin_down_csv
 
 
 def saved(*paths):
-    return [file.name for file in save_found(ANALYSES["spindown"], SPINDOWN.analyze(paths, SpinDownOptions()))]
+    return [file.name for file in save_found(ANALYSES["spindown"], SPINDOWN.analyze(paths))]
 
 
 #: Names that come near one another: with dots, without an ending, like results themselves.
@@ -71,12 +70,12 @@ def test_the_result_of_a_run_folder_is_result_json_in_it(tmp_path, sample_data, 
     assert saved(run) == ["result.json", "spindown.png"]
     assert written == ["spindown.png", "result.json"]  # who sees the new result sees no old figure
     assert (run / "result.json").is_file()
-    assert SPINDOWN.analyze([run / "readings.csv"], SpinDownOptions()).place.result() == run / "result.json"
+    assert SPINDOWN.analyze([run / "readings.csv"]).place.result() == run / "result.json"
 
 
 def write_result(tmp_path):
     """The result of a data file, without its figure."""
-    analysis = SPINDOWN.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions())
+    analysis = SPINDOWN.analyze([spin_down_csv(tmp_path / "my.csv")])
     return save(SPINDOWN.result_of(analysis, analysis.place), analysis.place, picture=b"")[0]
 
 

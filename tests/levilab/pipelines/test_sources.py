@@ -53,7 +53,7 @@ def test_the_same_readings_in_another_file_format_count_once(tmp_path, rewritten
     first = spin_down_csv(tmp_path / "first.csv")
     second = tmp_path / "second.csv"
     second.write_bytes(rewritten(first.read_text(encoding="utf-8")).encode())
-    analysis = SPINDOWN.analyze([first, second], SpinDownOptions())
+    analysis = SPINDOWN.analyze([first, second])
     assert [source.name for source in analysis.sources] == ["first.csv"]
     assert analysis.warnings == (f"{second}: holds the same readings as {first}, counted once",)
 
@@ -62,7 +62,7 @@ def test_an_export_beside_the_run_counts_once(tmp_path, sample_data):
     run = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
     export = tmp_path / "export.csv"
     export.write_text(with_decimal_commas((run / "readings.csv").read_text(encoding="utf-8")), encoding="utf-8")
-    assert len(SPINDOWN.analyze([run, export], SpinDownOptions()).sources) == 1
+    assert len(SPINDOWN.analyze([run, export]).sources) == 1
 
 
 def test_runs_that_differ_in_one_reading_are_two_runs(tmp_path):
@@ -71,7 +71,7 @@ def test_runs_that_differ_in_one_reading_are_two_runs(tmp_path):
     time, frequency, u = lines[7].split(",")
     lines[7] = f"{time},{float(frequency) * (1 + 2e-4)!r},{u}"
     (tmp_path / "second.csv").write_text("\n".join([*lines, ""]), encoding="utf-8")
-    assert len(SPINDOWN.analyze([first, tmp_path / "second.csv"], SpinDownOptions()).sources) == 2
+    assert len(SPINDOWN.analyze([first, tmp_path / "second.csv"]).sources) == 2
 
 
 def test_a_run_that_goes_on_in_another_folder_counts_once(tmp_path, sample_data):
@@ -81,13 +81,13 @@ def test_a_run_that_goes_on_in_another_folder_counts_once(tmp_path, sample_data)
     (tmp_path / "run" / "run.json").write_text(json.dumps(record | {"continued_in": "run-rescued"}), encoding="utf-8")
     lines = (tmp_path / "run" / "readings.csv").read_text(encoding="utf-8").splitlines(keepends=True)
     (tmp_path / "run" / "readings.csv").write_text("".join(lines[:-2]), encoding="utf-8")
-    analysis = SPINDOWN.analyze([tmp_path], SpinDownOptions())
+    analysis = SPINDOWN.analyze([tmp_path])
     assert [source.name for source in analysis.sources] == ["run-rescued"]
     assert analysis.remarks == (Skipped(f"{tmp_path / 'run'}, which was broken off: its run goes on in run-rescued"),)
 
 
 def test_runs_of_another_experiment_are_a_remark_and_no_warning(sample_data):
-    analysis = SPINDOWN.analyze([sample_data], SpinDownOptions())
+    analysis = SPINDOWN.analyze([sample_data])
     assert SkippedRuns("limit", 3) in analysis.remarks
     assert not any("skipped" in warning for warning in analysis.all_warnings)
 
@@ -168,15 +168,15 @@ def test_of_a_pattern_what_levilab_has_written_is_left_out(tmp_path):
     for analysis, found in analyze_suiting([tmp_path], {}):
         save(analysis, found)
     results = sorted(tmp_path.glob("*result.json"))
-    found = SPINDOWN.analyze(sorted(tmp_path.iterdir()), SpinDownOptions())
+    found = SPINDOWN.analyze(sorted(tmp_path.iterdir()))
     assert (len(found.sources), len(results)) == (2, 1)
     with pytest.raises(DataError, match="name the folder of the run instead"):
-        SPINDOWN.analyze(results, SpinDownOptions())
+        SPINDOWN.analyze(results)
 
 
 def test_what_another_analysis_reads_is_left_out_of_one_alone(tmp_path, sample_data):
     folder_of_a_student(tmp_path, sample_data)
-    found = SPINDOWN.analyze([tmp_path], SpinDownOptions())
+    found = SPINDOWN.analyze([tmp_path])
     (sound,) = [one for one in left_out_of(found.remarks) if one["path"].endswith(".wav")]
     assert (sound["kind"], sound["advice"]) == ("WAV recording", "levilab analyze spin reads it")
 

@@ -37,7 +37,7 @@ def test_warnings_that_are_alike_stand_together(tmp_path):
     for folder in folders[:4]:
         with (folder / "readings.csv").open("a", encoding="utf-8") as file:
             file.write("200,")
-    found = ANALYSES["spindown"].analyze([tmp_path / "runs"], ANALYSES["spindown"].options_from({}))
+    found = ANALYSES["spindown"].analyze([tmp_path / "runs"])
     torn = [alike for alike in found.grouped_warnings if "cut off" in alike[0]]
     assert [len(alike) for alike in torn] == [4]
     assert sorted(text for alike in found.grouped_warnings for text in alike) == sorted(found.all_warnings)
@@ -47,7 +47,7 @@ def test_of_many_runs_a_legend_does_not_name_each(tmp_path):
     limits = (SAMPLE_DATA / "upper-limits" / "readings.csv").read_text(encoding="utf-8")
     for k in range(9):
         (tmp_path / f"{k}.csv").write_text(limits.replace(",69.26", f",69.{k}6"), encoding="utf-8")
-    found = ANALYSES["limit"].analyze([tmp_path], ANALYSES["limit"].options_from({}))
+    found = ANALYSES["limit"].analyze([tmp_path])
     legend = limit_figure(found).axes[0].get_legend()
     assert [text.get_text() for text in legend.get_texts() if "runs" in text.get_text()] == ["9 runs: a top ± u"]
     assert len(legend.get_texts()) < len(found.sources)

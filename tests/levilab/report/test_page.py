@@ -35,7 +35,7 @@ def render(found):
 
 @pytest.fixture(scope="module")
 def found():
-    return SPINDOWN.analyze([SAMPLE_DATA], SpinDownOptions())
+    return SPINDOWN.analyze([SAMPLE_DATA])
 
 
 @pytest.fixture(scope="module")
@@ -247,7 +247,7 @@ def test_the_report_says_what_it_had_to_analyze(run, tmp_path):
     before = sorted(run.rglob("*"))
     assert "analyzed for this page: there was no result yet" in reported(run, output=tmp_path / "report.html")
     assert sorted(run.rglob("*")) == before
-    save(ANALYSES["spindown"], SPINDOWN.analyze([run], SpinDownOptions()))
+    save(ANALYSES["spindown"], SPINDOWN.analyze([run]))
     text = reported(run, output=tmp_path / "report.html", reading_u=0.05)
     assert f"analyzed for this page: other options than those of {run / 'result.json'}" in text
     assert "u of a reading: 0.05 Hz, as given to the analysis" in text

@@ -77,7 +77,7 @@ def test_what_recorded_all_runs_alike_is_said_once(tmp_path):
     limit = ANALYSES["limit"]
 
     def recorded(*runs):
-        found = limit.analyze(list(runs), limit.options_from({}))
+        found = limit.analyze(list(runs))
         of_data = next(one for one in reproduction([(limit, found)], Asked()).blocks if isinstance(one, Details))
         (facts,) = of_data.blocks[1].blocks
         return [(fact.name, fact.texts) for fact in facts.facts]

@@ -8,16 +8,13 @@ from levilab.sweeps.store import Store
 from levilab.workers import results_of
 from support.commands import command
 from support.dask_cluster import DaskCluster
+from support.maps import bits
 
 #: A map of 16 chunks.
 SWEEP = (
     "sweep", "undriven", "--sweep", "start.spin_hz=18:24:64", "--sweep", "top.mass_kg=0.0250:0.0254:64",
     "--duration", "0.3", "--observe", "survived,lifetime_s,position_error_m", "--out", "map.zarr",
 )  # fmt: skip
-
-
-def bits(store):
-    return {name: values.tobytes() for name, values in store.load().values.items()}
 
 
 def test_a_lost_scheduler_keeps_chunks_and_changes_no_bit(tmp_path, monkeypatch):

@@ -8,26 +8,14 @@ import pytest
 from levilab.computer import at_another_computer
 from levilab.laboratory.disk import Node, SimulatedComputer
 from levilab.laboratory.fate import Event, Fate, Killed
-from levilab.simulator.scene import preset
-from levilab.sweeps.plan import Axis, Plan
 from levilab.sweeps.run import tasks_of
 from levilab.sweeps.store import Store
-
-
-def plan():
-    axes = (Axis("start.spin_hz", np.linspace(18, 26, 40)), Axis("top.mass_kg", np.linspace(0.0250, 0.0254, 15)))
-    return Plan(preset("undriven"), axes, ("survived", "lifetime_s"), duration_s=0.2)
-
-
-def expected(box=...):
-    spin, mass = (axis.values for axis in plan().axes)
-    return (spin[:, None] + mass)[box]
+from support.maps import expected, made_up, plan
 
 
 def write_missing(store):
     for task in tasks_of(store):
-        spin, mass = np.broadcast_arrays(task.values["start.spin_hz"], task.values["top.mass_kg"])
-        store.write(task.part, {"survived": spin > 20, "lifetime_s": spin + mass})
+        store.write(task.part, made_up(task))
 
 
 @pytest.fixture

@@ -9,21 +9,9 @@ import zarr
 
 from levilab.errors import DataError
 from levilab.files import CannotWrite
-from levilab.simulator.scene import preset
-from levilab.sweeps.plan import Axis, Plan
 from levilab.sweeps.run import run, tasks_of
 from levilab.sweeps.store import Store
-
-
-def plan():
-    axes = (Axis("start.spin_hz", np.linspace(18, 26, 40)), Axis("top.mass_kg", np.linspace(0.0250, 0.0254, 15)))
-    return Plan(preset("undriven"), axes, ("survived", "lifetime_s"), duration_s=0.2)
-
-
-def made_up(task):
-    """Values that differ at every point."""
-    spin, mass = np.broadcast_arrays(task.values["start.spin_hz"], task.values["top.mass_kg"])
-    return {"survived": spin > 20, "lifetime_s": spin + mass}
+from support.maps import expected, made_up, plan
 
 
 def test_a_store_that_is_opened_again_has_the_plan_and_the_values(tmp_path):
@@ -36,9 +24,7 @@ def test_a_store_that_is_opened_again_has_the_plan_and_the_values(tmp_path):
     assert again.plan.as_table() == made.plan.as_table()
     assert [chunk.number for chunk in again.missing()] == [last.part.number]
     found = again.load()
-    spin, mass = (axis.values for axis in plan().axes)
-    expected = spin[:, None] + mass
-    assert np.array_equal(found.values["lifetime_s"][found.computed], expected[found.computed])
+    assert np.array_equal(found.values["lifetime_s"][found.computed], expected()[found.computed])
     assert np.all(np.isnan(found.values["lifetime_s"][~found.computed]))
     assert np.count_nonzero(~found.computed) == np.prod(last.part.shape)
 

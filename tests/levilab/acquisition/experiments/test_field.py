@@ -18,7 +18,7 @@ from levilab.bench.person import PlaceProbe, ShieldProbe
 from levilab.world.base import Base, Stand, random_base
 from levilab.world.bench import virtual_bus, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
-from support.acquisitions import Impatient, Meanwhile, Silent
+from support.acquisitions import Impatient, Meanwhile, Silent, acquired, texts
 
 #: Few heights and readings: what is tested is what happens to them.
 SHORT = FieldSettings(lowest_m=0.04, highest_m=0.08, step_m=0.01, readings=3, settle_s=0.1)
@@ -109,7 +109,7 @@ def test_a_probe_that_sees_a_field_is_asked_into_its_chamber_again(tmp_path):
     asked = []
     run = acquire(request_of(tmp_path, person=lambda task: asked.append(task.text) or ""), Silent())
     assert [text.partition(",")[0] for text in asked[1:3]] == ["The probe sees 19.4 mT"] * 2
-    (warning,) = (event["text"] for event in run.events() if event["kind"] == "warning")
+    (warning,) = texts(run, "warning")
     assert warning.startswith("the probe showed 19.4 mT before it was zeroed")
 
 
@@ -138,8 +138,7 @@ def test_the_range_may_be_left_to_the_instrument(tmp_path):
 def test_an_interrupted_scan_goes_on_at_the_next_height(tmp_path):
     bench = tmp_path / "bench.toml"
     bench.write_text("[field]\nlowest_m = 0.04\nhighest_m = 0.08\nstep_m = 0.01\nreadings = 3\n", encoding="utf-8")
-    options = AcquisitionOptions(mock=True, bench=bench, out=tmp_path, seed=5)
-    run = acquire(request_for("field", options), Impatient(2))
+    run = acquired("field", Impatient(2), bench=bench, out=tmp_path, seed=5)
     assert (run.status, run.count()) == ("interrupted", 2)
     again = acquire(request_for("field", AcquisitionOptions(resume=run.folder)), Silent())
     assert again.status == "finished"

@@ -10,18 +10,16 @@ from instruments.clock import VirtualClock
 from levilab.acquisition.driving import drive_off
 from levilab.acquisition.experiments import hold
 from levilab.acquisition.loop import acquire
-from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import DidNotFollow, NotHeld
 from levilab.acquisition.triggering import Motor
 from levilab.errors import UsageError
 from levilab.runs.run import Run
 from levilab.world.spin_world import SpinWorld, random_scene
-from support.acquisitions import Impatient, Meanwhile, Silent, in_world
+from support.acquisitions import Impatient, Meanwhile, Silent, acquired, asked, events, in_world, texts
 
 
-def held(out, seed, *settings, show=None, **more):
-    options = AcquisitionOptions(mock=True, out=out, seed=seed, settings=settings, **more)
-    return acquire(request_for("hold", options), show or Silent())
+def held(out, seed, *settings, **more):
+    return acquired("hold", out=out, seed=seed, settings=settings, **more)
 
 
 def drag_at(seed, spin):
@@ -38,7 +36,7 @@ def test_a_spin_is_held_and_its_amplitude_gives_the_drag(tmp_path):
         assert spins.size >= 15
         assert np.abs(spins - 45.0).max() < 0.06  # 0.01 Hz is the scatter of a reading
         assert np.median(run.readings().column("spin_frequency_u_hz")) < 0.015  # 0.03 Hz of a count, ten counts
-        (text,) = (event for event in run.events() if event["kind"] == "held")
+        (text,) = events(run, "held")
         assert text["scatter_hz"] == pytest.approx(spins.std(ddof=1))
         assert text["drag_u_hz_per_s"] < 0.006
         pulls.append((text["drag_hz_per_s"] - drag_at(seed, 45.0)) / text["drag_u_hz_per_s"])
@@ -82,7 +80,7 @@ def unplugged(out, lasts):
     def pull_out():
         world.off = (world.clock.now(), world.clock.now() + lasts)
 
-    request = request_for("hold", AcquisitionOptions(mock=True, out=out, settings=("hold.longest_s=150",)))
+    request = asked("hold", out=out, settings=("hold.longest_s=150",))
     return in_world(request, world), Meanwhile(3, pull_out), world
 
 
@@ -94,7 +92,7 @@ def test_pulses_that_do_not_come_for_seconds_cost_some_spin_alone(tmp_path, last
     spins = run.readings().column("spin_frequency_hz")
     assert spins[2:5].min() < 45.0 - dips  # mean over 10 s of a spin that falls by 0.18 Hz/s in between
     assert spins[-1] == pytest.approx(45.0, abs=0.05)
-    assert not [event for event in run.events() if event["kind"] == "not held"]
+    assert not events(run, "not held")
     assert not world.last.triggered
 
 
@@ -107,7 +105,7 @@ def test_a_cable_that_comes_off_ends_a_hold_with_its_reason(tmp_path):
     spins = run.readings().column("spin_frequency_hz")
     assert spins.size >= 3
     assert np.abs(spins - 45.0).max() < 1.0  # none of a top that is held no more
-    assert next(event for event in run.events() if event["kind"] == "not held")["text"].startswith("the top was lost")
+    assert texts(run, "not held")[0].startswith("the top was lost")
 
 
 def test_a_top_lost_while_the_loop_settles_is_brought_up_again(tmp_path, monkeypatch):
@@ -133,10 +131,8 @@ def test_the_gain_of_a_hard_drive_is_seen_near_the_held_spin(tmp_path):
     scene = random_scene(3)
     world = SpinWorld(replace(scene, lock_torque=3 * scene.lock_torque), VirtualClock())
     settings = ("hold.longest_s=40", "hold.drive_frequency_hz=28")
-    run = acquire(
-        in_world(request_for("hold", AcquisitionOptions(mock=True, out=tmp_path, settings=settings)), world), Silent()
-    )
-    gains = [np.array(event["spins_hz"]) for event in run.events() if event["kind"] == "gain measured"]
+    run = acquire(in_world(asked("hold", out=tmp_path, settings=settings), world), Silent())
+    gains = [np.array(event["spins_hz"]) for event in events(run, "gain measured")]
     assert len(gains) == 2
     assert all(np.ptp(spins) < 4.5 for spins in gains)  # 3 Hz, and a count of 1 Hz/s at the ends; ten would be 9 Hz
     assert all(abs(spins.mean() - 28.0) < 0.6 for spins in gains)
@@ -145,8 +141,8 @@ def test_the_gain_of_a_hard_drive_is_seen_near_the_held_spin(tmp_path):
 def test_two_readings_show_neither_a_scatter_nor_a_drag(tmp_path):
     run = held(tmp_path, 3, "hold.longest_s=15")
     assert (run.status, run.count()) == ("finished", 2)
-    assert not [event for event in run.events() if event["kind"] == "held"]
-    (ended,) = (event["text"] for event in run.events() if event["kind"] == "ended")
+    assert not events(run, "held")
+    (ended,) = texts(run, "ended")
     assert ended.endswith("3 are needed: hold the spin longer (hold.longest_s)")
 
 
@@ -161,7 +157,7 @@ def test_a_long_hold_does_not_drift(tmp_path):
 def test_a_faster_top_is_braked_to_its_spin_and_held(tmp_path):
     world = SpinWorld(replace(random_scene(3), start_hz=40.0), VirtualClock())
     settings = ("hold.longest_s=60", "hold.drive_frequency_hz=35")
-    request = request_for("hold", AcquisitionOptions(mock=True, out=tmp_path, settings=settings))
+    request = asked("hold", out=tmp_path, settings=settings)
     run = acquire(in_world(request, world), Silent())
     assert run.readings().column("spin_frequency_hz") == pytest.approx(35.0, abs=0.1)
 

@@ -21,13 +21,12 @@ from levilab.acquisition.triggering import CYCLE
 from levilab.bench.config import ConfigError
 from levilab.errors import UsageError
 from levilab.pipelines.limit.document import LIMIT
-from levilab.pipelines.options import LimitOptions, SpinDownOptions
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.simulator.scene import preset
 from levilab.world.bursts import mean_pull
 from levilab.world.motion_world import MotionWorld
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
-from support.acquisitions import Impatient, Meanwhile, Silent, in_world, kinds, texts
+from support.acquisitions import Impatient, Meanwhile, Silent, asked, events, in_world, kinds, texts
 
 #: From 30 Hz down to where a top falls within a minute, not held for long.
 QUICK = ("limit.drive_frequency_hz=24", "limit.ramp_hz_per_s=0.3", "limit.hold_s=1")
@@ -36,8 +35,7 @@ WEAK = ("limit.which=upper", "limit.drive_amplitude_vpp=5", "limit.hold_s=1", "l
 
 
 def mock(out, *settings, seed=1, **changes):
-    options = AcquisitionOptions(mock=True, out=out, seed=seed, settings=settings, **changes)
-    return request_for("limit", options)
+    return asked("limit", out=out, seed=seed, settings=settings, **changes)
 
 
 def causes(run):
@@ -145,7 +143,7 @@ def test_the_mean_of_tops_that_are_all_alike_is_no_better_than_a_step(tmp_path):
     run = acquire(
         in_world(mock(tmp_path, *SLIPS[:-1], "limit.repetitions=4"), Slipping(SpinScene(), VirtualClock())), Silent()
     )
-    (found,) = (one.statistics for one in LIMIT.analyze([run.folder], LimitOptions()).runs)
+    (found,) = (one.statistics for one in LIMIT.analyze([run.folder]).runs)
     assert (found.n, found.mean.value) == (4, pytest.approx(36, abs=2 * found.mean.u))
     assert found.mean.u > found.scatter.value / 2  # of four
     assert found.step > 0.03  # a look each 0.2 Hz, a quarter of it
@@ -248,7 +246,7 @@ def test_the_cause_of_a_loss_in_full_motion_is_the_only_possible_one(tmp_path, d
     settings = ("limit.which=upper", f"limit.drive_frequency_hz={begins}", "limit.creep_hz_per_s=0.1", "limit.hold_s=0")
     request = mock(tmp_path, *settings, "limit.drive_waveform=SQU", "limit.repetitions=1")
     run = acquire(in_world(request, MotionWorld(scene, VirtualClock(), seed=1)), Silent())
-    (group,) = LIMIT.analyze([run.folder], LimitOptions()).groups
+    (group,) = LIMIT.analyze([run.folder]).groups
     assert causes(run) == [cause]
     assert group.causes == {cause: 1}
     assert f"The phase before each loss tells why: {cause}." in group.text
@@ -380,13 +378,13 @@ def test_loose_washers_are_warned_of_in_the_run_and_in_its_result(tmp_path):
     options = AcquisitionOptions(mock=True, out=tmp_path, seed=1, scene="loose-washers", settings=given)
     show = Silent()
     run = acquire(request_for("spin", options), show)
-    (held,) = [event for event in run.events() if event["kind"] == "held"]
+    (held,) = events(run, "held")
     slip = 1.731314e-6 * 2.34e-4 * (2 * math.pi * 30.2) ** 1.5 / 1e-6 / (2 * math.pi)
     assert held["drive_frequency_hz"] - held["spin_frequency_hz"] == pytest.approx(slip, abs=0.02)
-    (warning,) = [event["text"] for event in run.events() if event["kind"] == "warning"]
+    (warning,) = texts(run, "warning")
     assert "LOOSE WASHERS, the tape slips by 0.1" in warning
     assert warning in show.messages
-    assert warning in json.loads(json.dumps(SPINDOWN.analyze([run.folder], SpinDownOptions()).all_warnings))
+    assert warning in json.loads(json.dumps(SPINDOWN.analyze([run.folder]).all_warnings))
 
 
 # --- a drive that the top triggers ---
@@ -400,14 +398,14 @@ def test_a_top_that_levels_off_shows_where_pull_and_drag_are_equal(tmp_path):
     frame, scene = run.readings().frame, random_scene(1)
     place = scene.moment_turns + scene.tape.offset(scene.trigger.thresholds(rising=True), 50.0)
     bursts = Triggered(2.4e-4, 1, rising=True, delay=0.0, jitter=0.0)
-    phases = [event["phase_deg"] for event in run.events() if event["kind"] == "phase found"]
+    phases = [event["phase_deg"] for event in events(run, "phase found")]
     sines = [Output("SIN", CYCLE * 50.0, 0.0, 0.0, phase=phase, triggered=bursts) for phase in phases]
     pull = np.array([scene.lock_torque * mean_pull(sine, 50.0, place, jitter=scene.jitter) for sine in sines])
     balance = (pull / scene.constants[0]) ** (2 / 3) / 2 / math.pi
     pulls = (frame["spin_frequency_hz"] - balance) / frame["spin_frequency_u_hz"]
     assert abs(pulls).max() < 3
     assert frame["spin_frequency_u_hz"].max() < 0.02 * balance.min()
-    (found,) = LIMIT.analyze([run.folder], LimitOptions()).groups
+    (found,) = LIMIT.analyze([run.folder]).groups
     assert found.conditions.triggered
     assert found.conditions.levels_off
     assert found.statistics.step == 0
@@ -428,7 +426,7 @@ def test_a_top_that_leaves_the_window_has_its_limit_where_it_fell(tmp_path):
     pulls = (lost["spin_frequency_hz"] - 37) / lost["spin_frequency_u_hz"]
     assert abs(pulls).max() < 3
     assert lost["spin_frequency_u_hz"].max() < 0.05
-    analysis = LIMIT.analyze([run.folder], LimitOptions())
+    analysis = LIMIT.analyze([run.folder])
     (found,) = analysis.groups
     assert found.statistics.n == 2
     assert not found.conditions.levels_off
@@ -449,6 +447,6 @@ def test_a_top_that_gets_slower_under_its_drive_is_no_limit(tmp_path):
     settings = [*TRIGGERED, "limit.repetitions=1", "limit.longest_s=300"]
     run = acquire(in_world(mock(tmp_path, *settings), Cut(SpinScene(), VirtualClock())), Silent())
     assert causes(run) == []
-    (once_more, *_) = [event["text"] for event in run.events() if event["kind"] == "once more"]
+    (once_more, *_) = texts(run, "once more")
     assert "the top gets slower under the drive" in once_more
     assert "does the cable lead from the phototransistor" in once_more

@@ -13,16 +13,14 @@ from instruments.errors import NoAnswer
 from levilab.acquisition.counting import prepare_counter
 from levilab.acquisition.experiments.precession import PrecessionSettings, _time_left, calming_step
 from levilab.acquisition.loop import AcquisitionRequest, acquire
-from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import Configuration, with_settings
 from levilab.interruption import Interrupted
-from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.precession.document import PRECESSION
 from levilab.runs.run import Run
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
-from support.acquisitions import Impatient, Silent, texts
+from support.acquisitions import Impatient, Silent, asked, texts
 from support.commands import command
 
 QUICK = {"hold_s": 1.0, "counts": 3, "gate_s": 0.5, "interval_s": 1.0, "ramp_hz_per_s": 0.2}
@@ -49,8 +47,7 @@ def kept(out):
 
 
 def test_a_sweep_in_full_motion_finds_a_locked_top(tmp_path):
-    options = AcquisitionOptions(mock=True, out=tmp_path, seed=1)
-    asked = request_for("precession", options)
+    usual = asked("precession", out=tmp_path, seed=1)
     quick = QUICK | {
         "hold_s": 5.0,
         "gate_s": 1.0,
@@ -61,7 +58,7 @@ def test_a_sweep_in_full_motion_finds_a_locked_top(tmp_path):
     }
     settings = PrecessionSettings(drive_frequency_hz=45.0, frequencies_hz=(45.0, 44.5, 44.0), **quick)
     show = Silent()
-    run = acquire(replace(asked, config=with_settings(asked.config, "precession", settings)), show)
+    run = acquire(replace(usual, config=with_settings(usual.config, "precession", settings)), show)
     assert run.status == "finished"
     assert run.record.synthetic
     readings = run.readings()
@@ -74,7 +71,7 @@ def test_a_sweep_in_full_motion_finds_a_locked_top(tmp_path):
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
     assert show.left == sorted(show.left, reverse=True)
     assert show.left[-1] == 0
-    (found,) = PRECESSION.analyze([run.folder], PrecessionOptions()).runs
+    (found,) = PRECESSION.analyze([run.folder]).runs
     assert [one.point for one in found.coherences] == [0, 1, 2]
     # of this run's gates; their u is the line's, the first estimate of the value stands in the readings
     np.testing.assert_allclose(found.fit.column("precession"), readings.column("precession_frequency_hz"), rtol=1e-9)

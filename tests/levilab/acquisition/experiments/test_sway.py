@@ -5,18 +5,16 @@ import json
 import numpy as np
 import pytest
 
-from levilab.acquisition.loop import acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.bench.config import ConfigError
 from levilab.formats.table import read_run_readings
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.simulator.scene import preset
-from support.acquisitions import Impatient, Silent
+from support.acquisitions import Impatient, acquired
 
 
-def filmed(out, *settings, show=None, **more):
-    options = AcquisitionOptions(mock=True, out=out, settings=settings, **more)
-    return acquire(request_for("sway", options), show or Silent())
+def filmed(out, *settings, **more):
+    return acquired("sway", out=out, settings=settings, **more)
 
 
 def track_of(run):
@@ -31,7 +29,7 @@ def test_a_film_of_the_virtual_bench_has_the_split_of_its_scene(tmp_path):
     assert steps == pytest.approx(np.full(steps.size, 1 / 120), abs=2e-6)  # six decimals
     # neighbouring frames differ by the noise of two, 0.1 mm each, and hardly by motion
     assert np.std(np.diff(track["height_m"], 2)) == pytest.approx(np.sqrt(6) * 1e-4, rel=0.1)
-    (found,) = ANALYSES["sway"].analyze([run.folder], ANALYSES["sway"].options_from({})).runs
+    (found,) = ANALYSES["sway"].analyze([run.folder]).runs
     assert len(found.swings) == 3
     assert abs(found.geometry.ratio.value - 1) < 4 * found.geometry.ratio.u  # chance: one of 16 000
     assert found.geometry.ratio.u < 0.01

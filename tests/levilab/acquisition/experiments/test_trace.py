@@ -20,7 +20,7 @@ from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from levilab.world.bench import VIRTUAL, virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld, random_scene
-from support.acquisitions import Impatient, Meanwhile, Silent
+from support.acquisitions import Impatient, Meanwhile, Silent, asked, texts
 from support.commands import command
 
 #: The thesis's driven top, put where it floats: as IC1 it swings so far that the laser misses it now and then.
@@ -43,7 +43,7 @@ def mock_trace(folder, lines="", **options):
     """Records on the virtual bench, with lines of the bench file's table [trace]."""
     bench = folder / "bench.toml"
     bench.write_text(f"[trace]\n{lines}\n", encoding="utf-8")
-    return request_for("trace", AcquisitionOptions(mock=True, bench=bench, out=folder / "runs", **options))
+    return asked("trace", bench=bench, out=folder / "runs", **options)
 
 
 def pulses(run, k, slope=1.0):
@@ -222,7 +222,7 @@ def test_what_was_cut_short_is_said_and_taken_anew(tmp_path):
     killed = record.replace('"status": "finished"', '"status": "interrupted"')
     (whole.folder / "run.json").write_text(killed, encoding="utf-8")
     run = acquire(request_for("trace", AcquisitionOptions(resume=whole.folder, out=tmp_path)), Silent())
-    cut = [event["text"] for event in run.events() if event["kind"] == "cut short"]
+    cut = texts(run, "cut short")
     assert cut[0].startswith("traces/000004.npy: the run was cut short before traces.jsonl said how to read it")
     assert cut[1] == "record 2 was cut short after 1 of 2 channels; it is taken again"
     assert [one.number for one in run.traces()] == [1, 2, 3, 5, 6]
@@ -266,7 +266,7 @@ def test_what_had_come_of_a_record_when_killed_is_found_again(tmp_path, monkeypa
         (3, 12_000, None),
     ]
     np.testing.assert_array_equal(again.traces()[1].trace.codes, codes[:10_000])
-    kinds = [event["text"] for event in again.events() if event["kind"] == "cut short"]
+    kinds = texts(again, "cut short")
     assert kinds[0] == "traces.jsonl: record 2 (tape) was cut short: 10000 of its 12000 points are kept"
 
 

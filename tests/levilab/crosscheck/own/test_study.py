@@ -31,7 +31,7 @@ CHEAP = (
 
 def result(name, *paths):
     row = ANALYSES[name]
-    return row.analyze(list(paths), row.options_from({}))
+    return row.analyze(list(paths))
 
 
 @pytest.mark.parametrize(("name", "sample"), CHEAP)

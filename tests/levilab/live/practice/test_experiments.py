@@ -12,7 +12,6 @@ from levilab.live.practice.experiments import PRACTICE, settings_for
 from levilab.live.practice.seeds import keys_of_seed
 from levilab.live.practice.what_if import USUAL, WHAT_IF, keys_of
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.options import FieldOptions
 from levilab.present.progress import Display
 from levilab.simulator.equilibrium import stability_of
 from levilab.simulator.scene import preset
@@ -27,7 +26,7 @@ def test_the_mass_to_set_by_the_scan_floats_on_the_same_bench(tmp_path, seed):
     options = AcquisitionOptions(mock=True, out=tmp_path, seed=seed, settings=settings_for(PRACTICE["field"], scene))
     wiring = virtual_wiring(scene_world(scene, VirtualClock, lambda _: None, seed=seed), Limits())
     run = acquire(request_at(wiring, scene, "field", options), Display())
-    values = ANALYSES["field"].analyze([run.folder], FieldOptions()).values
+    values = ANALYSES["field"].analyze([run.folder]).values
     window = stability_of(scene).lifted[-1]
     for name, mass in (
         ("lightest_mass", window.light),

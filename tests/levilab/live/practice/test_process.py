@@ -38,6 +38,7 @@ from levilab.simulator.scene import read_scene
 from levilab.telemetry.publisher import Publisher
 from levilab.world.bench import scene_world, virtual_wiring
 from levilab.world.spin_world import random_scene
+from support.acquisitions import events
 
 
 class Script:
@@ -551,7 +552,7 @@ def test_a_run_that_is_stopped_is_kept_and_the_bench_goes_on(session):
     assert [event["text"] for event in run.events()][-1] == "interrupted by the stop button, outputs are off"
     assert session.spins(156.0, 157.0)[-1][2] > 20
     # a drive feeds the nutation of a top, which the next run has to know; this one began with a top that was put back
-    assert not [event for event in run.events() if event["kind"] == "driven before"]
+    assert not events(run, "driven before")
     release = release_of(run.events())
     (before,) = (event for event in Run.load(Path(again["folder"])).events() if event["kind"] == "driven before")
     assert (before["frequency_hz"], before["driven_s"]) == (release.spin_hz, release.driven_s)

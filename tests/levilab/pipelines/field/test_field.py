@@ -90,7 +90,7 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp
     other = shutil.copytree(scan, tmp_path / "other")
     text = (other / "readings.csv").read_text(encoding="utf-8").replace(",0.035,", ",0.0352,")
     (other / "readings.csv").write_text(text, encoding="utf-8")
-    found = FIELD.analyze([tmp_path], FieldOptions())
+    found = FIELD.analyze([tmp_path])
     alone = [run.values["strength"] for run in found.runs]
     mean = found.values["strength"]
     assert mean.value == pytest.approx(np.mean([one.value for one in alone]))
@@ -105,7 +105,7 @@ def test_several_scans_have_means_that_are_no_more_certain_than_the_calliper(tmp
 
 
 def test_the_windows_of_spin_are_drawn_from_the_lightest_top_to_the_heaviest(sample_data):
-    found = FIELD.analyze([sample_data / "field-scan"], FieldOptions())
+    found = FIELD.analyze([sample_data / "field-scan"])
     slow, fast = field_figure(found).axes[3].get_lines()[:2]
     ends = [1e3 * (found.values[name].value or 0.0) for name in ("lightest_mass", "heaviest_mass")]
     for line in (slow, fast):
@@ -159,15 +159,15 @@ def test_bad_scans_are_refused_in_one_line(tmp_path, z, b, says):
 def test_a_file_without_its_base_says_what_is_missing(tmp_path):
     path = csv(tmp_path / "hall.csv", "z [mm],B [mT]", HEIGHTS_MM, FIELD_MT)
     with pytest.raises(DataError, match=r"the radii of the base are not known.*`device`"):
-        FIELD.analyze([path], FieldOptions())
+        FIELD.analyze([path])
 
 
 def test_a_file_of_something_else_does_not_suit(tmp_path, sample_data):
     with pytest.raises(DoesNotSuit, match="needs a field run"):
-        FIELD.analyze([sample_data / "spin-down-1"], FieldOptions())
+        FIELD.analyze([sample_data / "spin-down-1"])
     path = csv(tmp_path / "spin.csv", "t,f", HEIGHTS_MM, FIELD_MT)
     with pytest.raises(DoesNotSuit, match=r"no title is known \(height_m, flux_density_t.*z=NAME,b=NAME"):
-        FIELD.analyze([path], FieldOptions())
+        FIELD.analyze([path])
 
 
 def test_a_moment_needs_the_mass(scan):

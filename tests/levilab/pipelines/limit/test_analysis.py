@@ -31,7 +31,7 @@ from support.spin_downs import spin_down_csv
 
 
 def test_the_published_limits_give_the_published_statistics(sample_data):
-    analysis = LIMIT.analyze([sample_data / "lower-limits"], LimitOptions())
+    analysis = LIMIT.analyze([sample_data / "lower-limits"])
     values = ANALYSES["limit"].document(analysis, sample_data)["values"]
     assert round(values["mean"]["value"], 2) == 21.86
     assert round(values["scatter"]["value"], 2) == 0.25
@@ -43,7 +43,7 @@ def test_theory_beside_them_is_that_of_the_thesis_top(sample_data, tmp_path):
     """PHYSICS: window 21.65 to 80.6 Hz at z = 7.30 cm, computed there from the quartic; resonance 22.1 Hz."""
     file = tmp_path / "upper.csv"  # with no scene of its own
     file.write_text("61.2\n60.9\n61.0\n", encoding="utf-8")
-    (lower, upper) = LIMIT.analyze([sample_data / "lower-limits", file], LimitOptions()).groups
+    (lower, upper) = LIMIT.analyze([sample_data / "lower-limits", file]).groups
     expected = {one.name: one.expected for group in (lower, upper) for one in group.comparisons}
     share = 2779 * 2 * np.pi / 60 / 326  # of Simon's top 3: measured, and the edge of its quartic
     reached = {ISLANDS: 59.5, THESIS_HIGHEST: 61, THESIS_LOOSE: 66, SIMON: share * 80.6}
@@ -55,7 +55,7 @@ def test_theory_beside_them_is_that_of_the_thesis_top(sample_data, tmp_path):
 
 
 def test_both_kinds_together_have_values_of_both(sample_data, tmp_path):
-    analysis = ANALYSES["limit"].analyze([sample_data], LimitOptions())
+    analysis = ANALYSES["limit"].analyze([sample_data])
     document = ANALYSES["limit"].document(analysis, tmp_path)
     assert {"lower_mean", "upper_1_mean", "upper_2_standard_error"} <= document["values"].keys()
     assert "The top was lost by the drive 8 times." in analysis.groups[1].text
@@ -96,7 +96,7 @@ def test_groups_of_the_same_mean_are_told_apart(sample_data, tmp_path):
         change(folder, changes, synthetic=name == "a")
         text = "\n".join(["spin_frequency_hz,spin_frequency_u_hz", *rows, ""])
         (folder / "readings.csv").write_text(text, encoding="utf-8")
-    analysis = ANALYSES["limit"].analyze([tmp_path], LimitOptions())
+    analysis = ANALYSES["limit"].analyze([tmp_path])
     one, other = (group.statistics.mean for group in analysis.groups)
     assert one == other
     assert marks_of_budgets(analysis) == ["SYNTHETIC.", ""]
@@ -104,11 +104,11 @@ def test_groups_of_the_same_mean_are_told_apart(sample_data, tmp_path):
     assert [document["values"][f"upper_{k}_mean"]["group"] for k in (1, 2)] == [0, 1]
     assert [budget["group"] for budget in document["budget"]] == [0, 1]
     (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
-    assert marks_of_budgets(ANALYSES["limit"].recall([tmp_path], LimitOptions())) == ["SYNTHETIC.", ""]
+    assert marks_of_budgets(ANALYSES["limit"].recall([tmp_path])) == ["SYNTHETIC.", ""]
     document["budget"][0]["group"] = 2
     (tmp_path / "result.json").write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(DataError, match="a budget is of none of the 2 groups"):
-        ANALYSES["limit"].recall([tmp_path], LimitOptions())
+        ANALYSES["limit"].recall([tmp_path])
 
 
 @pytest.mark.usefixtures("undrawn_figures")
@@ -120,7 +120,7 @@ def test_measured_and_made_up_runs_are_never_one_mean(sample_data, tmp_path):
         head, *limits = (folder / "readings.csv").read_text(encoding="utf-8").split()
         limits = {"a": limits, "b": [f"{32.0 + 0.1 * k:.1f}" for k in range(10)], "c": limits[::-1]}[name]
         (folder / "readings.csv").write_text("\n".join([head, *limits, ""]), encoding="utf-8")
-    analysis = ANALYSES["limit"].analyze([tmp_path], LimitOptions())
+    analysis = ANALYSES["limit"].analyze([tmp_path])
     assert sorted(group.runs for group in analysis.groups) == [(0, 2), (1,)]
     (measured,) = (group for group in analysis.groups if group.runs == (0, 2))
     assert measured.statistics.mean.value == pytest.approx(21.86)
@@ -131,10 +131,10 @@ def test_measured_and_made_up_runs_are_never_one_mean(sample_data, tmp_path):
     assert [group["conditions"]["synthetic"] for group in document["groups"]] == [False, True]
     assert [run["result"]["conditions"]["synthetic"] for run in document["runs"]] == [False, True, False]
     save(ANALYSES["limit"], analysis)
-    assert ANALYSES["limit"].recall([tmp_path], LimitOptions()).groups == analysis.groups
+    assert ANALYSES["limit"].recall([tmp_path]).groups == analysis.groups
     page = write_report([tmp_path], tmp_path / "page.html").read_text(encoding="utf-8")
     assert "MIXED" not in page
-    (alone,) = ANALYSES["limit"].analyze([tmp_path / "a", tmp_path / "c"], LimitOptions()).groups
+    (alone,) = ANALYSES["limit"].analyze([tmp_path / "a", tmp_path / "c"]).groups
     assert alone.statistics == measured.statistics
     assert alone.conditions.synthetic is False
     assert "SYNTHETIC" not in alone.text  # nothing to be told apart from
@@ -152,7 +152,7 @@ def test_what_is_made_up_is_said_of_each_run_and_group(sample_data, tmp_path, mo
     (tmp_path / "my.csv").write_text("f [Hz]\n21.9\n21.8\n22.0\n", encoding="utf-8")
     if "and a run" in name:
         paths.append(shutil.copytree(sample_data / "lower-limits", tmp_path / "lower-limits"))
-    analysis = ANALYSES["limit"].analyze(paths, LimitOptions())
+    analysis = ANALYSES["limit"].analyze(paths)
     assert "SYNTHETIC" not in analysis.text  # nothing to be told apart from
     (file, *_) = save(ANALYSES["limit"], analysis)
     document = json.loads(file.read_text(encoding="utf-8"))
@@ -160,14 +160,14 @@ def test_what_is_made_up_is_said_of_each_run_and_group(sample_data, tmp_path, mo
     assert group["conditions"]["synthetic"] is synthetic
     assert document["runs"][0]["result"]["conditions"]["synthetic"] is synthetic
     assert [run["result"]["conditions"]["synthetic"] for run in document["runs"][1:]] == [False] * (len(paths) - 1)
-    recalled = ANALYSES["limit"].recall(paths, LimitOptions())
+    recalled = ANALYSES["limit"].recall(paths)
     assert (recalled.runs, recalled.groups) == (analysis.runs, analysis.groups)
 
 
 @pytest.mark.usefixtures("undrawn_figures")
 def test_what_was_written_is_what_a_report_shows(sample_data, tmp_path):
     folder = shutil.copytree(sample_data / "loose-washers", tmp_path / "run")
-    analysis = LIMIT.analyze([folder], LimitOptions())
+    analysis = LIMIT.analyze([folder])
     assert [file.name for file in save(ANALYSES["limit"], analysis)] == ["result.json", "limit.png"]
     page = write_report([folder], tmp_path / "page.html").read_text(encoding="utf-8")
     assert "LOOSE WASHERS" in page
@@ -179,7 +179,7 @@ def test_what_was_written_is_what_a_report_shows(sample_data, tmp_path):
 def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path):
     file = tmp_path / "my.csv"
     file.write_text("top,f [Hz]\n1,80.1\n2,80.3\n3,79.9\n", encoding="utf-8")
-    (group,) = LIMIT.analyze([file], LimitOptions()).groups
+    (group,) = LIMIT.analyze([file]).groups
     assert (group.which, group.statistics.n) == ("upper", 3)  # by the nearer edge of the window
 
 
@@ -196,7 +196,7 @@ def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path):
 def test_a_column_of_limits_alone_is_enough(tmp_path, text, request):
     file = tmp_path / "my.csv"
     file.write_text(("rpm\n" if request.node.callspec.id == "rpm" else "") + text, encoding="utf-8")
-    (group,) = LIMIT.analyze([file], LimitOptions()).groups
+    (group,) = LIMIT.analyze([file]).groups
     assert group.statistics.mean.value == pytest.approx(65.0 / 3)
     assert (group.which, group.statistics.n) == ("lower", 3)
 
@@ -206,7 +206,7 @@ def test_another_column_is_no_limit(tmp_path, text):
     file = tmp_path / "my.csv"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(TableError):
-        LIMIT.analyze([file], LimitOptions())
+        LIMIT.analyze([file])
 
 
 def test_runs_of_other_conditions_stand_apart(sample_data, tmp_path):
@@ -219,7 +219,7 @@ def test_runs_of_other_conditions_stand_apart(sample_data, tmp_path):
         off = 4.0 * k + np.tile([-0.1, 0.1], 4)
         rows = ["spin_frequency_hz,spin_frequency_u_hz", *(f"{67 + one},0.05" for one in off)]
         (folder / "readings.csv").write_text("\n".join([*rows, ""]), encoding="utf-8")
-    analysis = LIMIT.analyze([tmp_path / name for name in names], LimitOptions())
+    analysis = LIMIT.analyze([tmp_path / name for name in names])
     assert sorted(group.runs for group in analysis.groups) == [(0, 1), (2,), (3,)]
     both = next(group for group in analysis.groups if group.runs == (0, 1))
     assert both.statistics.between.value == pytest.approx(8**0.5, rel=0.01)  # 4 Hz apart
@@ -236,7 +236,7 @@ def test_a_repetition_far_off_is_numbered_among_all_and_the_page_shows_200(tmp_p
         limits = 21.9 + 0.1 * np.sin(1.0 + np.arange(n))
         limits[3] += 2.0 * (name == "two")
         (tmp_path / f"{name}.csv").write_text("\n".join(f"{one:.3f}" for one in limits), encoding="utf-8")
-    analysis = LIMIT.analyze([tmp_path / "one.csv", tmp_path / "two.csv"], LimitOptions())
+    analysis = LIMIT.analyze([tmp_path / "one.csv", tmp_path / "two.csv"])
     of_all, of_second = (text for text in analysis.all_warnings if "not belong to the others" in text)
     assert of_all.startswith("limits that do not")
     assert of_second.startswith("two.csv: limits that do not")
@@ -252,7 +252,7 @@ def test_upper_limits_that_do_not_scatter_are_no_better_than_a_step(sample_data,
     header, *rows = (folder / "readings.csv").read_text(encoding="utf-8").splitlines()
     alike = [",".join([row.split(",")[0], *rows[0].split(",")[1:]]) for row in rows]
     (folder / "readings.csv").write_text("\n".join([header, *alike, ""]), encoding="utf-8")
-    analysis = LIMIT.analyze([folder], LimitOptions())
+    analysis = LIMIT.analyze([folder])
     (run,) = analysis.runs
     assert run.statistics.mean.u == pytest.approx(float(rows[0].split(",")[2]))
     assert any("however often it is repeated: creep slower" in text for text in analysis.all_warnings)
@@ -265,7 +265,7 @@ def test_a_mean_within_a_step_of_the_drive_is_not_called_better(sample_data, tmp
     cells = [[row.split(",")[0], *rows[0].split(",")[1:]] for row in rows]
     cells[0][at] = str(float(cells[0][at]) + 0.01)
     (folder / "readings.csv").write_text("\n".join([header, *map(",".join, cells), ""]), encoding="utf-8")
-    text = str(limit_part(LIMIT.analyze([folder], LimitOptions())).result[0])
+    text = str(limit_part(LIMIT.analyze([folder])).result[0])
     assert "times as good" not in text
     assert "do not become less by more tops" in text
 
@@ -277,7 +277,7 @@ def test_causes_of_losses_are_counted_over_runs_and_explained(sample_data, tmp_p
             file.write('{"time_s": 5000.0, "kind": "note", "text": "", "cause": "left behind by the drive"}\n')
     readings = folders[1] / "readings.csv"
     readings.write_text(readings.read_text(encoding="utf-8").replace("69.", "68."), encoding="utf-8")
-    analysis = LIMIT.analyze(folders, LimitOptions())
+    analysis = LIMIT.analyze(folders)
     (group,) = analysis.groups
     assert group.causes == {"left behind by the drive": 18}
     assert "The phase before each loss tells why: left behind by the drive 18 times." in group.text
@@ -292,13 +292,13 @@ def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path, samp
     file = spin_down_csv(tmp_path / "my.csv")
     assert [row.name for row, _ in analyze_suiting([file], {})] == ["spindown"]
     with pytest.raises(DoesNotSuit, match="no limits of one top"):
-        LIMIT.analyze([file], LimitOptions())
+        LIMIT.analyze([file])
     file.write_text("t,f\n0,40\n10,39\n20,37\n30,37.5\n40,36\n50,35\n", encoding="utf-8")  # not far down
     with pytest.raises(DoesNotSuit, match="the spin falls with time"):
-        LIMIT.analyze([file], LimitOptions())
+        LIMIT.analyze([file])
     file.write_text("t,f\n" + "".join(f"{k},21.8\n" for k in range(6)), encoding="utf-8")  # a top under the drive
     with pytest.raises(DoesNotSuit, match="the spin does not change with time: is the drive on"):
-        LIMIT.analyze([file], LimitOptions())
+        LIMIT.analyze([file])
     with pytest.raises(DataError, match="is the drive still on"):
         analyze_suiting([file], {})
     for wrong, says in (("0,40\nca. 9,39\n20,40\n30,39.5\n", "'ca. 9' stands in"), ("0,40\n0,39\n9,40\n", "repeated")):
@@ -308,10 +308,10 @@ def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path, samp
     empty = shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
     (empty / "readings.csv").write_text("spin_frequency_hz\n", encoding="utf-8")
     with pytest.raises(TableError, match="at least one repetition is needed"):
-        LIMIT.analyze([empty], LimitOptions())
+        LIMIT.analyze([empty])
     (empty / "readings.csv").write_text("spin_frequency_hz\n21.9\n-1\n", encoding="utf-8")
     with pytest.raises(TableError, match="line 3: the limit is -1 Hz"):
-        LIMIT.analyze([empty], LimitOptions())
+        LIMIT.analyze([empty])
 
 
 def test_a_scene_that_was_measured_is_the_one_compared_with(sample_data, tmp_path):
@@ -319,9 +319,9 @@ def test_a_scene_that_was_measured_is_the_one_compared_with(sample_data, tmp_pat
     record = json.loads((folder / "run.json").read_text(encoding="utf-8"))
     record["configuration"]["scene"] = {"name": "mine", "top": {"mass_kg": 0.025}}
     (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
-    (run,) = LIMIT.analyze([folder], LimitOptions()).runs
+    (run,) = LIMIT.analyze([folder]).runs
     assert run.device.name == "scene mine, 25 g"
     record["configuration"]["scene"]["top"]["mass_kg"] = 0.03  # floats nowhere
     (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
     with pytest.raises(DataError, match=r"configuration\.scene: no spin keeps this top up"):
-        LIMIT.analyze([folder], LimitOptions())
+        LIMIT.analyze([folder])

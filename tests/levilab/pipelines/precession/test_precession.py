@@ -65,12 +65,12 @@ def test_the_options_reach_the_fit(tmp_path):
 
 def test_several_sweeps_share_a_line(tmp_path):
     files = [sweep_csv(tmp_path / f"{k}.csv", seed=k) for k in (1, 2)]
-    found = PRECESSION.analyze(files, PrecessionOptions())
+    found = PRECESSION.analyze(files)
     assert found.combined.line.n == 18
     both, one = found.combined.line, found.runs[0].fit.line
     assert both.u_slope / both.scale == pytest.approx(one.u_slope / one.scale / 2**0.5)
     other = sweep_csv(tmp_path / "3.csv", slope=1.05, seed=3)
-    together = PRECESSION.analyze([*files, other], PrecessionOptions())
+    together = PRECESSION.analyze([*files, other])
     assert any("slopes of the 3 runs differ" in text for text in together.all_warnings)
     assert "are excluded" in together.text
 
@@ -128,21 +128,19 @@ def run_with_records(folder, drift, kept_s=26.0):
 
 
 def test_a_record_says_whether_the_pulses_keep_to_the_drives_phase(tmp_path):
-    found = PRECESSION.analyze([run_with_records(tmp_path / "locked", 0.0, kept_s=20.0)], PrecessionOptions())
+    found = PRECESSION.analyze([run_with_records(tmp_path / "locked", 0.0, kept_s=20.0)])
     ((point, coherence),) = [(one.point, one.coherence) for one in found.runs[0].coherences]
     assert point == 1
     assert coherence.length > 0.99
     assert coherence.phase_rad == pytest.approx(-np.pi / 2, abs=0.15)  # a cosine's maxima on a sine's phase, ±½ ms
-    drifting = PRECESSION.analyze([run_with_records(tmp_path / "drifting", 0.6)], PrecessionOptions())
+    drifting = PRECESSION.analyze([run_with_records(tmp_path / "drifting", 0.6)])
     assert drifting.runs[0].coherences[0].coherence.drift_hz == pytest.approx(0.6, abs=0.01)
     assert any("do not keep to the drive's phase at point 2" in text for text in drifting.all_warnings)
 
 
 def test_figure_and_page_show_what_was_found(tmp_path):
     analysis = ANALYSES["precession"]
-    found = analysis.analyze(
-        [sweep_csv(tmp_path / "mine.csv", half=3), run_with_records(tmp_path / "runs", 0.0)], PrecessionOptions()
-    )
+    found = analysis.analyze([sweep_csv(tmp_path / "mine.csv", half=3), run_with_records(tmp_path / "runs", 0.0)])
     page = render([(analysis, found)])
     assert found.text.split(". ")[0].replace("−", "-") in page.replace("−", "-")
     assert "mean vector" in page
@@ -174,7 +172,7 @@ def test_a_reading_that_is_not_that_of_its_gates_is_believed_itself(tmp_path):
                 counted = rates_at_point(spin, laser)[1].value + change
                 writer.reading(dict(zip(names, (20.0 * (k + 1), drive, counted, 0.5), strict=True)))
             writer.finish("finished")
-        (run,) = PRECESSION.analyze([writer.folder], PrecessionOptions()).runs
+        (run,) = PRECESSION.analyze([writer.folder]).runs
         assert (run.fit.points[0].u == 0.5) == bool(change)
         assert (run.fit.points[0].spin is None) == bool(change)
-    assert PRECESSION.analyze([writer.folder], PrecessionOptions()).all_warnings[0].endswith("the gates are not used")
+    assert PRECESSION.analyze([writer.folder]).all_warnings[0].endswith("the gates are not used")

@@ -15,7 +15,7 @@ from instruments.drivers.oscilloscope import Trace
 from levilab.computer import utc_now
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.options import SpinDownOptions, SpinOptions
+from levilab.pipelines.options import SpinOptions
 from levilab.pipelines.spin import words
 from levilab.pipelines.spin.analysis import Series, drive_offset, in_a_sentence
 from levilab.pipelines.spin.document import SPIN
@@ -50,7 +50,7 @@ def test_the_offset_from_a_drive_is_of_the_held_part_and_its_u_of_the_scatter():
 @pytest.fixture(scope="module")
 def scope_files():
     """What is found in the sample files."""
-    return SPIN.analyze([SAMPLE_DATA / "scope-files"], SpinOptions())
+    return SPIN.analyze([SAMPLE_DATA / "scope-files"])
 
 
 def test_every_sample_file_gives_the_spin_that_it_was_made_with(scope_files):
@@ -69,7 +69,7 @@ def test_every_sample_file_gives_the_spin_that_it_was_made_with(scope_files):
 def test_a_laser_and_a_drive_are_no_spin(sample_data):
     sweep = sample_data / "precession-sweep"
     with pytest.raises(DoesNotSuit, match="records of laser, drive, none of which shows the spin: levilab analyze"):
-        SPIN.analyze([sweep], SpinOptions())
+        SPIN.analyze([sweep])
     named = SPIN.analyze([sweep], SpinOptions(channel="laser"))
     assert any("the frequency of laser is no spin, but how often" in text for text in named.all_warnings)
 
@@ -91,7 +91,7 @@ def test_a_note_of_channels_names_its_file_and_them_as_they_are_in_german_too(tm
     for name in ("p1.csv", "p2.csv"):
         shifted = table + (name == "p2.csv") * 1e-3  # not the same readings twice
         np.savetxt(tmp_path / name, shifted, "%.7g", ",", header="time [s],mark,laser", comments="")
-    found = SPIN.analyze([tmp_path / "p1.csv", tmp_path / "p2.csv"], SpinOptions())
+    found = SPIN.analyze([tmp_path / "p1.csv", tmp_path / "p2.csv"])
     said = [in_language(text, "de") for text in found.all_warnings]
     has = "hat Aufzeichnungen von mark, laser; ausgewertet wird mark, die Option `channel` wählt etwas anderes"
     assert [text for text in said if "Aufzeichnungen" in text] == [f"p1.csv: {has}", f"p2.csv: {has}"]
@@ -99,13 +99,13 @@ def test_a_note_of_channels_names_its_file_and_them_as_they_are_in_german_too(tm
 
 def test_a_long_record_is_followed_and_feeds_the_drag_laws(tmp_path):
     path = coasting_wav(tmp_path / "long.wav")
-    (run,) = SPIN.analyze([path], SpinOptions()).runs
+    (run,) = SPIN.analyze([path]).runs
     assert len(run.series) == 15  # windows of 2 s
     omega = ((2 * np.pi * RELEASE_HZ) ** -0.5 + C32 * run.series.time / 2) ** -2
     pulls = (run.series.frequency - omega / (2 * np.pi)) / run.series.u
     assert np.abs(pulls).max() < 4.5
     assert [kind for kind, _, _ in run.series.phases] == ["coasting"]
-    down = SPINDOWN.analyze([path], SpinDownOptions())
+    down = SPINDOWN.analyze([path])
     disc = down.runs[0].fit("disc").parameters["c32"]
     assert disc.value == pytest.approx(C32, abs=4 * disc.u)
     assert disc.u < 2e-3 * C32
@@ -118,7 +118,7 @@ def test_a_top_that_is_held_has_a_spin_and_no_spin_down(tmp_path):
     assert row.name == "spin"
     assert found.runs[0].spin.frequency.value == pytest.approx(30, abs=1e-3)
     with pytest.raises(DoesNotSuit, match="is the drive still on"):
-        SPINDOWN.analyze([held], SpinDownOptions())
+        SPINDOWN.analyze([held])
 
 
 def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path):
@@ -126,14 +126,14 @@ def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path):
     times = np.interp(np.arange(1, int(coasting_turns(t)[-1])), coasting_turns(t), t)
     path = tmp_path / "pulses.csv"
     path.write_text("pulse time [s]\n" + "".join(f"{x:.7f}\n" for x in times), encoding="utf-8")
-    disc = SPINDOWN.analyze([path], SpinDownOptions()).runs[0].fit("disc").parameters["c32"]
+    disc = SPINDOWN.analyze([path]).runs[0].fit("disc").parameters["c32"]
     assert disc.value == pytest.approx(C32, rel=1e-3)
-    assert len(SPIN.analyze([path], SpinOptions()).runs[0].series) == 15
+    assert len(SPIN.analyze([path]).runs[0].series) == 15
 
 
 def test_a_record_that_is_too_short_is_no_spin_down(sample_data):
     with pytest.raises(DoesNotSuit, match=r"lasts 0\.5 s, a spin-down needs 3 windows of 2 s"):
-        SPINDOWN.analyze([sample_data / "scope-files" / "recording.wav"], SpinDownOptions())
+        SPINDOWN.analyze([sample_data / "scope-files" / "recording.wav"])
 
 
 def run_of(runs, records):
@@ -160,7 +160,7 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced):
     waveform = run_waveforms(Run.load(traced))[1]
     assert (waveform.start, waveform.step, waveform.count) == (pytest.approx(9.6), 2.5e-4, 1600)
     assert waveform.samples().max() == pytest.approx(1.1, abs=0.1)
-    analysis = SPIN.analyze([traced], SpinOptions())
+    analysis = SPIN.analyze([traced])
     series = analysis.runs[0].series
     assert series.frequency == pytest.approx([30, 29, 28], abs=0.01)
     assert series.time == pytest.approx([-0.2, 9.8, 19.8], abs=0.05)  # the middles of 0.4 s before they were complete
@@ -182,13 +182,13 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced):
 def test_a_run_that_was_killed_before_its_first_record_has_nothing_to_analyze(traced):
     (traced / "traces.jsonl").unlink()
     with pytest.raises(DataError, match=r"holds no traces\.jsonl, so nothing was recorded; analyze another run"):
-        SPIN.analyze([traced], SpinOptions())
+        SPIN.analyze([traced])
 
 
 def test_records_of_a_run_that_are_left_out_are_counted_in_a_note(traced):
     first, *others = (stored.trace for stored in Run.load(traced).traces())
     dark = replace(first, codes=np.full_like(first.codes, 10))
-    analysis = SPIN.analyze([run_of(traced.parent, [dark, *others])], SpinOptions())
+    analysis = SPIN.analyze([run_of(traced.parent, [dark, *others])])
     assert len(analysis.runs[0].series) == 2
     (note,) = [text for text in analysis.all_warnings if text.endswith("(no-pulses)")]
     assert "1 of 3 records are left out: no pulses" in note
@@ -199,14 +199,14 @@ def test_a_finding_in_some_records_of_a_run_names_them(traced):
     *others, last = (stored.trace for stored in Run.load(traced).traces())
     codes = last.codes.copy()  # at 28 Hz, from -0.2 s on: its sixth turn
     codes[int((0 - 0.5 / 28 + 0.2) * 4000) : int((0.5 / 28 + 0.2) * 4000)] = 10
-    analysis = SPIN.analyze([run_of(traced.parent, [*others, replace(last, codes=codes)])], SpinOptions())
+    analysis = SPIN.analyze([run_of(traced.parent, [*others, replace(last, codes=codes)])])
     assert analysis.runs[0].spin.missing == 0
     assert [text for text in analysis.all_warnings if text.endswith("record 3: 1 turn has no pulse (missing)")]
 
 
 def test_the_result_says_what_the_interface_promises(sample_data, tmp_path):
     shutil.copy(sample_data / "scope-files" / "keysight-dsox.csv", tmp_path)
-    analysis = SPIN.analyze([tmp_path / "keysight-dsox.csv"], SpinOptions())
+    analysis = SPIN.analyze([tmp_path / "keysight-dsox.csv"])
     written = save_found(ANALYSES["spin"], analysis)[0]
     assert written.name == "keysight-dsox.csv.result.spin.json"
     result = json.loads(written.read_text(encoding="utf-8"), parse_constant=pytest.fail)
@@ -221,7 +221,7 @@ def test_findings_are_notes_with_their_names(tmp_path):
     t = np.arange(4000) / 1000
     turns = 30 * t
     signal = np.where(np.isin(np.rint(turns), (20, 21, 50)), 0.1, pulses(turns))  # three turns without their pulse
-    analysis = SPIN.analyze([write_wav(tmp_path / "a.wav", signal, 1000)], SpinOptions())
+    analysis = SPIN.analyze([write_wav(tmp_path / "a.wav", signal, 1000)])
     assert analysis.runs[0].spin.missing == 3
     assert any(text.endswith("(missing)") for text in analysis.all_warnings)
 
@@ -229,7 +229,7 @@ def test_findings_are_notes_with_their_names(tmp_path):
 def test_a_record_without_pulses_is_refused_in_one_line(tmp_path):
     path = write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
     with pytest.raises(DataError, match=r"dark\.wav: 0 pulses in 4 s, at least 4 are needed"):
-        SPIN.analyze([path], SpinOptions())
+        SPIN.analyze([path])
 
 
 @pytest.mark.parametrize("find", [SPIN.analyze, ANALYSES["spin"].recall])
@@ -278,7 +278,7 @@ def test_the_figure_shows_the_trace_the_turns_the_residuals_and_the_frequency(wh
         "times": [sample_data / "scope-files" / "pulse-times.txt"],
         "long": [coasting_wav(tmp_path / "long.wav", seconds=14, rate=4000)] if what == "long" else [],
     }
-    figure = spin_figure(scope_files if what == "many" else SPIN.analyze(files[what], SpinOptions()))
+    figure = spin_figure(scope_files if what == "many" else SPIN.analyze(files[what]))
     panels = figure.get_axes()
     assert len(panels) == (12 if what == "many" else 4)
     assert faults(figure) == []
@@ -308,7 +308,7 @@ def test_residuals_of_a_bent_frequency_have_no_bend_left(what, tmp_path):
         text = "time [s],signal [V]\n" + "".join(f"{a:.4f},{b:.4f}\n" for a, b in zip(time, light, strict=True))
     file = tmp_path / "curved.csv"
     file.write_text(text, encoding="utf-8")
-    analysis = SPIN.analyze([file], SpinOptions())
+    analysis = SPIN.analyze([file])
     bend = analysis.runs[0].spin.bend
     assert bend.value == pytest.approx(0.6, abs=4 * bend.u)
     panel = spin_figure(analysis).get_axes()[2]
@@ -322,9 +322,7 @@ def test_residuals_of_a_bent_frequency_have_no_bend_left(what, tmp_path):
 
 def test_records_that_scatter_by_more_than_their_u_are_of_a_spin_that_swings(sample_data):
     """A driven top of the sample swings by 0.3 Hz; one that coasts loses its spin along a line."""
-    swings, coasts = (
-        ANALYSES["spin"].analyze([sample_data / name], SpinOptions()) for name in ("trace-laser", "trace-tape")
-    )
+    swings, coasts = (ANALYSES["spin"].analyze([sample_data / name]) for name in ("trace-laser", "trace-tape"))
     assert swings.runs[0].swing[0] == pytest.approx(np.std(swings.runs[0].series.frequency), rel=0.5)
     assert "they scatter about a line by 0.35 Hz, 180 times their uncertainties" in meaning(swings)[0]
     assert "scatter" not in meaning(coasts)[0]
@@ -338,7 +336,7 @@ def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_
     """
     settings = {"trace.records": 50, "trace.interval_s": 2.0}
     run = levilab.acquire("trace", mock=True, seed=2, out=tmp_path, settings=settings)
-    found = SPIN.analyze([run.folder], SpinOptions()).runs[0]
+    found = SPIN.analyze([run.folder]).runs[0]
     straight, weight = found.series.frequency**-0.5, 2 * found.series.frequency**1.5 / found.series.u
     line = np.polynomial.Polynomial.fit(found.series.time, straight, 1, w=weight)
     squares = float((((straight - line(found.series.time)) * weight) ** 2).sum())
@@ -348,7 +346,7 @@ def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_
 
 
 def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data):
-    found = SPIN.analyze([sample_data / "trace-tape"], SpinOptions())
+    found = SPIN.analyze([sample_data / "trace-tape"])
     (run,) = found.runs
     assert run.which == "record 3 of 5"
     assert (run.trend.value, run.trend.u) == pytest.approx((-0.0879, 0.0017), abs=5e-5)  # single ones: u of 0.4 Hz/s
@@ -375,7 +373,7 @@ def test_the_time_that_is_said_moves_the_spin_by_less_than_its_u(tmp_path):
     times += 0.002 * times**2  # it slows by 0.16 Hz/s
     path = tmp_path / "pulses.csv"
     path.write_text("time_s\n" + "".join(f"{t:.9f}\n" for t in times), encoding="utf-8")
-    found = SPIN.analyze([path], SpinOptions())
+    found = SPIN.analyze([path])
     spin = found.runs[0].spin
     (said,) = re.findall(r" at ([\d.]+) s", in_a_sentence(found.runs[0]))
     assert abs((float(said) - spin.reference_time) * spin.chirp.value) < spin.frequency.u / 2

@@ -41,7 +41,7 @@ def short(tmp_path_factory):
 
 
 def test_a_phones_record_gives_spin_amplitudes_and_budget(short):
-    found = ANALYSES["spin"].analyze([short], SpinOptions())
+    found = ANALYSES["spin"].analyze([short])
     (run,) = found.runs
     assert abs(run.spin.frequency.value - 31.0) < 4 * run.spin.frequency.u
     values = ANALYSES["spin"].document(found, short.parent)["values"]
@@ -59,10 +59,10 @@ def test_the_tilt_of_the_moment_follows_from_distance_and_moment(short):
 
 
 def test_a_long_record_gives_the_drag_law_and_the_limit(long):
-    spindown = ANALYSES["spindown"].analyze([long], SpinDownOptions())
+    spindown = ANALYSES["spindown"].analyze([long])
     stokes = spindown.runs[0].fit("stokes").parameters["c1"]
     assert abs(stokes.value - 3.2e-3) < 4 * stokes.u
-    limit = ANALYSES["limit"].analyze([long], LimitOptions())
+    limit = ANALYSES["limit"].analyze([long])
     truth = 37.0 * np.exp(-3.2e-3 * 163.2)
     assert limit.sources[0].readings.limit == pytest.approx([truth], abs=4 * limit.sources[0].readings.u[0])
 
@@ -79,7 +79,7 @@ def test_a_spin_that_is_held_is_compared_with_the_drive(tmp_path, long):
 
 
 def test_a_tilt_that_the_readings_do_not_show_is_given_as_a_bound(long):
-    text = ANALYSES["spindown"].analyze([long], SpinDownOptions()).text
+    text = ANALYSES["spindown"].analyze([long]).text
     assert "do not make certain that the moment of the top is tilted against its axis: it is by less than" in text
 
 
@@ -98,7 +98,7 @@ def test_a_record_suits_the_analyses_that_find_something_in_it(long, short):
 def test_a_spin_that_may_be_folded_is_named_with_its_choices(tmp_path):
     made = synthetic_field(np.random.default_rng(53), frequency=61.0, chirp=0.0, jitter=0.0)
     path = phone(tmp_path / "even.csv", *made)
-    found = ANALYSES["spin"].analyze([path], SpinOptions())
+    found = ANALYSES["spin"].analyze([path])
     assert " or " in found.text
     assert any("39.00" in text and "61.00" in text for text in said(found))
     chosen = ANALYSES["spin"].analyze([path], SpinOptions(near=60.0))
@@ -110,7 +110,7 @@ def test_a_field_too_strong_for_a_phone_is_in_another_unit(tmp_path):
     times, field = synthetic_field(np.random.default_rng(54))
     path = tmp_path / "bare.csv"
     np.savetxt(path, np.column_stack([times, 1e6 * field]), delimiter=",", header="t,Bx,By,Bz", comments="")
-    found = ANALYSES["spin"].analyze([path], SpinOptions())
+    found = ANALYSES["spin"].analyze([path])
     assert any("[µT]" in text for text in said(found))
     assert abs(found.runs[0].spin.frequency.value - 31.0) < 5 * found.runs[0].spin.frequency.u
 
@@ -119,12 +119,12 @@ def test_times_that_go_back_are_refused_with_their_line(tmp_path):
     times, field = synthetic_field(np.random.default_rng(55))
     path = phone(tmp_path / "twice.csv", np.concatenate([times, times]), np.concatenate([field, field]))
     with pytest.raises(DataError, match="line 1002"):
-        ANALYSES["spin"].analyze([path], SpinOptions())
+        ANALYSES["spin"].analyze([path])
 
 
 @pytest.mark.parametrize("name", ["short", "long"])
 def test_the_figure_of_a_phones_record_has_no_faults(name, request):
-    assert not faults(spin_figure(ANALYSES["spin"].analyze([request.getfixturevalue(name)], SpinOptions())))
+    assert not faults(spin_figure(ANALYSES["spin"].analyze([request.getfixturevalue(name)])))
 
 
 def test_the_sample_record_is_made_by_its_script_and_gives_the_tilt(sample_data):

@@ -34,7 +34,7 @@ PUBLISHED = (("0.003199", "1.760e-05"), ("0.003134", "1.707e-05"), ("0.003133", 
 @pytest.fixture(scope="module")
 def four():
     """What is found in the four sample runs."""
-    return SPINDOWN.analyze([SAMPLE_DATA], SpinDownOptions())
+    return SPINDOWN.analyze([SAMPLE_DATA])
 
 
 def test_the_straight_lines_give_the_published_constants_to_every_printed_digit(four):
@@ -116,7 +116,7 @@ def test_the_result_is_written_as_the_interface_says(four, tmp_path):
 
 
 def test_one_run_has_its_start_and_covariance_at_the_top(sample_data):
-    analysis = SPINDOWN.analyze([sample_data / "spin-down-1"], SpinDownOptions())
+    analysis = SPINDOWN.analyze([sample_data / "spin-down-1"])
     result = ANALYSES["spindown"].document(analysis, analysis.output_folder)
     disc = next(model for model in result["models"] if model["name"] == "disc")
     assert set(disc["parameters"]) == {"start_frequency", "c32"}
@@ -134,22 +134,22 @@ def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path):
 
 
 def test_the_same_run_given_twice_counts_once(sample_data):
-    analysis = SPINDOWN.analyze([sample_data, sample_data / "spin-down-1"], SpinDownOptions())
+    analysis = SPINDOWN.analyze([sample_data, sample_data / "spin-down-1"])
     assert len(analysis.sources) == 4
 
 
 def test_the_readings_of_a_run_are_that_run_and_as_synthetic(sample_data, tmp_path):
-    (source,) = SPINDOWN.analyze([sample_data / "spin-down-1" / "readings.csv"], SpinDownOptions()).sources
+    (source,) = SPINDOWN.analyze([sample_data / "spin-down-1" / "readings.csv"]).sources
     assert source.synthetic
     shutil.copytree(sample_data / "spin-down-1", tmp_path / "broken")
     (tmp_path / "broken" / "run.json").write_text("{", encoding="utf-8")
-    (source,) = SPINDOWN.analyze([tmp_path / "broken" / "readings.csv"], SpinDownOptions()).sources
+    (source,) = SPINDOWN.analyze([tmp_path / "broken" / "readings.csv"]).sources
     assert any("whether it is SYNTHETIC is not known" in warning for warning in source.warnings)
 
 
 def test_real_and_synthetic_inputs_together_are_warned_of(sample_data, tmp_path):
     path = spin_down_csv(tmp_path / "my.csv")
-    analysis = SPINDOWN.analyze([path, sample_data / "spin-down-1"], SpinDownOptions())
+    analysis = SPINDOWN.analyze([path, sample_data / "spin-down-1"])
     assert "1 of 2 inputs are SYNTHETIC" in analysis.warnings[0]
     assert analysis.output_folder == Path()
 
@@ -159,7 +159,7 @@ def test_inputs_of_the_same_name_are_told_apart(tmp_path):
         (tmp_path / folder).mkdir()
         spin_down_csv(tmp_path / folder / "run.csv", seed=k)
     paths = [tmp_path / "monday" / "run.csv", Path(os.path.relpath(tmp_path / "tuesday" / "run.csv"))]
-    analysis = SPINDOWN.analyze(paths, SpinDownOptions())
+    analysis = SPINDOWN.analyze(paths)
     assert [source.name for source in analysis.sources] == ["monday/run.csv", "tuesday/run.csv"]
 
 
@@ -169,10 +169,10 @@ def test_another_unit_taken_for_hertz_is_doubted(tmp_path, unit, factor):
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
     np.savetxt(path, np.c_[t, factor * nu], delimiter=",", header="t,f", comments="")
     with pytest.raises(NoSuchColumn) as error:
-        SPINDOWN.analyze([path], SpinDownOptions())
+        SPINDOWN.analyze([path])
     assert error.value.doubt.choices[0].columns == {"t": "1", "f": f"2 [{unit}]"}
     np.savetxt(path, np.c_[t, factor * nu], delimiter=",", header="t,f [Hz]", comments="")
-    found = SPINDOWN.analyze([path], SpinDownOptions())  # stated: a note
+    found = SPINDOWN.analyze([path])  # stated: a note
     (source,) = found.sources
     assert source.readings.doubtful
     assert found.text.startswith("The unit comes first: as it was read the")  # and no "fits best … known to"
@@ -223,7 +223,7 @@ def test_a_run_whose_unit_is_in_doubt_stays_out_of_the_means(four, sample_data, 
     path = spin_down_csv(tmp_path / "my.csv", u=False)
     t, nu = np.loadtxt(path, delimiter=",", skiprows=1, unpack=True)
     np.savetxt(path, np.c_[t, 360 * nu], delimiter=",", header="t,f [Hz]", comments="")
-    both = SPINDOWN.analyze([sample_data, path], SpinDownOptions())
+    both = SPINDOWN.analyze([sample_data, path])
     assert both.combined.fit("disc").constants == four.combined.fit("disc").constants
     assert len(both.runs) == len(four.runs) + 1
     assert any("my" in warning for warning in both.about_all())
@@ -233,7 +233,7 @@ def test_a_speed_without_unit_may_be_in_hertz_or_turns_per_minute(tmp_path):
     path = tmp_path / "speed.csv"
     path.write_text("time,speed\n0,39.9\n10,38\n20,36\n30,34\n", "utf-8")
     with pytest.raises(DataError, match=r"'speed' has the values 39.9 to 34 and no unit: Hz .* or rpm\? say"):
-        SPINDOWN.analyze([path], SpinDownOptions())
+        SPINDOWN.analyze([path])
 
 
 def test_a_stated_reading_uncertainty_takes_the_place_of_the_scatter(tmp_path):
@@ -252,14 +252,14 @@ def test_in_a_searched_folder_what_is_broken_is_passed_over_and_told(sample_data
     for name in ("spin-down-1", "spin-down-2", "lower-limits"):
         shutil.copytree(sample_data / name, tmp_path / name)
     (tmp_path / "spin-down-2" / "run.json").write_text("{", encoding="utf-8")
-    analysis = SPINDOWN.analyze([tmp_path], SpinDownOptions())
+    analysis = SPINDOWN.analyze([tmp_path])
     assert [source.name for source in analysis.sources] == ["spin-down-1"]
     assert any("spin-down-2" in warning for warning in analysis.warnings)
 
 
 def test_a_run_of_another_experiment_is_refused_by_name(sample_data):
     with pytest.raises(DataError, match="holds a limit run, spindown needs a spin run") as refused:
-        SPINDOWN.analyze([sample_data / "lower-limits"], SpinDownOptions())
+        SPINDOWN.analyze([sample_data / "lower-limits"])
     german = in_language(text_of(refused.value), "de")
     assert german.endswith("Art der Messung: Grenzmessung; spindown liest: Auslaufmessung")
 
@@ -267,7 +267,7 @@ def test_a_run_of_another_experiment_is_refused_by_name(sample_data):
 def test_a_folder_without_a_spin_run_says_what_it_found(sample_data, tmp_path):
     shutil.copytree(sample_data / "lower-limits", tmp_path / "limits")
     with pytest.raises(DataError, match="found only 1 limit"):
-        SPINDOWN.analyze([tmp_path], SpinDownOptions())
+        SPINDOWN.analyze([tmp_path])
 
 
 @pytest.mark.usefixtures("undrawn_figures")

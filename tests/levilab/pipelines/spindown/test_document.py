@@ -114,14 +114,14 @@ def test_runs_analyzed_one_by_one_are_combined_without_a_new_fit(runs, fitted):
         analyzed(run)
     after = recall_spindowns([runs], SpinDownOptions())
     assert fitted == []
-    assert differences(after.combined, SPINDOWN.analyze([runs], SpinDownOptions()).combined) == []
+    assert differences(after.combined, SPINDOWN.analyze([runs]).combined) == []
 
 
 def test_a_run_is_recalled_from_the_result_of_its_folder(runs, fitted):
     analyzed(runs)
     after = recall_spindowns([runs / "run-3"], SpinDownOptions())
     assert fitted == []
-    assert differences(after.runs[0], SPINDOWN.analyze([runs / "run-3"], SpinDownOptions()).runs[0]) == []
+    assert differences(after.runs[0], SPINDOWN.analyze([runs / "run-3"]).runs[0]) == []
 
 
 def test_a_part_of_a_run_is_recalled_as_that_part(runs, fitted):

@@ -8,7 +8,6 @@ from scipy.linalg import toeplitz
 
 from analysis.spindown.drag import LAWS
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.figure import spindown_figure
 from levilab.pipelines.spindown.report import count_table, meaning, spindown_part, spindown_tables
@@ -35,7 +34,7 @@ def test_note_and_table_have_one_number_of_independent_readings(tmp_path):
         residuals.append(0.9 * residuals[-1] + 0.19**0.5 * rng.normal() if residuals else rng.normal())
     spin = 40 * (1 + 2.34e-4 * np.sqrt(2 * np.pi * 40) * time / 2) ** -2 + 0.03 * np.array(residuals)
     np.savetxt(path := tmp_path / "my.csv", np.column_stack([time, spin]), delimiter=",", header="t,f", comments="")
-    analysis = SPINDOWN.analyze([path], SpinDownOptions())
+    analysis = SPINDOWN.analyze([path])
     correlation = toeplitz(analysis.runs[0].correlation.value ** np.arange(12.0))
     worth = f"{12**2 / correlation.sum():.2g}"  # the variance of a reading over that of the mean
     assert f"12 readings are worth as much as {worth} independent ones" in " ".join(analysis.all_warnings)
@@ -88,4 +87,4 @@ def undecided(tmp_path):
         f = (250**-0.5 + c * t / 2) ** -2 / (2 * np.pi) + random.normal(0, U, t.size)
         rows = "\n".join(f"{time},{spin},{U}" for time, spin in zip(t, f, strict=True))
         (tmp_path / f"{c}.csv").write_text(f"t,f,u\n{rows}\n", encoding="utf-8")
-    return SPINDOWN.analyze(sorted(tmp_path.glob("*.csv")), SpinDownOptions())
+    return SPINDOWN.analyze(sorted(tmp_path.glob("*.csv")))

@@ -24,7 +24,7 @@ from levilab.animation.camera import (
 from levilab.errors import DataError, UsageError
 from levilab.formats.film import open_film, pictures
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.options import LimitOptions, SpinDownOptions, VideoOptions
+from levilab.pipelines.options import VideoOptions
 from levilab.pipelines.suits import save
 from levilab.simulator.scene import preset
 from support.commands import command
@@ -279,7 +279,7 @@ def test_a_film_is_recalled_from_its_result_and_reported_with_its_still(path, tm
     assert {file.name.removeprefix("IMG_0042.") for file in save(video, found)} == {
         "mp4.result.video.json", "mp4.video.png", "tracks.csv", "spin.csv",
     }  # fmt: skip
-    again = video.recall([copy], VideoOptions())
+    again = video.recall([copy])
     assert again.origins[0].text.startswith("as levilab analyze found it")
     assert differences(found.runs, again.runs) == []
     assert video.document(again, tmp_path) == video.document(found, tmp_path)
@@ -308,9 +308,9 @@ def test_a_top_that_falls_has_its_spin_then_as_a_limit_that_others_read(folder):
     assert spin.value == pytest.approx(22 - 0.06 * 2.6, abs=3 * spin.u)
     assert max(fall.u, spin.u) < 0.03
     save(video, analysis)
-    (limit,) = ANALYSES["limit"].analyze([folder / "falls.limit.csv"], LimitOptions()).runs
+    (limit,) = ANALYSES["limit"].analyze([folder / "falls.limit.csv"]).runs
     assert limit.statistics.mean.value == pytest.approx(spin.value)
-    ANALYSES["spindown"].analyze([folder / "falls.spin.csv"], SpinDownOptions())
+    ANALYSES["spindown"].analyze([folder / "falls.spin.csv"])
 
 
 @pytest.mark.slow

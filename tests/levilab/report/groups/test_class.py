@@ -11,8 +11,6 @@ import pytest
 from python_calamine import CalamineWorkbook
 
 from analysis.comparison import compare
-from levilab.acquisition.loop import acquire
-from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.crosscheck.truth import Truth
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
@@ -23,7 +21,7 @@ from levilab.report.groups.figure import class_figure
 from levilab.report.page import render
 from levilab.runs.find import RECORD
 from levilab.world.spin_world import SpinScene, random_scene
-from support.acquisitions import RAISED_QUICKLY, Silent
+from support.acquisitions import RAISED_QUICKLY, acquired
 from support.pages import Page
 from support.paths import SAMPLE_DATA
 
@@ -35,14 +33,13 @@ def measured(root, groups, experiment="spin", *settings):
     """Let groups measure on virtual benches; the k-th has the seed k."""
     settings = settings or RAISED_QUICKLY
     for seed, group in enumerate(groups, start=1):
-        options = AcquisitionOptions(mock=True, seed=seed, group=group, out=root, settings=settings)
-        acquire(request_for(experiment, options), Silent())
+        acquired(experiment, seed=seed, group=group, out=root, settings=settings)
     return root
 
 
 def compared(root, analysis="spindown"):
     row = ANALYSES[analysis]
-    return class_of(row, row.analyze([root], row.options_from({})))
+    return class_of(row, row.analyze([root]))
 
 
 @pytest.fixture(scope="module")

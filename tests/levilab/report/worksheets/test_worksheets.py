@@ -69,7 +69,7 @@ def test_the_commands_of_a_worksheet_find_the_numbers_of_its_key(experiment, tmp
     for command in commands:
         levilab(*shlex.split(command.replace("&quot;", '"'))[1:])
     analysis = ANALYSES[sheet.analysis]
-    students = class_of(analysis, analysis.recall([tmp_path / "class"], analysis.options_from({})), sheet.asked)
+    students = class_of(analysis, analysis.recall([tmp_path / "class"]), sheet.asked)
     key = measure(sheet, seeds)
     assert [one.estimates for one in students.quantities] == [one.estimates for one in key.quantities]
     assert [one.truths for one in students.quantities] == [one.truths for one in key.quantities]
