@@ -100,7 +100,7 @@ def test_an_analysis_need_not_be_named(levilab, sample_data):
     each = json.loads(levilab("analyze", sample_data, "--no-save", "--json").stdout)
     assert [(one["analysis"], len(one["runs"])) for one in each] == [
         ("spindown", 4),
-        ("spin", 23),
+        ("spin", 29),
         ("field", 1),
         ("limit", 3),
         ("precession", 1),
