@@ -121,8 +121,10 @@ class _Survey:
 
     def clip(self, values: Array, column: int) -> Array:
         """Return samples of a column with those beyond the range at the ends of the others, at 0 without others."""
-        low, high = (ends[column] if self.off_range else 0.0 for ends in (self.lowest, self.highest))
-        return values if not self.off_range else values.clip(low, high) if low <= high else np.zeros_like(values)
+        if not self.off_range:
+            return values
+        low, high = self.lowest[column], self.highest[column]
+        return values.clip(low, high) if low <= high else np.zeros_like(values)
 
 
 def read_samples(
