@@ -236,6 +236,7 @@ _WITH_TENTHS = 100.0
 def spindown_tables(analysis: SpinDownAnalysis) -> tuple[Table, ...]:
     """Return the runs, the laws, how well they fit, the straight lines.  Each fits a terminal of 80 columns."""
     quality = quality_table(analysis, QUALITY)
+    quality = replace(quality, title=Sentences("How well they fit.", _QUALITY_SYMBOLS))
     count = count_table(analysis, symbols=True)
     best, *lines = _of_laws(analysis)
     title = Text("Run by run: the fit of the {law} law, and unweighted straight lines", law=analysis.combined.best)
@@ -302,6 +303,7 @@ def _quality(statistics: Statistics, runs: int) -> list[str]:
 
 
 #: For the terminal, where nothing else explains them.
+_QUALITY_SYMBOLS = "order p: below 0.01 the signs of the residuals have a pattern; DW: near 2 without correlation."
 _WOBBLE_SYMBOLS = "δ: tilt of the moment; ν_r: resonance, below the last reading."
 _NUTATION = "K, with the laws: nutation. (prior): known of tops beforehand, not from the readings."
 
