@@ -88,18 +88,19 @@ def test_a_polite_client_is_served_beside_hostile_ones(what, way):
                 act(connection, way, what)
 
     threads = [threading.Thread(target=be_hostile) for _ in range(2)]
-    with served.opened, served.server:
-        polite = [served.open(one) for one in WAYS]
-        for thread in threads:
-            thread.start()
-        until(lambda: len(rounds) >= 2)
-        for client in [*polite, served.open(way)]:
-            for _ in range(3):
-                assert client.query("*IDN?").strip() == Thing.identity
-            client.close()
-        over.set()
-    for thread in threads:  # the end of the server ends them
-        thread.join()
+    with served.opened:  # which closes what the threads opened, once they have ended
+        with served.server:
+            polite = [served.open(one) for one in WAYS]
+            for thread in threads:
+                thread.start()
+            until(lambda: len(rounds) >= 2)
+            for client in [*polite, served.open(way)]:
+                for _ in range(3):
+                    assert client.query("*IDN?").strip() == Thing.identity
+                client.close()
+            over.set()
+        for thread in threads:  # the end of the server ends them
+            thread.join()
 
 
 @pytest.mark.parametrize("way", WAYS)
