@@ -382,8 +382,8 @@ pulses of {PULSE_V:g} V, {100 * DUTY:g} % of a turn wide at half height, on {DAR
 rounded to {DIGIT_V:g} V.  recording.wav has 2 V at full scale.  Of the same top, pulse-times.txt and saleae-logic.csv
 hold {len(pulse_times())} passages from time 0 on, with a jitter of 20 us; microcontroller.csv four seconds at uneven
 times, from 0.25 s before time 0 on; the sounds phone.* two seconds from there on, 44100 samples per second, phone.flac
-11025.  red-pitaya.csv has times that fall, as its oscilloscope writes them: --rate 2048.  So has dsview-dslogic.csv the
-same passages as saleae-logic.csv.
+11025.  red-pitaya.csv has times that fall, as its oscilloscope writes them: --rate 2048.
+dsview-dslogic.csv has the same passages as saleae-logic.csv.
 """
 
 

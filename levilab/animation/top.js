@@ -28,7 +28,8 @@ const LEASH = 0.15;         // the close-up follows a top that moves further tha
  * @param THREE the library.
  * @param parts the description of a scene, as parts_of makes it.
  * @param {"light"|"dark"} theme which of its colours.
- * @returns {object} scene (to render), top, washers, base (groups), and functions:
+ * @returns {object} scene (to render), top, washers, base (groups), half (of the length from tip to end of the axis, in
+ *   drawn units), and functions:
  *   setPose(position [m], quaternion [x, y, z, w], {washers, drive}): place the top; `washers` is how far they have
  *     turned on it [rad], `drive` the drive's field as a part of its amplitude, −1 to 1;
  *   setPath(points, count): the line that the axis' end has drawn, a Float32Array of x, y, z [m];
@@ -288,7 +289,6 @@ export function openStage(THREE, OrbitControls, canvas, parts, {changed, ratio =
     if (!width || !height) return;
     const beside = closeWidth(width, height);
     renderer.setSize(width, height, false);
-    renderer.setClearColor(parts.colours[theme()].ground);
     controls.zoomToCursor = !beside;
     near.aspect = beside / height || 1;
     near.updateProjectionMatrix();
@@ -309,6 +309,7 @@ export function openStage(THREE, OrbitControls, canvas, parts, {changed, ratio =
   function render() {
     const [width, height] = [canvas.clientWidth, canvas.clientHeight], beside = closeWidth(width, height);
     renderer.setScissorTest(false);
+    renderer.setClearColor(parts.colours[theme()].ground);  // of which the seam is left
     if (beside) renderer.clear();
     renderer.setScissorTest(beside > 0);
     renderPart(0, width - beside - (beside && SEAM), height, camera);
@@ -346,7 +347,7 @@ export function openStage(THREE, OrbitControls, canvas, parts, {changed, ratio =
   controls.addEventListener("change", changed);
   dark.addEventListener("change", () => {
     view.setTheme(theme());
-    resize();
+    changed();
   });
   new ResizeObserver(resize).observe(canvas);
   resize();

@@ -67,7 +67,7 @@ _MEANT = {
     **dict.fromkeys(("gui", "demo", "app", "start"), "live --mock"),
 }
 
-#: Options of other programs → the same here.
+#: Options of other programs → what to do here.
 _MEANT_OPTIONS = dict.fromkeys(
     ("--format", "--pdf", "--html", "--xlsx"), "The ending of a file's name chooses the format: -o report.pdf"
 )

@@ -11,7 +11,7 @@ def plan():
     return Plan(preset("undriven"), axes, ("survived", "lifetime_s"), duration_s=0.2)
 
 
-def made_up(task):
+def cheap_values(task):
     """Values that differ at every point."""
     spin, mass = np.broadcast_arrays(task.values["start.spin_hz"], task.values["top.mass_kg"])
     return {"survived": spin > 20, "lifetime_s": spin + mass}

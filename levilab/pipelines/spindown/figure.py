@@ -45,7 +45,7 @@ _SEEN, _MOST_NAMED = 1 / 120, 6
 #: Of the residuals: the common scale shows at least so many units, a law whose residuals reach this much further than
 #: it does has a scale of its own; a scale is so many times as long as the residuals reach, for the markers.
 _LEAST_SCALE, _BEYOND, _ROOM = 3.2, 1.1, 1.12
-#: Places [inch]: left edge and width of the panels; height of the figure, and of the short one.
+#: Places [inch]: left edge and width of the panels; height of the figure, and of the short one; top of the lines.
 _LEFT, _FULL, _HEIGHT, _SHORT_HEIGHT, _LINES_TOP = 0.66, 6.26, 9.15, 4.1, 7.2
 
 

@@ -235,8 +235,7 @@ _WITH_TENTHS = 100.0
 
 def spindown_tables(analysis: SpinDownAnalysis) -> tuple[Table, ...]:
     """Return the runs, the laws, how well they fit, the straight lines.  Each fits a terminal of 80 columns."""
-    quality = quality_table(analysis, QUALITY)
-    quality = replace(quality, title=Sentences("How well they fit.", _QUALITY_SYMBOLS))
+    quality = replace(quality_table(analysis, QUALITY), title=Sentences("How well they fit.", _QUALITY_SYMBOLS))
     count = count_table(analysis, symbols=True)
     best, *lines = _of_laws(analysis)
     title = Text("Run by run: the fit of the {law} law, and unweighted straight lines", law=analysis.combined.best)

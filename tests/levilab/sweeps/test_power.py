@@ -10,12 +10,12 @@ from levilab.laboratory.disk import Node, SimulatedComputer
 from levilab.laboratory.fate import Event, Fate, Killed
 from levilab.sweeps.run import tasks_of
 from levilab.sweeps.store import Store
-from support.maps import expected, made_up, plan
+from support.maps import cheap_values, expected, plan
 
 
 def write_missing(store):
     for task in tasks_of(store):
-        store.write(task.part, made_up(task))
+        store.write(task.part, cheap_values(task))
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from levilab.errors import DataError
 from levilab.files import CannotWrite
 from levilab.sweeps.run import run, tasks_of
 from levilab.sweeps.store import Store
-from support.maps import expected, made_up, plan
+from support.maps import cheap_values, expected, plan
 
 
 def test_a_store_that_is_opened_again_has_the_plan_and_the_values(tmp_path):
@@ -19,7 +19,7 @@ def test_a_store_that_is_opened_again_has_the_plan_and_the_values(tmp_path):
     assert made.plan.chunk_count > 2
     *tasks, last = tasks_of(made)
     for task in tasks:
-        made.write(task.part, made_up(task))
+        made.write(task.part, cheap_values(task))
     again = Store.open(tmp_path / "map.zarr")
     assert again.plan.as_table() == made.plan.as_table()
     assert [chunk.number for chunk in again.missing()] == [last.part.number]
@@ -66,7 +66,7 @@ def test_two_processes_cannot_write_into_one_store(tmp_path):
 def test_a_store_that_is_damaged_is_an_error_that_names_it(tmp_path):
     made = Store.create(tmp_path / "map.zarr", plan())
     task = next(tasks_of(made))
-    made.write(task.part, made_up(task))
+    made.write(task.part, cheap_values(task))
     (file,) = (tmp_path / "map.zarr" / "lifetime_s" / "c").glob("*/*")
     file.write_bytes(b"torn")
     with pytest.raises(DataError, match=r"map\.zarr: a file of lifetime_s is damaged"):
@@ -85,7 +85,7 @@ def test_a_store_that_is_moved_while_it_is_written_is_an_error_that_names_it(tmp
     (tmp_path / "map.zarr").rename(tmp_path / "elsewhere.zarr")
     task = next(tasks_of(made))
     with pytest.raises(CannotWrite, match=r"map\.zarr: it was moved or removed meanwhile"):
-        made.write(task.part, made_up(task))
+        made.write(task.part, cheap_values(task))
 
 
 def test_a_store_whose_marks_are_torn_is_an_error(tmp_path):
