@@ -71,7 +71,7 @@ TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 SLOWEST_SPIN_HZ, FASTEST_SPIN_HZ = 10.0, 100.0
 #: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, seconds that
 #: pass for minutes 5e-5, times in ms 3e-6; a brake of eddy currents lies between.
-FASTEST_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 1e-4
+FASTEST_LOSS_PER_S, USUAL_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 0.003, 1e-4
 #: A record whose spin falls by less than this part is no spin-down: in 6 s, a top that coasts loses twice as much.
 LEAST_FALL = 0.01
 #: Rank correlation with the number of the row above which spins are those of one top, and not limits of several.
@@ -258,6 +258,16 @@ def possible_times(loss: float) -> dict[str, float]:
     return {unit: factor for unit, factor in units.items() if is_possible_loss(loss / factor)}
 
 
+def is_likely_unit(unit: str, loss: float) -> bool:
+    """Return whether a spin is lost more usually in this unit of its times than in the others in which it can be lost.
+
+    >>> is_likely_unit("s", 0.003), is_likely_unit("s", 0.06), is_likely_unit("min", 0.06)
+    (True, False, True)
+    """
+    off = {one: abs(math.log(loss / factor / USUAL_LOSS_PER_S)) for one, factor in possible_times(loss).items()}
+    return unit in off and off[unit] == min(off.values())
+
+
 def trend_of(values: Array) -> float:
     """Return the rank correlation of values, shape (n,), with their order: -1 where each is below the one before."""
     ordered = np.sort(values)
@@ -402,13 +412,13 @@ def _doubt_about_times(plan: "Plan", column: Column, what: str) -> Doubt | None:
     if not spin or spin.is_total or not {*plan.request.quantities} <= {*SPIN}:
         return None
     times, spins = (np.array(_numbers(plan.layout, one.index)) for one in (column, spin))
-    if not len(times) or is_possible_loss(_loss(times, spins, inverse=spin.inverse) / column.factor):
+    if not len(times) or _is_in_unit(column, _loss(times, spins, inverse=spin.inverse)):
         return None
     with suppress(TableError):
         times, spins = read_rows(plan.text, plan.layout, (column, spin), skip_doubtful=True).values
     loss = _loss(times, spins, inverse=spin.inverse)
     units = possible_times(loss)
-    if is_possible_loss(loss / column.factor) or not units:
+    if _is_in_unit(column, loss) or not units:
         return None
     times = times[np.isfinite(times)]
     lasts = float(times[-1] - times[0])
@@ -418,6 +428,11 @@ def _doubt_about_times(plan: "Plan", column: Column, what: str) -> Doubt | None:
     of_run = {"f": str(spin.index + 1)} if column.index in plan.own else {}
     given = {**plan.request.columns, **of_run}
     return _ask(plan.layout, column.index, "t", given, numbers=times, said=(what, answers, (column.unit,)))
+
+
+def _is_in_unit(column: Column, loss: float) -> bool:
+    """Return whether a loss is possible in a stated unit of the times, or more usual in that which is assumed."""
+    return is_possible_loss(loss / column.factor) if column.written else is_likely_unit(column.unit, loss)
 
 
 def _loss(times: Array, spins: Array, *, inverse: bool) -> float:

@@ -356,6 +356,11 @@ def test_times_in_which_no_spin_falls_are_asked_about(rows, unit, columns, write
     assert (run.problem, len(run.doubts)) == ("", 1)
 
 
+def test_times_of_a_long_run_in_minutes_do_not_pass_for_seconds(write):
+    (run,) = understand(write("t,f\n" + "".join(f"{k},{40 - 1.8 * k}\n" for k in range(11)), "mine.csv")).runs
+    assert "in which the spin falls by 45 % in 10 s: s (10 s) or min (10 min)?" in run.problem
+
+
 @pytest.mark.parametrize("rows", [
     "t,f\n0,22.1\n600,21.7\n1200,22\n1800,21.8\n",  # limits of a top, one every ten minutes
     "t,f\n" + "".join(f"{k},{40 - max(0, k - 150) / 10}\n" for k in range(300)),  # after a drive has held it
