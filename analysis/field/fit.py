@@ -49,6 +49,9 @@ _TOO_GOOD = 1e-4
 #: A scan that leaves more than this share of the calliper's u has learned nothing; scan and calliper may differ by so
 #: many u.
 LEARNS_NOTHING, APART = 0.9, 3.0
+#: Residuals whose rms is above this part of the largest reading are those of another field: heights that are set to
+#: 1 mm leave 0.02.
+_MOST_LEFT = 0.05
 #: Where no prior says how thick the ring is, the search begins at this part of its inner radius.
 _START_THICKNESS = 0.3
 
@@ -144,6 +147,11 @@ class FieldScan:
     flux_density: Array
     u: Array
     remarks: tuple[Remark, ...] = ()
+
+    @property
+    def is_of_a_ring(self) -> bool:
+        """Whether a ring's field describes the readings, and its strength is significant; else no masses follow."""
+        return not any(remark.kind in {"no ring", "no strength"} for remark in self.remarks)
 
     @cached_property
     def values(self) -> Array:
@@ -427,7 +435,8 @@ def _describe_scan(problem: _Problem, values: Array, sigma: Array) -> FieldScan:
     }
     scan = FieldScan(parameters, covariance, free, known, statistics, problem.z, problem.b, sigma)
     leverage = found.leverage[: len(problem.z)]
-    return replace(scan, remarks=(*misfit, *_doubts(scan), *_outliers(scan, leverage)))
+    explained = statistics.chi_square is not None and factor == 1.0
+    return replace(scan, remarks=(*misfit, *_doubts(scan, explained=explained), *_outliers(scan, leverage)))
 
 
 def _statistics(problem: _Problem, values: Array, sigma: Array) -> Statistics:
@@ -451,7 +460,8 @@ def _misfit(statistics: Statistics) -> tuple[float, list[Remark]]:
 
     reduced = statistics.reduced_chi_square
     if reduced is None or statistics.chi_square is None:
-        return 1.0, []
+        p = statistics.runs_test_p
+        return 1.0, [Remark("scan bends", values=(p,))] if p is not None and p < NO_FIT else []
     if float(chdtrc(statistics.degrees_of_freedom, statistics.chi_square)) < NO_FIT:
         return reduced, [Remark("scan scatters", values=(reduced,))]
     if float(chdtr(statistics.degrees_of_freedom, statistics.chi_square)) < _TOO_GOOD:
@@ -534,13 +544,21 @@ def parts_of(scan: FieldScan, height_u: ArrayLike | float) -> dict[str, tuple[UP
     }
 
 
-def _doubts(scan: FieldScan) -> list[Remark]:
-    """Return remarks: scan and calliper contradict each other, or the strength is not significant."""
+def _doubts(scan: FieldScan, *, explained: bool) -> list[Remark]:
+    """Return remarks: scan and calliper contradict each other, no ring has the field, or it is not significant.
+
+    Args:
+        scan: the fit.
+        explained: whether the stated uncertainties explain its residuals.
+    """
     said = []
     for name in scan.fitted:
         prior, found = scan.known.prior(name), scan.parameters[name].value
         if prior is not None and found is not None and abs(found - prior.value) > APART * prior.u:
             said.append(Remark("contradicts", name=name, values=(found, prior.value, prior.u)))
+    left, largest = scan.statistics.rms_residual, float(np.abs(scan.flux_density).max())
+    if left > _MOST_LEFT * largest and not explained:
+        said.append(Remark("no ring", values=(left, largest)))
     strength = scan.parameters["strength"]
     if strength.value is not None and strength.u is not None and abs(strength.value) < 3 * strength.u:
         said.append(Remark("no strength"))

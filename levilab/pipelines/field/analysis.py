@@ -22,7 +22,7 @@ class FieldRun:
     Attributes:
         scan: its fit.
         top: of which top what follows is.
-        floating: what follows, None where no top floats.
+        floating: what follows, None where no top floats, or the scan shows no ring.
         text: what it says, in a few sentences.
         warnings: what else to know before using the numbers.
     """
@@ -87,8 +87,8 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
         0.0 if readings.height_u is None else readings.height_u,
         free_radii=options.free_radii,
     )
-    floating = follow(scan, top)
-    if floating is None:
+    floating = follow(scan, top) if scan.is_of_a_ring else None
+    if floating is None and scan.is_of_a_ring:
         warnings = ["no top of this kind floats above this base at any mass and spin: are radii and inertias right?"]
     if readings.u is None:
         warnings.append("no uncertainty of the readings is given: their scatter about the fit stands for it")

@@ -46,7 +46,7 @@ def field_figure(analysis: FieldAnalysis) -> Figure:
         if run.floating is None:
             for axes in (left, right):
                 axes.set_axis_off()
-            left.text(0.0, 0.5, "no top floats above this base", fontsize=9)
+            left.text(0.0, 1.0, "no masses and no spins follow from this scan", fontsize=9)
         else:
             _draw_masses(left, run)
             _draw_spins(right, run)

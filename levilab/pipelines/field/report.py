@@ -83,7 +83,7 @@ def follows_table(values: Mapping[str, Estimate]) -> Table:
     """Return what follows for the tops that float there."""
     names = [name for name in OF_TOPS if name in values]
     rows = [(QUANTITIES[name].shown_symbol, with_uncertainty(QUANTITIES[name].show(values[name]))) for name in names]
-    return table("What follows for a top", ("", ""), rows or [("no top floats above this base", "")])
+    return table("What follows for a top", ("", ""), rows or [("no masses and no spins follow from this scan", "")])
 
 
 def by_run_table(analysis: FieldAnalysis) -> Table:

@@ -48,7 +48,7 @@ FIELD_ROW = (
     *columns_of(QUANTITIES.values()),
     statistic("reduced_chi_square", "1", "χ² per degree of freedom"),
     statistic("rms_residual", "T", "root mean square of the residuals"),
-    Column("floats", "truth", "whether any top floats above the ring",
+    Column("floats", "truth", "whether a top floats above the ring, by this scan",
            lambda part: part["result"]["floating"] is not None),
     entry("text", "text", "what the scan says", "result.text"),
 )  # fmt: skip
@@ -83,6 +83,8 @@ def scans_as_text(means: Mapping[str, Estimate], runs: int, scatter: float) -> s
 
 def scan_as_text(scan: FieldScan, floating: Floating | None) -> str:
     """Return what a scan says, in a few sentences."""
+    if not scan.is_of_a_ring:
+        return "This scan does not show the field of a ring magnet: no masses and no spins follow from it."
     base = Text(
         "The base has the strength ρ = {strength:n}, its middle at {origin:n}; its field points {pole} above it.",
         _format("strength", scan.parameters["strength"]), _format("origin", scan.parameters["origin"]), _pole(scan),
@@ -185,6 +187,20 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Weighed] = MappingProxyType(
             "advice",
         ),
         "contradicts": _contradicts,
+        "scan bends": lambda p: Text(
+            "the residuals keep their sign over many heights (order p = {p:n}): uncertainties that follow from the "
+            "scatter are too small; is the probe on the axis, and are the radii right?",
+            p=digits(p, 1),
+        ),
+        "no ring": Weighed(
+            lambda left, largest: Text(
+                "the residuals are {left:n} mT (rms) where the field is {largest:n} mT at most: no ring magnet has "
+                "such a field; are heights, unit and radii right, and is nothing magnetic beside the base?",
+                left=digits(1e3 * left),
+                largest=digits(1e3 * largest),
+            ),
+            "doubt",
+        ),
         "no strength": Weighed(
             "the strength is not significantly different from zero: was the probe near the base?", "doubt"
         ),

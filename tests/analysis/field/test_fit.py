@@ -160,3 +160,20 @@ def test_a_strength_within_three_of_its_uncertainties_is_doubted(strength, doubt
     rough = 1e-4  # of a reading [T]: as noise of this size alone may make
     found = fit_scan(Z, scan(1, replace(TRUTH, strength=strength), u_b=rough), KNOWN, rough, U_Z)
     assert any(of.kind == "no strength" for of in found.remarks) is doubted
+    assert found.is_of_a_ring is not doubted
+
+
+@pytest.mark.parametrize(("u", "kinds"), [(None, {"no ring"}), (1e-5, {"scan scatters", "contradicts", "no ring"})])
+def test_a_field_that_no_ring_has_is_none_of_a_base(u, kinds):
+    z = np.arange(0.005, 0.12, 0.005)
+    bump = 4e-3 * np.exp(-(((z - 0.05) / 0.02) ** 2)) + 1e-5 * np.random.default_rng(3).normal(size=len(z))
+    found = fit_scan(z, bump, KNOWN, u)
+    assert not found.is_of_a_ring
+    assert {of.kind for of in found.remarks} >= kinds
+
+
+def test_residuals_that_keep_their_sign_are_named_where_no_u_tells_them():
+    z = np.linspace(0.03, 0.12, 60)
+    bent = on_axis(TRUTH, z)[0] + 1e-4 * np.sin(z / 0.01)
+    assert {of.kind for of in fit_scan(z, bent, KNOWN).remarks} == {"scan bends"}
+    assert fit_scan(z, on_axis(TRUTH, z)[0] + 1e-4 * np.random.default_rng(2).normal(size=60), KNOWN).remarks == ()

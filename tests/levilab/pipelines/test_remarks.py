@@ -48,6 +48,8 @@ OF_FIELD = {
     of(
         "contradicts", 0.0021, 0.0, 5e-4, name="inner_radius"
     ): "the scan wants inner radius = 2.1 mm, which lies 4.2 u from the stated 0 mm (u = 0.5 mm)",
+    of("scan bends", 1e-4): "the residuals keep their sign over many heights (order p = 0.0001): uncertainties",
+    of("no ring", 4e-4, 4e-3): "the residuals are 0.4 mT (rms) where the field is 4 mT at most: no ring magnet",
     of("no strength"): "the strength is not significantly different from zero",
     of("stray reading", 0.075, 6.0): "the reading at 75 mm lies 6.0 u off the others",
     of("another zero", 0.06, 0.07, 0.075): "said to float at 60 mm, by this scan tops float from 70 to 75 mm",

@@ -114,6 +114,18 @@ def test_the_windows_of_spin_are_drawn_from_the_lightest_top_to_the_heaviest(sam
         assert [drawn[0], drawn[-1]] == pytest.approx(ends, abs=1e-3)
 
 
+def test_no_masses_follow_from_a_field_that_no_ring_has(tmp_path):
+    bump = 4 * np.exp(-(((HEIGHTS_MM - 50) / 20) ** 2)) + 1
+    file = csv(tmp_path / "bump.csv", "z [mm],B [mT]", HEIGHTS_MM, bump)
+    found = FIELD.analyze([file], FieldOptions(device=CALLIPER))
+    assert found.text.startswith("This scan does not show the field of a ring magnet")
+    assert "mass_to_set" not in found.values
+    assert any("no ring magnet has such a field" in text for text in found.all_warnings)
+    assert not any("no top of this kind" in text for text in found.all_warnings)
+    assert faults(field_figure(found)) == []
+    assert "no masses and no spins follow from this scan" in render([(ANALYSES["field"], found)])
+
+
 # --- users' files ---
 
 
