@@ -35,7 +35,7 @@ from levilab.pipelines.row import Column, Quantity, columns_of, entry
 from levilab.pipelines.sources import Source
 from levilab.pipelines.spin.magnetometer import FieldRecord, findings_of, spin_of_line, track_middle
 from levilab.pipelines.spin.readings import Records, track_of_record
-from levilab.pipelines.spin.words import finding_text
+from levilab.pipelines.spin.words import NEAR_UNUSED, finding_text
 from levilab.present.numbers import with_decimals, with_uncertainty
 from levilab.texts.note import Note, kind_of
 from levilab.texts.text import Sentences, Text
@@ -233,6 +233,8 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
         method = self.options.method
         if method != "auto" and all(source.readings.pulses for source in self.sources):
             yield Text("the method {method} was chosen, but a list of pulse times leaves no choice", method=method)
+        if self.options.near is not None and not any(source.readings.field for source in self.sources):
+            yield Note("near", NEAR_UNUSED, weight="advice")
         if self.options.distance_m is not None and not any(run.transverse for run in self.runs):
             yield "a distance was given, but no record of a magnetometer has three axes: no tilt follows"
 

@@ -8,6 +8,9 @@ from analysis.pulses import Finding
 from levilab.present.numbers import enumeration, filled
 from levilab.texts.text import Text, how_many
 
+#: About the option `near` where it has no effect.
+NEAR_UNUSED = "`near` is not used: only a magnetometer's samples and a film's pictures leave a choice of spins"
+
 
 def finding_text(found: Finding, part: str = "window") -> str:
     """Return the sentence of a finding.  part: "window" or "record", several of which were searched.

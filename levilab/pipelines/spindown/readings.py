@@ -37,7 +37,7 @@ from levilab.pipelines.options import InputOptions
 from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, findings_of, read_field_record
 from levilab.pipelines.spin.readings import track_of_record
-from levilab.pipelines.spin.words import finding_text
+from levilab.pipelines.spin.words import NEAR_UNUSED, finding_text
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run
 from levilab.texts.note import Note, of_file
@@ -100,6 +100,8 @@ def read_spin_file(path: "Path", options: "InputOptions") -> SpinReadings:
         with suppress(DataError):
             return _read_pulses_or_table(path, options)
     readings = field_readings(path, field, options) if field else _read_pulses_or_table(path, options)
+    if options.near is not None and not field:
+        readings = replace(readings, warnings=(*readings.warnings, Note("near", NEAR_UNUSED, weight="advice")))
     return _between(readings, options, path)
 
 

@@ -16,6 +16,7 @@ from levilab.pipelines.sources import Source
 from levilab.pipelines.sway.device import known_of
 from levilab.pipelines.sway.readings import SwayReadings
 from levilab.present.numbers import with_uncertainty
+from levilab.texts.note import Note
 from levilab.texts.text import Sentences, Text
 
 #: Of `analysis.sway.Geometry`.
@@ -91,12 +92,20 @@ class SwayAnalysis(EachAlone[SwayReadings, SwayRun, SwayOptions]):
         """What the data say, of a single track as a text for each language."""
         return _in_words(self.runs[0].geometry) if len(self.runs) == 1 else super().text
 
+    def about_all(self) -> Iterable[str]:
+        """Yield that a stated spin is not used where all tracks have their own."""
+        if self.options.spin_hz is not None and all(source.readings.spin is not None for source in self.sources):
+            yield Note("own spin", "`spin` is not used: the tracks have spins of their own", weight="advice")
+
 
 def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRun:
     """Find the swings of one input, and what they say.  Raises AnalysisError, DataError."""
     readings = source.readings
-    spin = np.full(len(readings), options.spin_hz) if options.spin_hz is not None else readings.spin
-    if spin is None:
+    if readings.spin is not None:
+        spin = readings.spin
+    elif options.spin_hz is not None:
+        spin = np.full(len(readings), options.spin_hz)
+    else:
         raise DataError(
             Text(
                 "{path:s}: the spin is not known: a column spin_frequency_hz, or the option `spin` where it is nearly "

@@ -31,6 +31,7 @@ from levilab.texts.text import in_language
 from support.detector import C32, RELEASE_HZ, coasting_turns, coasting_wav, pulses, write_wav
 from support.figures import faults
 from support.paths import ROOT, SAMPLE_DATA
+from support.spin_downs import spin_down_csv
 
 
 def true_frequency(name, time):
@@ -379,3 +380,10 @@ def test_the_time_that_is_said_moves_the_spin_by_less_than_its_u(tmp_path):
     assert abs((float(said) - spin.reference_time) * spin.chirp.value) < spin.frequency.u / 2
     assert len(said) < 14
     assert said in frequency_table(found).rows[0].cells
+
+
+def test_a_spin_nearby_is_of_no_use_for_pulses_and_tables(tmp_path):
+    wav = coasting_wav(tmp_path / "tape.wav", seconds=3)
+    for name, path in (("spin", wav), ("spindown", spin_down_csv(tmp_path / "mine.csv"))):
+        row = ANALYSES[name]
+        assert words.NEAR_UNUSED in row.analyze([path], row.options_from({"near": 20.0})).all_warnings

@@ -90,6 +90,14 @@ def test_without_a_spin_nothing_is_said_and_an_option_gives_it(found, tmp_path):
     assert abs(geometry.measured.value - TRUE_HZ) < 3 * geometry.measured.u
 
 
+def test_a_track_with_spins_does_not_take_that_of_the_option(window, tmp_path):
+    rows, own = window
+    path = write(tmp_path / "own.csv", tuple(rows[0]), [tuple(row.values()) for row in rows])
+    stated = analyze(path, device=DEVICE, spin_hz=30.0)
+    assert stated.runs[0].geometry.measured == own.geometry.measured
+    assert "`spin` is not used: the tracks have spins of their own" in stated.all_warnings
+
+
 def test_a_phone_above_the_top_shows_the_split_and_the_spin_of_the_film(found):
     with pytest.raises(DoesNotSuit, match="the option `sensor`"):
         analyze(PHONE, device=DEVICE)
