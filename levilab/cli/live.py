@@ -8,7 +8,7 @@ import typer
 
 from levilab.cli import exit_codes
 from levilab.cli.importing import importing
-from levilab.cli.options import Language, argument, flag, option, place
+from levilab.cli.options import PageLanguage, argument, flag, option, place
 from levilab.cli.output import message, result
 from levilab.errors import UsageError
 
@@ -25,7 +25,7 @@ def live(
     share: Annotated[
         bool, flag("Let phones in the same network look on, by a second address with a QR code.", "--share")
     ] = False,
-    language: Language = "en",
+    language: PageLanguage = "",
     no_open: Annotated[bool, flag("Open no browser: print the address only.", "--no-open", "--no-browser")] = False,
 ) -> None:
     """Serve the view until Ctrl-C."""

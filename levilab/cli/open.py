@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 from levilab.cli.analyze import takes_options, write_and_print
-from levilab.cli.options import Json, Language, argument, existing_paths, flag, place
+from levilab.cli.options import Json, PageLanguage, argument, existing_paths, flag, place
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.errors import NoneUsable, UsageError, as_typed
 from levilab.pipelines.options import OF_FILES, read_options
@@ -40,7 +40,7 @@ def open_files(
             show_default="a browser where there is one, but not with --keep, -o or --json",
         ),
     ] = None,
-    language: Language = "en",
+    language: PageLanguage = "",
     as_json: Json = False,
     **given: Any,
 ) -> None:

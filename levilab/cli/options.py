@@ -160,7 +160,12 @@ def speak_from(args: Sequence[str]) -> None:
 
 
 def _speak(context: typer.Context, language: str) -> str:
-    """Speak a language before the other options are read, which may be refused.  Raises UsageError."""
+    """Speak a language before the other options are read, which may be refused.  Raises UsageError.
+
+    Empty where it is left to the browser, while the terminal speaks English.
+    """
+    if not language:
+        return language
     source = context.get_parameter_source("language")
     check_language(language, "LEVILAB_LANGUAGE" if source and source.name == "ENVIRONMENT" else "language")
     speak(language)
@@ -168,13 +173,12 @@ def _speak(context: typer.Context, language: str) -> str:
 
 
 #: Not the machine's own: a script that reads messages finds the same on each.
-Language = Annotated[
-    str,
-    typer.Option(
-        "--language", metavar="CODE", envvar="LEVILAB_LANGUAGE", help="Of what people read: en or de.",
-        is_eager=True, callback=_speak,
-    ),
-]  # fmt: skip
+_LANGUAGE: dict[str, Any] = {
+    "metavar": "CODE", "envvar": "LEVILAB_LANGUAGE", "help": "Of what people read: en or de.", "is_eager": True,
+    "callback": _speak,
+}  # fmt: skip
+Language = Annotated[str, typer.Option("--language", **_LANGUAGE)]
+PageLanguage = Annotated[str, typer.Option("--language", show_default="the browser's; in the terminal en", **_LANGUAGE)]
 #: The heading of a report: name → metavar and help.
 _HEADING = {
     "title": ("TEXT", "In place of the report's own title."),

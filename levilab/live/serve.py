@@ -49,7 +49,7 @@ class LiveOptions:
         port: of the loopback address; 0: any that is free.
         seed: of the top on the bench for practice; of the first group, where groups have numbers.
         share: whether phones in the network may look, too.
-        language: of pages at which none was chosen.
+        language: of pages at which none was chosen; empty: of the browser.
         files: data files to open, with the options by which they are read; None: the view is of runs.
     """
 
@@ -59,7 +59,7 @@ class LiveOptions:
     port: int = 8765
     seed: int = 0
     share: bool = False
-    language: str = ENGLISH
+    language: str = ""
     files: tuple[tuple[Path, Mapping[str, Any]], ...] | None = None
 
 
@@ -113,7 +113,7 @@ def serve_live(
         CannotShow: the port is taken.
         NoNetwork: the view is to be shared, and this machine is in no network.
     """
-    check_language(options.language)
+    check_language(options.language or ENGLISH)
     root, shown = _where(options)
     with contextlib.ExitStack() as at_end:
         hosts = [HOST, address_in_network()] if options.share else [HOST]

@@ -9,6 +9,7 @@ import contextlib
 import json
 import math
 import os
+import re
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import asdict, dataclass, field
@@ -71,7 +72,7 @@ class Hall:
         doors: who may come in.
         desk: the bench for practice; None where runs are only looked at.
         guests: who may come in from the network; None where the view is not shared.
-        language: of pages at which none was chosen.
+        language: of pages at which none was chosen; empty: of the browser.
         opened: data files that were opened, and the folder for dropped ones, beside that with the runs.
     """
 
@@ -80,7 +81,7 @@ class Hall:
     doors: Doors
     desk: Desk | None = None
     guests: Doors | None = None
-    language: str = ENGLISH
+    language: str = ""
     watches: dict[str, Watch] = field(default_factory=dict)
     pages: dict[str, int] = field(default_factory=dict)  # name of a run → how many look at it
     new: asyncio.Event = field(default_factory=asyncio.Event)
@@ -245,13 +246,11 @@ class Pages:
         return self._page("open.html", request)
 
     def _page(self, name: str, request: Request) -> Response:
-        """Return a page in the language of its address, else as it was chosen last in this browser."""
-        asked = request.query_params.get("language")
-        known = [code for code in (asked, request.cookies.get(_COOKIE)) if code in languages()]
-        code = known[0] if known else self.hall.language
+        """Return a page in its language, which is kept where its address has it."""
+        code = _language(request, self.hall)
         page, result = (self.files[one].read_text("utf-8") for one in (name, "result.html"))
         answer = HTMLResponse(page_in(page.replace("<!--result-->", result), code), headers=self.doors.headers())
-        if code == asked:
+        if code == request.query_params.get("language"):
             answer.set_cookie(_COOKIE, code, _KEPT_S, samesite="strict", httponly=True)
         return answer
 
@@ -413,9 +412,10 @@ def _views(pages: Pages) -> list[BaseRoute]:
 
 
 def _language(request: Request | WebSocket, hall: Hall) -> str:
-    """Return the language of the page that asks."""
-    asked = request.query_params.get("language", "")
-    return asked if asked in languages() else hall.language
+    """Return the language of the page that asks: of its address, else chosen last in this browser, else its own."""
+    of_browser = re.findall(r"(?:^|,)\s*(\w+)", request.headers.get("accept-language", ""))
+    codes = request.query_params.get("language"), request.cookies.get(_COOKIE), hall.language, *of_browser
+    return next((code for code in codes if code in languages()), ENGLISH)
 
 
 def _nothing() -> Response:

@@ -178,10 +178,14 @@ export function drawHistory(paper, {drives, counts, marks, latest, rests}) {
   c.setLineDash([3, 3]);
   line(c, marks.map(([time]) => [toX(time), TOP, toX(time), bottom]));
   c.setLineDash([]);
+  c.lineWidth = 4;
+  c.lineJoin = "round";
+  c.strokeStyle = paint.panel;  // about the letters, where they lie on a line
   for (const [k, [time, text]] of marks.entries()) {
-    const right = toX(time) > width / 2;
+    const right = toX(time) > width / 2, place = [toX(time) + (right ? -5 : 5), TOP + 10 + 14 * (k % 2)];
     c.textAlign = right ? "right" : "left";
-    c.fillText(text, toX(time) + (right ? -5 : 5), TOP + 10 + 14 * (k % 2));
+    c.strokeText(text, ...place);
+    c.fillText(text, ...place);
   }
   c.restore();
 

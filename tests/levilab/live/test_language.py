@@ -127,6 +127,16 @@ def test_a_page_in_german_stays_german_and_nothing_is_cut(viewport, hall, watche
     assert page.evaluate(f"{wide}.map((one) => one.textContent)") == []
 
 
+@pytest.mark.parametrize(("browser", "started_in", "seen"), [
+    ("de-DE,de;q=0.9,en;q=0.8", "", "de"), ("fr,de;q=0.5", "", "de"), ("en-GB,de;q=0.5", "", "en"), ("fr", "", "en"),
+    ("de-DE", "en", "en"), ("en", "de", "de"),
+])  # fmt: skip
+def test_a_page_is_in_the_language_of_the_browser_where_none_was_chosen(hall, browser, started_in, seen):
+    hall.language = started_in
+    page = request(address(hall), "/", headers={"Accept-Language": browser})[1]
+    assert f'<html lang="{seen}"' in page
+
+
 def test_the_server_answers_in_the_language_of_the_page_that_asks(hall):
     said = data_in("de", advice_on({"top": "24.1", "washers": "0.4", "temperature": "20"}))["text"]
     assert said.startswith("Nimm keine Scheiben: Der Kreisel wiegt dann 24,1 g und schwebt mit")
