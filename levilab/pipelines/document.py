@@ -189,6 +189,8 @@ class Analysis(Needs[Any], Generic[A]):
         options: Any,
         one: Callable[[Source[Any]], Done],
         recall: Callable[[Sequence[Any]], Any] | None = None,
+        *,
+        skips: bool = False,
     ) -> A:
         """Return what is found of all inputs, each by itself and together.  Raises DataError.
 
@@ -198,8 +200,9 @@ class Analysis(Needs[Any], Generic[A]):
             options: as they were given.
             one: from one input to what is found of it.
             recall: from what is found of each to what was found of all together; None where it is not known.
+            skips: whether of several inputs one that cannot be used is skipped, also where the analysis skips none.
         """
-        done, warnings = self._each(found.sources, one)
+        done, warnings = self._each(found.sources, one, skips=skips or self.skips)
         sources, runs, origins = (list(column) for column in zip(*done, strict=True))
         used = origins[0].options if all(origin.options == origins[0].options for origin in origins) else options
         for k, (source, run, origin) in enumerate(zip(sources, runs, origins, strict=True)):
@@ -218,9 +221,11 @@ class Analysis(Needs[Any], Generic[A]):
         of_all = (origins[0].budget or ()) if len(origins) == 1 else self.budget_of_all(found_of_all)
         return replace(found_of_all, budget=of_all)
 
-    def _each(self, sources: Sequence[Source[Any]], one: Callable[[Source[Any]], Done]) -> tuple[list[Done], list[str]]:
+    def _each(
+        self, sources: Sequence[Source[Any]], one: Callable[[Source[Any]], Done], *, skips: bool
+    ) -> tuple[list[Done], list[str]]:
         """Return what is found of each input, and warnings about those that are skipped."""
-        if not self.skips or len(sources) == 1:
+        if not skips or len(sources) == 1:
             return [one(source) for source in sources], []
         done: list[Done] = []
         errors: list[DataError] = []
@@ -237,12 +242,13 @@ class Analysis(Needs[Any], Generic[A]):
         """Return what to know of the inputs before using the numbers."""
         synthetic = sum(source.synthetic for source in sources)
         if self.mixed and 0 < synthetic < len(sources):
-            yield f"{synthetic} of {len(sources)} inputs are SYNTHETIC, the others are not known to be: {self.mixed}"
+            said = "{some} of {n} inputs are SYNTHETIC, the others are not known to be: {mixed}"
+            yield Text(said, some=synthetic, n=len(sources), mixed=self.mixed)
         reading_u = getattr(options, "reading_u", None)
         given = [source.name for source in sources if getattr(source.readings, "u", None) is not None]
         if reading_u is not None and given:
-            names = ", ".join(given)
-            yield f"the given u of a reading, {reading_u:g} Hz, takes the place of the uncertainties in {names}"
+            said = "the given u of a reading, {u:g} Hz, replaces the uncertainties in {names:s}"
+            yield Text(said, u=reading_u, names=tuple(given))
         if options.columns and all(source.run for source in sources):
             yield "names of columns were given, but none of the inputs is a data file"
 
@@ -339,8 +345,10 @@ class Analysis(Needs[Any], Generic[A]):
         found = collect(paths, self, self.reading(archive, options))
         return self.recall_found(paths, found, archive, options)
 
-    def recall_found(self, paths: Sequence[Path], found: Found[Any], archive: Archive[Any], options: Any) -> A:
-        """Do the same for inputs that were found already."""
+    def recall_found(
+        self, paths: Sequence[Path], found: Found[Any], archive: Archive[Any], options: Any, *, skips: bool = False
+    ) -> A:
+        """Do the same for inputs that were found already; skips: see `gather`."""
         given = _given_options(options)
         whole = archive.whole(found.sources)
         if whole and not any(self._problem(whole.of(source), given, source) for source in found.sources):
@@ -352,7 +360,7 @@ class Analysis(Needs[Any], Generic[A]):
                 lambda source: self._read_one(source, whole.of(source)),
                 lambda _: self.renumber(whole.result.combined, numbers),
             )
-        return self.gather(paths, found, options, lambda source: self._recall_one(source, archive, given))
+        return self.gather(paths, found, options, lambda source: self._recall_one(source, archive, given), skips=skips)
 
     def _options(self, earlier: Earlier[Any]) -> Any:
         return self.options(**dict(earlier.result.settings))

@@ -6,7 +6,8 @@ folder is for the analyses of the runs and files in it.  A result that was writt
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,8 @@ from levilab.pipelines.sources import (
 )
 from levilab.runs.find import RECORD, find_run, find_runs
 from levilab.runs.run import Run
-from levilab.texts.text import Text, how_many
+from levilab.texts.note import of_file
+from levilab.texts.text import Text, how_many, text_of
 
 Tell = Callable[[str], None]
 
@@ -87,20 +89,46 @@ def analyze_suiting(
 
 
 def recall_suiting(
-    paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None = None
+    paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None = None, *, skips: bool = False
 ) -> list[tuple[Analysis[Any], Any]]:
     """Read the results of the inputs at the paths, of each analysis that has one; in the order of the catalogue.
 
-    An input that has no result is analyzed by those that suit it.  Raises DataError: no analysis suits a path, or
-    damage.
+    An input that has no result is analyzed by those that suit it.  Where results by one analysis share an input, the
+    analysis is returned several times.  Raises DataError: no analysis suits a path, or damage.
 
     Args:
         paths: run folders, data files, folders to search, and results that lie elsewhere: their files, or a folder with
             nothing to analyze in it.
         given: options by their names, of any analysis.
         tell: called with the reason why no analysis can use a file or a run in a folder.
+        skips: whether an input that cannot be used is skipped with a note, as long as there is another one.
     """
+    errors: list[DataError] | None = [] if skips else None
     places, written = _split(paths)
+    shares = _without_shared_inputs(written)
+    names = _names_of_results(shares)
+    done = []
+    for k, results in enumerate(shares):
+        recalled = _recall(places if k == 0 else [], results, given, tell, errors)
+        done += [(analysis, _with_names_of_results(analysis, found, results, names)) for analysis, found in recalled]
+    if errors and not done:
+        raise errors[0]
+    done.sort(key=lambda one: [*catalogue.ANALYSES].index(one[0].name))
+    if errors:
+        first, found = done[0]
+        notes = (of_file("skipped", str(Skipped(text_of(error)))) for error in errors)
+        done[0] = first, replace(found, warnings=(*found.warnings, *notes))
+    return done
+
+
+def _recall(
+    places: Sequence[Path],
+    written: Sequence[Written],
+    given: Mapping[str, Any],
+    tell: Tell | None,
+    errors: list[DataError] | None,
+) -> list[tuple[Analysis[Any], Any]]:
+    """Read or make the results of inputs; errors: where those of inputs that are skipped go, None: none is skipped."""
     own = {name: [one for one in written if one.analysis == name] for name in catalogue.ANALYSES}
     archives: dict[str, Archive[Any]] = {}
 
@@ -119,11 +147,59 @@ def recall_suiting(
 
     results = {name: [path for one in of for path in one.inputs] for name, of in own.items()}
     done = []
-    for one in _suiting(places, options, choose, tell, results):
-        chosen = one.analysis.options_from(given)
-        recalled = one.analysis.recall_found(one.paths, one.found, archives[one.analysis.name], chosen)
-        done.append((one.analysis, recalled))
+    for one in _suiting(places, options, choose, tell, results, skipped=errors):
+        chosen, archive = one.analysis.options_from(given), archives[one.analysis.name]
+        with _skipping(errors):
+            found = one.analysis.recall_found(one.paths, one.found, archive, chosen, skips=errors is not None)
+            done.append((one.analysis, found))
     return done
+
+
+@contextmanager
+def _skipping(errors: list[DataError] | None) -> Iterator[None]:
+    """Keep the error of an input that is skipped; with None no input is."""
+    try:
+        yield
+    except DataError as error:
+        if errors is None:
+            raise
+        errors.append(error)
+
+
+def _without_shared_inputs(written: Sequence[Written]) -> list[list[Written]]:
+    """Return the results in lists, in none of which an analysis has an input twice."""
+    shares: list[list[Written]] = [[]]
+    for one in {one.file.resolve(): one for one in written}.values():
+        free = (share for share in shares if not any(_share_inputs(one, other) for other in share))
+        if (share := next(free, None)) is None:
+            shares.append(share := [])
+        share.append(one)
+    return shares
+
+
+def _share_inputs(one: Written, other: Written) -> bool:
+    inputs = {path.resolve() for path in other.inputs}
+    return one.analysis == other.analysis and not inputs.isdisjoint(path.resolve() for path in one.inputs)
+
+
+def _names_of_results(shares: Sequence[Sequence[Written]]) -> dict[Path, str]:
+    """Return how results of the same inputs are distinguished: by their folders, or else their files."""
+    if len(shares) == 1:
+        return {}
+    files = [one.file for share in shares for one in share]
+    by_folder = len({file.parent for file in files}) == len(files)
+    return {file: str(file.parent if by_folder else file) for file in files}
+
+
+def _with_names_of_results(analysis: Analysis[A], found: A, written: Sequence[Written], names: Mapping[Path, str]) -> A:
+    """Return what was found with the name of its result behind that of each input, where the result has a name."""
+    own = [one for one in written if one.analysis == analysis.name and one.file in names]
+    known = {path.resolve(): names[one.file] for one in own for path in one.inputs}
+    sources = [
+        replace(source, name=f"{source.name} ({known[place]})") if (place := source.path.resolve()) in known else source
+        for source in found.sources
+    ]
+    return replace(found, sources=tuple(sources))
 
 
 def _split(paths: Sequence[Path]) -> tuple[list[Path], list[Written]]:
@@ -163,6 +239,8 @@ def _suiting(
     choose: Callable[[Source[Any], Collection[str]], Collection[str]],
     tell: Tell | None,
     more: Mapping[str, Sequence[Path]] | None = None,
+    *,
+    skipped: list[DataError] | None = None,
 ) -> list[Suiting]:
     """Return the analyses with the inputs that they take.
 
@@ -172,21 +250,25 @@ def _suiting(
         choose: an input, and the analyses that take it → those that get it.
         tell: see `suiting`.
         more: analysis → paths that are for it alone.
+        skipped: where the errors of paths that are skipped go; None: no path is skipped.
     """
     rows = catalogue.ANALYSES
     readers = {name: options(row) for name, row in rows.items()}
     taken: dict[str, list[tuple[Path, Found[Any]]]] = {name: [] for name in rows}
     unusable: list[NoneUsable] = []
     for path in paths:
-        found, errors = _look(path, readers)
-        chosen = _chosen(found, choose)
-        if not chosen:
-            raise _refusal(path, errors)
-        unusable += [error for error in errors.values() if isinstance(error, NoneUsable)]
-        for name, one in chosen.items():
-            taken[name].append((path, one))
+        with _skipping(skipped):
+            found, errors = _look(path, readers)
+            chosen = _chosen(found, choose)
+            if not chosen:
+                raise _refusal(path, errors)
+            unusable += [error for error in errors.values() if isinstance(error, NoneUsable)]
+            for name, one in chosen.items():
+                taken[name].append((path, one))
     for name, inputs in (more or {}).items():
-        taken[name] += [(path, find(path, rows[name], readers[name])) for path in inputs]
+        for path in inputs:
+            with _skipping(skipped):
+                taken[name].append((path, find(path, rows[name], readers[name])))
     done = [
         Suiting(rows[name], tuple(path for path, _ in those), join([one for _, one in those]))
         for name, those in taken.items()

@@ -61,14 +61,15 @@ def document_of(results: Results, others: Sequence[Section] = (), asked: Asked |
     blocks: list[Block] = []
     for (analysis, found), part in zip(results, parts, strict=True):
         own = blocks_of_part(analysis, found, part, asked, deeper=not alone)
-        blocks += own if alone else [_of_one_analysis(found, part, own, first=not blocks)]
+        again = sum(other is analysis for other, _ in results) > 1
+        blocks += own if alone else [_of_one_analysis(found, part, own, first=not blocks, again=again)]
     blocks += others
     if results and not asked.short:
         blocks.append(_measurements(results, parts))
     if results:
         blocks.append(reproduction(results, asked))
     counts = count_inputs(sources)
-    first, *more = [*(part.subject for part in parts), *(one.title for one in others)]
+    first, *more = dict.fromkeys([*(part.subject for part in parts), *(one.title for one in others)])
     capital = first[:1].upper() + first[1:] if parts else first
     return Document(
         title=parts[0].heading if alone else _title(counts, others),
@@ -178,7 +179,7 @@ def picture_of(analysis: Analysis[A], found: A, part: ReportPart, *, short: bool
         name=analysis.name,
         title=words.title,
         caption=words.caption,
-        alt=words.title.rstrip("."),
+        alt=words.title,
         draw=partial(analysis.figure, found, short=words is part.short_figure),
         points=() if many else words.points,
         raster=many,
@@ -187,13 +188,14 @@ def picture_of(analysis: Analysis[A], found: A, part: ReportPart, *, short: bool
 
 
 def _of_one_analysis(
-    found: Analyzed[Any, Any, Any, Any], part: ReportPart, blocks: Iterable[Block], *, first: bool
+    found: Analyzed[Any, Any, Any, Any], part: ReportPart, blocks: Iterable[Block], *, first: bool, again: bool
 ) -> Section:
-    """Return one of several analyses, below a heading of its own."""
+    """Return one of several analyses below a heading of its own; again: there is another result of this analysis."""
+    names = list_in_words([source.name for source in found.sources])
     mixed = _mixes(found)
     mark = banner_of(found.sources, mixed=True) if mixed else None
     return Section(
-        part.heading,
+        Text("{heading}: {names}", heading=part.heading, names=names) if again else part.heading,
         (*([mark] if mark else []), *blocks),
         anchor=part.subject,
         lead=_lead(found, part),

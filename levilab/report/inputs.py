@@ -89,7 +89,7 @@ def describe(parts: Sequence[About]) -> Input:
     source = parts[0].source
     own = (_fold_listing(block) for one in parts for block in one.part.blocks)
     return Input(
-        name=source.name,
+        name=source.name if len({one.source.name for one in parts}) == 1 else source.path.name,
         facts=tuple(fact for fact in _facts(source, parts) if any(fact.texts)),
         blocks=(*_changes(source), *_events(source), *with_marks(own, mark_of([source]))),
     )

@@ -152,7 +152,7 @@ def _results(
 ) -> Results:
     """Return what was found of the measurements at the paths; none where there are none and none are needed."""
     try:
-        return recall_suiting(paths, given, tell) if paths or needed else []
+        return recall_suiting(paths, given, tell, skips=True) if paths or needed else []
     except (DoesNotSuit, NoneUsable):
         if needed:
             raise

@@ -23,15 +23,18 @@ class FieldRun:
         scan: its fit.
         top: of which top what follows is.
         floating: what follows, None where no top floats, or the scan shows no ring.
-        text: what it says, in a few sentences.
         warnings: what else to know before using the numbers.
     """
 
     scan: FieldScan
     top: KnownTop
     floating: Floating | None
-    text: str
     warnings: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """What the scan says, in a few sentences."""
+        return scan_as_text(self.scan, self.floating)
 
     @property
     def values(self) -> dict[str, Estimate]:
@@ -64,7 +67,7 @@ class FieldAnalysis(Analyzed[FieldReadings, FieldRun, None, FieldOptions]):
     def text(self) -> str:
         """What the data say, in a few sentences."""
         if len(self.runs) == 1:
-            return scan_as_text(self.runs[0].scan, self.runs[0].floating)
+            return self.runs[0].text
         found = means([run.values for run in self.runs])
         return scans_as_text(found, len(self.runs), found["strength"].scatter)
 
@@ -94,7 +97,7 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
         warnings.append("no uncertainty of the readings is given: their scatter about the fit stands for it")
     if readings.height_u is None:
         warnings.append("no uncertainty of the heights is given: they are taken as exact")
-    return FieldRun(scan, top, floating, scan_as_text(scan, floating), tuple(warnings))
+    return FieldRun(scan, top, floating, tuple(warnings))
 
 
 def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:

@@ -147,7 +147,7 @@ def _value(estimate: Estimate) -> dict[str, Any]:
 
 
 def _run_entries(run: FieldRun) -> dict[str, Any]:
-    return {"values": values_of(run.values), "models": [_model(run)]}
+    return {"values": values_of(run.values), "models": [_model(run)], "text": run.text}
 
 
 def _model(run: FieldRun) -> dict[str, Any]:

@@ -50,7 +50,7 @@ FIELD_ROW = (
     statistic("rms_residual", "T", "root mean square of the residuals"),
     Column("floats", "truth", "whether a top floats above the ring, by this scan",
            lambda part: part["result"]["floating"] is not None),
-    entry("text", "text", "what the scan says", "result.text"),
+    entry("text", "text", "what the scan says"),
 )  # fmt: skip
 
 

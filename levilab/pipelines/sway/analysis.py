@@ -42,7 +42,7 @@ SWAY_ROW = (
     *columns_of(QUANTITIES),
     statistic("reduced_chi_square", "1", "χ² per degree of freedom of the windows"),
     entry("mirrored", "truth", "whether the view was mirrored", "result.mirrored"),
-    entry("text", "text", "what the swings say", "result.text"),
+    entry("text", "text", "what the swings say"),
 )
 
 #: A split of fewer standard uncertainties excludes nothing; a ratio that is more of them from 1 disagrees.
@@ -62,7 +62,6 @@ class SwayRun:
         spin: in the middle of each, shape (n,) [Hz].
         geometry: what they say.
         mirrored: whether the view was mirrored; None where no precession is seen to tell it.
-        text: in a few sentences.
         unknown: what is not known of top and base, and taken from the thesis.
     """
 
@@ -70,8 +69,12 @@ class SwayRun:
     spin: NDArray[np.float64]
     geometry: Geometry
     mirrored: bool | None
-    text: str
     unknown: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        """What the swings say, in a few sentences."""
+        return _in_words(self.geometry)
 
     @property
     def warnings(self) -> tuple[Text, ...]:
@@ -86,11 +89,6 @@ class SwayRun:
 
 class SwayAnalysis(EachAlone[SwayReadings, SwayRun, SwayOptions]):
     """Tracks, each by itself: another mass or another height has another split."""
-
-    @property
-    def text(self) -> str:
-        """What the data say, of a single track as a text for each language."""
-        return _in_words(self.runs[0].geometry) if len(self.runs) == 1 else super().text
 
     def about_all(self) -> Iterable[str]:
         """Yield that a stated spin is not used where all tracks have their own."""
@@ -128,7 +126,7 @@ def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRu
     at = np.interp([one.time for one in swings], readings.time, np.abs(spin))
     swings = choose_lines(swings, at, known)
     geometry = geometric_magnetism(swings, at, known)
-    return SwayRun(tuple(swings), at, geometry, False if beside else view, _in_words(geometry), unknown)
+    return SwayRun(tuple(swings), at, geometry, False if beside else view, unknown)
 
 
 def _in_words(found: Geometry) -> str:

@@ -61,7 +61,7 @@ def _run_entries(run: SwayRun) -> dict[str, Any]:
         "covariance": [[(found.measured.u or 0.0) ** 2]],
         "statistics": {"n": freedom + 1, "reduced_chi_square": found.chi_square / freedom if freedom else None},
     }
-    return {"values": values, "models": [model]}
+    return {"values": values, "models": [model], "text": run.text}
 
 
 SWAY = Analysis(

@@ -44,11 +44,12 @@ from levilab.report.beside import (
     statistics_of_agreement,
     verdict,
 )
-from levilab.report.document import banner_of, count_inputs
+from levilab.report.document import Results, banner_of, count_inputs
 from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, write_content, writing_report
 from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
+from levilab.texts.note import of_file
 from levilab.texts.text import Sentences, Text, in_language, spoken
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from analysis.uncertainty import Estimate
+    from levilab.pipelines.document import Analysis
     from levilab.present.style import Figure
 
 
@@ -75,8 +77,7 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str) -
     sources = list({source.path.resolve(): source for of in classes for source in of.found.sources}.values())
     classes = sorted(classes, key=lambda of: -len(of.groups))  # what one group alone measured comes last
     alone = len(classes) == 1
-    found = [*(text for of in classes for text in of.found.warnings), *_unread(classes)]
-    warnings = dict.fromkeys(unquote(in_language(text)).replace("`", "") for text in found)
+    warnings = dict.fromkeys(unquote(in_language(text)).replace("`", "") for text in _left_out(classes))
     of_all = [Warnings(tuple((text,) for text in warnings))] if warnings else []
     chapters: list[Block] = []
     for k, of in enumerate(classes):
@@ -91,17 +92,32 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str) -
     )
 
 
-def _unread(classes: Sequence[Class]) -> list[str]:
-    """Return the tables of which no analysis could make a result; other files are no matter of a class."""
+def _left_out(classes: Sequence[Class]) -> list[str]:
+    """Return warnings about all inputs, and the tables of which no analysis made a result."""
     said = (
         "{file}: a table whose columns are not certain, which no search reads: name the file itself, or keep its "
         "columns with `levilab open`"
     )
-    return [
-        Text(said, file=one.path)
+    warnings = [text for of in classes for text in of.found.warnings]
+    unread = (
+        str(one.path)
         for one in remarks([of.found.remarks for of in classes])
         if isinstance(one, LeftOut) and one.kind == OTHER_COLUMNS
-    ]
+    )
+    return [*warnings, *(Text(said, file=file) for file in unread if not any(file in text for text in warnings))]
+
+
+def _each_reading_once(results: Results) -> Results:
+    """Return the first result of the same readings, with a note of the others: a mean would count them twice."""
+    first: dict[str, tuple[Analysis[Any], Any]] = {}
+    said = "{names:s}: not counted, as {first:s} is a result of the same readings; levilab report shows all"
+    for analysis, found in results:
+        _, counted = first.setdefault(analysis.name, (analysis, found))
+        if found is not counted:
+            names, first_names = (tuple(source.name for source in one.sources) for one in (found, counted))
+            note = of_file("repeated", Text(said, names=names, first=first_names))
+            first[analysis.name] = analysis, replace(counted, warnings=(*counted.warnings, note))
+    return [*first.values()]
 
 
 def _subject(of: Class) -> str:
@@ -267,7 +283,7 @@ def write_class(
         form.check()
     with writing_report(output):
         check_writable(output)
-    results = recall_suiting(paths, given or {}, tell)
+    results = _each_reading_once(recall_suiting(paths, given or {}, tell, skips=True))
     classes = [class_of(analysis, found) for analysis, found in results]
     date = newest_of(results)
     if form:
@@ -277,7 +293,7 @@ def write_class(
         content = class_workbook(classes, date)
     write_content(output, content)
     if tell:
-        for text in _unread(classes):
+        for text in dict.fromkeys(_left_out(classes)):
             tell(text)
         found = tuple(Text("{subject} ({n})", subject=_subject(one), n=len(one.groups)) for one in classes)
         tell(Text("groups or runs side by side: {found}", found=found))

@@ -1,14 +1,18 @@
 """A report of many runs: an overview, in which nothing is said a hundred times and nothing is left out."""
 
 import re
+import shutil
 
 import pytest
 
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.limit.figure import limit_figure
+from levilab.pipelines.suits import save
 from levilab.report.document import MOST_IN_FULL
+from levilab.report.groups.document import write_class
 from levilab.report.page import write_report
 from many_runs import make_runs
+from support.pages import Page
 from support.paths import SAMPLE_DATA
 
 COUNT = 16
@@ -51,3 +55,50 @@ def test_of_many_runs_a_legend_does_not_name_each(tmp_path):
     legend = limit_figure(found).axes[0].get_legend()
     assert [text.get_text() for text in legend.get_texts() if "runs" in text.get_text()] == ["9 runs: a top ± u"]
     assert len(legend.get_texts()) < len(found.sources)
+
+
+@pytest.mark.usefixtures("undrawn_figures")
+def test_several_results_of_one_file_are_all_shown_and_count_once_in_a_class(tmp_path):
+    file = shutil.copy(SAMPLE_DATA / "spin-down-1" / "readings.csv", tmp_path / "a.csv")
+    row, folders = ANALYSES["spindown"], [tmp_path / name for name in ("x1", "x2", "x4")]
+    for folder, laws in zip(folders, [(), ("disc",), ("disc", "newton")], strict=True):
+        save(row, row.analyze([file], row.options_from({"laws": laws} if laws else {})), folder)
+    page = write_report(folders, tmp_path / "report.html").read_text(encoding="utf-8")
+    assert re.findall(r"<h2>[^<]*top: a.csv \(([^<]*)\)</h2>", page) == [str(folder) for folder in folders]
+    assert "<h3>a.csv</h3>" in page
+    assert re.findall(r"--laws (\S+)", page) == ["disc", "disc,newton"]
+    page = write_class(folders, tmp_path / "class.html", tell=(told := []).append).read_text(encoding="utf-8")
+    assert "a.csv (" in page
+    assert "2 runs" not in page
+    left_out = [text for text in told if f"not counted, as a.csv ({folders[0]}) is a result of the same" in text]
+    assert [text.partition(":")[0] for text in left_out] == [f"a.csv ({folder})" for folder in folders[1:]]
+    assert all(text in page for text in left_out)
+
+
+@pytest.mark.parametrize("named", [True, False])
+@pytest.mark.parametrize("write", [write_report, write_class])
+@pytest.mark.usefixtures("undrawn_figures")
+def test_an_input_that_cannot_be_used_is_named_and_ends_nothing(tmp_path, write, named):
+    """A field whose base is not known, a track without a spin, a damaged result, and what is no table of readings."""
+    (root := tmp_path / "runs").mkdir()
+    for k in (1, 2):
+        shutil.copytree(SAMPLE_DATA / f"spin-down-{k}", root / f"group-{k}")
+    (root / "group-2" / "result.json").write_text("{", encoding="utf-8")
+    shutil.copy(SAMPLE_DATA / "field-scan" / "readings.csv", root / "field.csv")
+    shutil.copy(SAMPLE_DATA / "spin-down-3" / "readings.csv", root / "good.csv")
+    places = "".join(f"{0.02 * k:.2f},{k % 7}e-3,{k % 5}e-3\n" for k in range(400))
+    (root / "track.csv").write_text(f"t in s,x in m,y in m\n{places}", encoding="utf-8")
+    (root / "short.csv").write_text("t in s,f in Hz\n0,40\n10,abc\n", encoding="utf-8")
+    (root / "unit.csv").write_text("t,f\n" + "".join(f"{10 * k},{2400 - 60 * k}\n" for k in range(15)), "utf-8")
+    (root / "empty.csv").write_text("", encoding="utf-8")
+    paths = sorted(root.iterdir()) if named else [root]
+    page = Page(write(paths, tmp_path / "page.html").read_text(encoding="utf-8")).text
+    for name, reason in [
+        ("field.csv", "the radii of the base are not known: write"), ("track.csv", "the spin is not known: a column"),
+        ("short.csv", "at least 3 readings are needed"), ("group-2", "is cut off or not JSON"),
+    ]:  # fmt: skip
+        assert len(re.findall(f"skipped {root / name}.{{0,40}}{reason}", page)) == 1
+    for name, doubt in [("unit.csv", "no unit, and would be in Hz"), ("empty.csv", "is empty")] if named else []:
+        assert len(re.findall(f"skipped {root / name}.{{0,99}}{doubt}", page)) == 1
+    assert "group-1" in page
+    assert "good.csv" in page
