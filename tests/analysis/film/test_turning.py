@@ -38,6 +38,21 @@ def test_spin_and_slope_scatter_as_u_says():
 
 
 @pytest.mark.parametrize("sense", [1, -1])
+@pytest.mark.parametrize("length", [0.8, 1.9])
+def test_the_bend_of_the_spin_by_drag_moves_no_spin_of_a_short_film(length, sense):
+    times = phone_times(length)
+    root = 35.0**-0.5 + 3.4e-4 * times  # of 1/spin, under the drag of a disc: 0.14 Hz/s
+    found = turning_of(times, sense * -1 / (3.4e-4 * root) % 1, np.full(times.size, NOISE), 0 * times, start=sense * 35)
+    for time, spin, most in (  # a parabola through 1.9 s: 0.08, 0.02 and 0.32 mHz
+        (found.middle, found.frequency, 1e-6),
+        (found.time, found.spin, 1e-6),
+        (times, found.smooth, 5e-6),
+    ):
+        assert sense * spin == pytest.approx(np.interp(time, times, root) ** -2, abs=most)
+    assert found.u_frequency < 1.1 * NOISE * np.sqrt(12 / times.size) / length  # of a straight line
+
+
+@pytest.mark.parametrize("sense", [1, -1])
 def test_uneven_times_tell_a_spin_far_above_half_the_rate(sense):
     random = np.random.default_rng(12)
     times = np.arange(60) / 30 + random.uniform(-4e-3, 4e-3, 60)
