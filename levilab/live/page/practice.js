@@ -188,12 +188,13 @@ export function openPractice(about, command, run, isOwn, allowed) {
   by("next-task").addEventListener("click", () => send("begin a task", {task: by("next-task").value}));
   let shownTask = "", reached = "";
 
-  /** Show the task under way, else the first steps, and after those, or a task, the next one. */
-  function showTask(bench, isGuided) {
+  /** Show the task under way, else the first steps, of which none goes with a top that lies, and after those, or a task, the next. */
+  function showTask(bench, isGuided, lies) {
     const row = tasks[bench.task], next = about.tasks.find(({name}) => !bench.tasks_done.includes(name));
     if (shownTask && !row) reached = bench.tasks_done.includes(shownTask) ? shownTask : "";
     put(by("task"), {hidden: !row, inert: !allowed});
-    put(by("guide"), {hidden: Boolean(row) || !isGuided});
+    put(by("guide"), {hidden: Boolean(row) || !isGuided || lies});
+    put(by("to-back"), {hidden: Boolean(row) || !isGuided || !lies});
     put(by("offer"), {hidden: Boolean(row) || !(reached || !isGuided && next), inert: !allowed});
     write("offer-text", reached ? `✓ ${phrase(tasks[reached].title)}: ${phrase(tasks[reached].teaches)}` : phrase("These were the first steps. Now a task:"));
     put(by("next-task"), {hidden: !next, value: next?.name ?? "", textContent: next ? phrase(next.title) : ""});
@@ -261,8 +262,9 @@ export function openPractice(about, command, run, isOwn, allowed) {
     }
     if (bench.seed !== now.seed) seed.set(String(now.seed = bench.seed));  // else a person may be typing
     names.forEach((name, k) => knobs[k].show(bench.what_if[name]));
-    showTask(bench, Boolean(steps));
-    const next = now.busy ? "" : tasks[bench.task]?.needs ?? (down && steps && steps !== "analyze" ? "back" : steps);
+    const lies = Boolean(down && steps && steps !== "analyze");
+    showTask(bench, Boolean(steps), lies);
+    const next = now.busy ? "" : tasks[bench.task]?.needs ?? (lies ? "back" : steps);
     need(next, Boolean(bench.task));
     for (const id of ["match", "back", "record", "analyze"]) by(id).classList.toggle("main", id === (next || (down ? "back" : "record")));  // one at most
     for (const part of ["what-if", "tasks", "offer"]) put(by(part), {inert: now.busy || !allowed});

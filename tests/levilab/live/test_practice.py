@@ -292,6 +292,11 @@ def test_a_task_opens_the_control_that_it_needs_and_leads_to_the_next(starting, 
     publish(starting.watches[""], here)
     until(page, f"{NEEDED} === 'match'")
     assert page.locator("#experiment").is_visible()
+    page.evaluate("levilab.data.up = false")
+    until(page, f"{NEEDED} === 'back' && document.getElementById('guide').hidden")  # no step goes with a top that lies
+    assert page.inner_text("#to-back") == "Put the top back: it floats again."
+    page.evaluate("levilab.data.up = true")
+    until(page, f"{NEEDED} === 'match' && document.getElementById('to-back').hidden")
     publish(starting.watches[""], replace(here, time_s=3.0, task="mass"))
     until(page, f"{NEEDED} === 'washers_g'")
     assert page.locator("#washers_g").is_visible()
