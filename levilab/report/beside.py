@@ -45,7 +45,7 @@ class Group:
         source: with its name and note.
         statistics: of the model; empty where the analysis has none.
         best_model: the law that describes its readings best, or "undecided"; empty where no laws compete.
-        warnings: about it, without advice.
+        warnings: about it, without advice and those of models that are not compared.
         doubts: those of them that make its numbers worthless where they are right.
     """
 
@@ -162,8 +162,12 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
     model = max(laws, key=lambda law: laws[law], default="") or document.get("best_model", "")
     parts = document["runs"]
     said = [
-        [text for text in (*source.warnings, *found.about_run(run)) if weight_of(text) != "advice"]
-        for source, run in zip(found.sources, found.runs, strict=True)
+        [
+            text
+            for text in (*source.warnings, *found.about_run(run))
+            if weight_of(text) != "advice" and text not in _of_other_models(part, model)
+        ]
+        for source, run, part in zip(found.sources, found.runs, parts, strict=True)
     ]
     groups = tuple(
         Group(
@@ -190,6 +194,12 @@ def _model(part: Mapping[str, Any], name: str) -> Mapping[str, Any]:
     """Return the model of this name, or the first; empty where there are none."""
     models: Sequence[Mapping[str, Any]] = part.get("models") or [{}]
     return next((one for one in models if one.get("name") == name), {} if name else models[0])
+
+
+def _of_other_models(part: Mapping[str, Any], name: str) -> set[str]:
+    """Return the warnings about models whose constants are not compared."""
+    others = (one for one in part["models"] if name and one["name"] != name)
+    return {text for one in others for text in one.get("warnings", ())}
 
 
 def _constants(document: Mapping[str, Any], law: str) -> list[str]:

@@ -234,3 +234,16 @@ def test_the_spreadsheet_has_numbers_texts_and_each_reading(of_three, tmp_path):
 def test_another_ending_is_refused_with_those_that_are_known(of_three, tmp_path):
     with pytest.raises(UsageError, match=r"\.html, \.pdf or \.xlsx"):
         write_class([of_three], tmp_path / "class.ods")
+
+
+def test_a_law_whose_constants_are_not_compared_has_no_part_in_what_to_look_at(tmp_path):
+    """Over a small fall of the spin c of the power law is known to a factor of several only."""
+    t = np.arange(0, 100, 10.0)
+    for k, start in enumerate([40.0, 39.0], start=1):
+        spin = (start**-0.5 + 3e-4 * t) ** -2 + 0.03 * np.random.default_rng(k).standard_normal(t.size)
+        rows = (f"{at:g},{hz:.3f},0.03\n" for at, hz in zip(t, spin, strict=True))
+        (tmp_path / f"{k}.csv").write_text(f"t in s,f in Hz,u in Hz\n{''.join(rows)}", encoding="utf-8")
+    of = compared(tmp_path)
+    assert [one.name for one in of.quantities] == ["c32"]
+    assert any("Power: c is known only to a factor" in text for text in of.found.all_warnings)
+    assert not any("Power: " in text for mark in of.marks for text in (*mark.why, *mark.notes))
