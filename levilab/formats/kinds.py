@@ -98,6 +98,9 @@ KINDS = (
     Kind("a database", "export its table as CSV", (".db", ".sqlite"), ((0, b"SQLite format 3"),)),
 )
 OTHER = Kind("a file of another kind", plural="other files")
+REPORT = Kind("a report of levilab", plural="reports of levilab")
+#: What stands in a page and in a PDF that levilab wrote.
+_OF_LEVILAB = (b"<title>levilab: ", b"/Keywords(levilab)")
 EMPTY = Kind("an empty file", "record again")
 #: Bytes at the beginning that tell the kind.
 _BYTES = 64
@@ -108,6 +111,8 @@ def kind_of(path: Path) -> Kind:
     with path.open("rb") as stream:
         head = stream.read(_BYTES)
     kind = kind_of_bytes(head, path.suffix)
+    if {".html", ".pdf"} & {*kind.suffixes} and any(mark in path.read_bytes() for mark in _OF_LEVILAB):
+        return REPORT
     return EMPTY if kind is OTHER and not head.strip() and len(head) < _BYTES else kind
 
 

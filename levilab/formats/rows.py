@@ -243,17 +243,22 @@ def _notes_on_refused(
         TableError: of the first line, where they are not; DoubtfulRows, if they could be.
     """
     numbers = [str(error.line) for error, _ in doubtful]
-    places = ", ".join([*numbers[:_MOST_NAMED], *["…"] * (len(numbers) > _MOST_NAMED)])
     if doubtful and not skip:
         error, _ = doubtful[0]
-        also = Said(" (also in {lines})", how_many(len(numbers) - 1, "other line")) if len(numbers) > 1 else ""
+        others = how_many(len(numbers) - 1, "other line")
+        also = Said(" (also in {lines}: {places:s})", others, _places(numbers[1:])) if len(numbers) > 1 else ""
         do = "; `skip_doubtful` leaves such rows out" if may_skip and len(doubtful) < read else ""
         kind = DoubtfulRows if do else TableError
         raise kind(error.path, "{wrong}{also}{do}", error.message, also, do, line=error.line)
     if doubtful:
         many = "{n} doubtful rows are left out, as `skip_doubtful` says: lines {places:s}"
         one = "{n} doubtful row is left out, as `skip_doubtful` says: line {places:s}"
-        yield Note("doubtful", Said(one if len(numbers) == 1 else many, len(numbers), places))
+        yield Note("doubtful", Said(one if len(numbers) == 1 else many, len(numbers), _places(numbers)))
+
+
+def _places(numbers: Sequence[str]) -> str:
+    """Return the numbers of lines, or the first few of them."""
+    return ", ".join([*numbers[:_MOST_NAMED], *["…"] * (len(numbers) > _MOST_NAMED)])
 
 
 def _lines(text: Text, layout: Layout, notes: list[str] | None = None) -> Iterator[tuple[int, str]]:

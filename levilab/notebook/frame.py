@@ -71,7 +71,7 @@ def are_arrays(data: Any) -> bool:
 
 
 def _is_array(item: Any) -> bool:
-    return hasattr(item, "dtype") or (isinstance(item, list | tuple) and bool(item) and _is_number(item[0]))
+    return hasattr(item, "dtype") or (isinstance(item, list | tuple) and (not item or _is_number(item[0])))
 
 
 def _is_number(item: Any) -> bool:

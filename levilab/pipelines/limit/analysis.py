@@ -458,13 +458,17 @@ def _sentences(limits: Limits) -> Iterable[str]:
         yield Text("{how}: {causes}.", how=how, causes=told)
 
 
+#: Below it the tail of a distribution is known too badly for a number of runs.
+_SELDOM = 1e-3
+
+
 def _times(what: str, n: int) -> str:
     times = {1: "once", 2: "twice"}.get(n) or Text("{n} times", n=n)
     return Text("{what} {times}", what=what, times=times)
 
 
 def _beside_theory(limits: Limits) -> Iterable[str]:
-    """Yield how far the mean lies from a limit of theory, why tops are lost sooner, and whether chance explains it."""
+    """Yield how far the mean lies from a limit of theory, why tops are lost sooner, and how often that is chance."""
     theory = {one.name: one for one in limits.comparisons}
     edge = theory.get(LOWER_EDGE) or theory.get(UPPER_EDGE)
     if edge is None:
@@ -490,5 +494,10 @@ def _beside_theory(limits: Limits) -> Iterable[str]:
     )
     if edge.p is not None:
         p = f"p = {digits(edge.p)}" if edge.p >= 1e-6 else "p < 10⁻⁶"
-        chance = "Chance explains the difference ({p:n})." if edge.agrees else "Chance does not explain it ({p:n})."
-        yield Text(chance, p=p)
+        once = (
+            Text("once in {n:.0f} such runs", n=1 / edge.p)
+            if edge.p >= _SELDOM
+            else "in fewer than one of 1000 such runs"
+        )
+        often = Text("in {percent:.0f} % of such runs", percent=100 * edge.p) if edge.agrees else once
+        yield Text("By chance alone so large a difference comes {often} ({p:n}).", often=often, p=p)

@@ -189,7 +189,7 @@ def test_a_number_behind_a_mark_that_cannot_be_used_is_quoted_as_it_stands(cell,
 
 def test_rows_that_a_person_doubts_are_left_out_on_request_and_named(write):
     path = write("t,f\n" + rows("{t},{f}").replace("37.1", "37.1?").replace("30.0,35", "~30.0,35"), "my.csv")
-    with pytest.raises(TableError, match=r"line 4: '37.1\?'.*also in 1 other line"):
+    with pytest.raises(TableError, match=r"line 4: '37.1\?'.*also in 1 other line: 5\)"):
         read_table(path)
     table = read_table(path, skip_doubtful=True)
     assert table.column("time_s").tolist() == [0, 10, 40, 50]

@@ -312,6 +312,8 @@ REFUSED = {
     "motion.hight": "did you mean height",
     "levilab.analyze((seconds, light))": "kind='spin', or light=",
     "levilab.analyze(np.array([]))": "an empty array: at least 3 readings are expected",
+    "levilab.analyze(([], []))": "an empty array: at least 3 readings are expected",
+    "levilab.analyze(time=[], frequency=[])": "an empty array: at least 3 readings are expected",
     "levilab.analyze(np.array(['a', 'b', 'c']))": "an array of a, …: numbers are expected",
     "levilab.analyze((t, f, 'u'))": "an array of u, …: numbers are expected",
     "levilab.analyze('none/*.csv')": "no file or folder in",

@@ -15,6 +15,7 @@ from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.sources import Readings, Skipped, SkippedRuns, collect, sha256_of
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import analyze_suiting, left_out_of, remarks, save, texts_of
+from levilab.report.page import write_report
 from support.spin_downs import spin_down_csv
 
 
@@ -186,6 +187,15 @@ def test_a_folder_without_anything_to_read_says_of_what_kind_its_files_are(tmp_p
     (tmp_path / "other.csv").write_text("a,b\n1,2\n", encoding="utf-8")
     with pytest.raises(DoesNotSuit, match=r"analyze in a picture \(foto\.jpg: .*; a table with other columns \(other"):
         analyze_suiting([tmp_path], {})
+
+
+@pytest.mark.usefixtures("undrawn_figures")
+def test_reports_of_levilab_are_named_as_such_and_need_no_advice(tmp_path):
+    spin_down_csv(tmp_path / "run.csv")
+    for name in ("report.html", "report.pdf"):
+        write_report([tmp_path / "run.csv"], tmp_path / name)
+    (text,) = texts_of(remarks([found.remarks for _, found in analyze_suiting([tmp_path], {})]))
+    assert text == "nothing to analyze in 2 reports of levilab (report.html, report.pdf)"
 
 
 def test_sound_without_the_extra_is_counted_with_what_to_install(tmp_path, sample_data, monkeypatch):

@@ -1,6 +1,7 @@
 """Limits from runs and files: the published statistics, theory beside them, result.json and back."""
 
 import json
+import re
 import shutil
 from types import MappingProxyType
 
@@ -325,3 +326,16 @@ def test_a_scene_that_was_measured_is_the_one_compared_with(sample_data, tmp_pat
     (folder / "run.json").write_text(json.dumps(record), encoding="utf-8")
     with pytest.raises(DataError, match=r"configuration\.scene: no spin keeps this top up"):
         LIMIT.analyze([folder])
+
+
+@pytest.mark.parametrize(
+    ("limits", "often"),
+    [
+        ("21.4\n21.6\n21.9\n21.7\n", r"in \d\d % of such runs \(p = 0\.\d"),
+        ("21.75\n21.9\n22.1\n21.95\n", r"once in \d\d such runs \(p = 0\.0"),
+        ("21.9\n21.91\n21.92\n21.9\n", r"in fewer than one of 1000 such runs \(p"),
+    ],
+)
+def test_how_often_chance_makes_such_a_difference_is_a_number_of_runs(tmp_path, limits, often):
+    (file := tmp_path / "lower.csv").write_text(limits, encoding="utf-8")
+    assert re.search(f"By chance alone so large a difference comes {often}", LIMIT.analyze([file]).text)
