@@ -22,10 +22,17 @@ const RESTS_S = 60;
 const MOST_CHANGES = 100;
 const LEFT = 58, LEAST_RIGHT_PX = 84, TOP = 10, BOTTOM = 34, GAP = 24;
 
-/** The last minutes: the drive, and each count at the middle of its gate, beside the drive of that moment. */
-export function openHistory() {
-  let drives = [], counts = [], marks = [], rests = false, turns = [];  // turns of the drive: [time, turns by then, frequency]
+/**
+ * The last minutes: the drive, and each count at the middle of its gate, beside the drive of that moment.
+ *
+ * @param kept what a page had that was loaded before this one, as text.
+ */
+export function openHistory(kept = "{}") {
+  // turns of the drive: [time, turns by then, frequency]
+  let {drives = [], counts = [], marks = [], turns = []} = JSON.parse(kept, (_, value) => value ?? NaN), rests = false;
   return {
+    /** As text, for the page that is loaded next; what is no number is null there. */
+    get kept() { return JSON.stringify({drives, counts, marks, turns}); },
     /** Each [time, drive]; NaN while it is off. */
     get drives() { return drives; },
     /** Each [time, spin, drive of that time, end of the gate]; NaN where there is a gap, or the drive was off. */
@@ -84,7 +91,7 @@ export function openHistory() {
       return ["bench_time_s,spin_frequency_hz,drive_frequency_hz", ...texts, ""].join("\n");
     },
 
-    /** Mark what happened at a time. */
+    /** Mark at a time what happened, in English. */
     mark(time, text) { marks.push([time, text]); },
   };
 
@@ -184,8 +191,8 @@ export function drawHistory(paper, {drives, counts, marks, latest, rests}) {
   for (const [k, [time, text]] of marks.entries()) {
     const right = toX(time) > width / 2, place = [toX(time) + (right ? -5 : 5), TOP + 10 + 14 * (k % 2)];
     c.textAlign = right ? "right" : "left";
-    c.strokeText(text, ...place);
-    c.fillText(text, ...place);
+    c.strokeText(phrase(text), ...place);
+    c.fillText(phrase(text), ...place);
   }
   c.restore();
 

@@ -36,11 +36,12 @@ const token = takeToken();
 const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, said: 0, source: null, records: {}};
 const data = {readings: null, found: null, hidden: null, shown: {}, said: [], fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
-const history = openHistory(), sound = openSound();
+const history = openHistory(sessionStorage.getItem(`minutes ${token}`) ?? undefined), sound = openSound();
 let fellAt = NaN;  // a fall whose poses are not kept yet
 let isReady = false;  // whether the bench for practice has measured something yet
 let paused = false, drawn = null, pointed = -1, space = null, topOf = "", wanted = "", practice = null, reachable = true;
 let news = [], spoken = 0, spokenState = "", close = null, dirty = {plot: true, trace: true};
+addEventListener("pagehide", () => sessionStorage.setItem(`minutes ${token}`, history.kept));  // another language loads the page again
 window.levilab = {frames: 0, drawn: 0, seen, data, history};  // what tests and benchmarks read
 
 // --- frames ---
@@ -186,7 +187,7 @@ function takePoses(pieces) {
 function markFall() {
   fellAt = data.lastUp;
   put(by("replay"), {hidden: true});
-  history.mark(data.lastUp, phrase("fell"));
+  history.mark(data.lastUp, "fell");
   dirty.plot = true;
 }
 

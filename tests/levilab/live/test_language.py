@@ -109,8 +109,11 @@ def test_a_page_in_german_stays_german_and_nothing_is_cut(viewport, hall, watche
     page.goto(address(hall, token=True))
     until(page, "levilab.frames > 0")
     assert page.get_attribute("html", "lang") == "en"
+    page.evaluate("levilab.history.mark(1, 'fell')")
     page.select_option("#language", "de")
     page.wait_for_url("**/?language=de")
+    until(page, "levilab.frames > 0")
+    assert page.evaluate("levilab.history.marks") == [[1, "fell"]]  # the last minutes are there in each language
     page.goto(address(hall))  # without it: the browser has kept the choice
     until(page, "levilab.frames > 0")
     assert page.get_attribute("html", "lang") == "de"
