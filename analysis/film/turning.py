@@ -26,6 +26,8 @@ _EXCLUDED = 25.0
 _GAIN = 0.03
 #: Time from a row to the next one where it is not known, as a standard deviation [s]: 5 to 30 µs in phones.
 _LINE_TIME = 20e-6
+#: 1/distance of a camera beside the top, and its standard deviation: from 0.25 to 1 m each factor is as probable [1/m].
+_NEARNESS, _NEARNESS_U = 2.16, 0.85
 #: Harmonics of the angle in a phase, and how large they may be, as a standard deviation [turns]: a top of 30 mm
 #: that turns about a point 0.2 mm beside the middle of its rim adds 0.003.
 _HARMONICS, _HARMONIC = 2, 0.003
@@ -128,7 +130,7 @@ def choices_of(found: list[tuple[float, float]], near: float | None) -> tuple[li
     return [f for f in seen if abs(f) >= LOW], [f for f in seen if abs(f) < LOW]
 
 
-def turning_of(times: Array, phase: Array, u: Array, rows: Array, *, start: float) -> Turning:
+def turning_of(times: Array, phase: Array, u: Array, rows: Array, aside: Array, *, start: float) -> Turning:
     """Follow the phase from the middle of the film to both ends, and fit the spin.
 
     Args:
@@ -136,18 +138,21 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, *, start: floa
         phase: shape (n,) [turns].
         u: standard uncertainties, shape (n,) [turns].
         rows: of the mark, by which its time may be late, shape (n,); zeros: it is not [pixels].
+        aside: place to the right, with which the line of sight of a camera beside the top turns, shape (n,); zeros: of
+            a camera above [m].
         start: spin in the middle [Hz].
     """
     middle = int(np.searchsorted(times, np.median(times)))
     turns = np.empty_like(phase)
     _follow(times[middle:], phase[middle:], turns[middle:], start, float(phase[middle]))
     _follow(times[middle::-1], phase[middle::-1], turns[middle::-1], start, float(phase[middle]))
+    turns += _NEARNESS * aside / (2 * np.pi)
     centre, half = float((times[0] + times[-1]) / 2), float(np.ptp(times)) / 2
     order = min(2 + int(half / WINDOW_S), _MOST_BENDS)
     late = (times - centre) / half
     swings = min(int(_SWING_HZ * 4 * half), _MOST_SWINGS) if np.any(rows) else 0
     basis, swing = np.split(chebvander(late, order + swings), [order + 1], axis=1)
-    nuisance = np.concatenate([_nuisance(turns, start * (rows - rows.mean())), _SWING * swing], axis=1)
+    nuisance = np.concatenate([_nuisance(turns, start * (rows - rows.mean()), aside), _SWING * swing], axis=1)
     slope, bend = (chebval(0.0, chebder(np.eye(order + 1), n)) / half**n for n in (1, 2))
     chirp = float(bend @ _fit(basis, turns, u, nuisance)[0][: order + 1])
     slower = chirp * min(chirp / start, 0.0)  # of the slope, a second; that of an even drive stays
@@ -174,14 +179,15 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, *, start: floa
     )
 
 
-def _nuisance(turns: Array, late: Array) -> Array:
+def _nuisance(turns: Array, late: Array, aside: Array) -> Array:
     """Return further terms of a phase, in standard deviations of the priors, shape (n, p) [turns].
 
-    Rows that are read one after another; and harmonics of the angle, from a mark that does not turn about the middle of
-    the rim and a camera that looks from the side.
+    Rows that are read one after another; the line of sight; and harmonics of the angle, from a mark that does not turn
+    about the middle of the rim and a camera that looks from the side.
     """
     waves = [part(2 * np.pi * m * turns) for m in range(1, _HARMONICS + 1) for part in (np.cos, np.sin)]
-    return np.stack([_LINE_TIME * late, *(_HARMONIC * wave for wave in waves)], axis=1)
+    sight = _NEARNESS_U * aside / (2 * np.pi)
+    return np.stack([_LINE_TIME * late, sight, *(_HARMONIC * wave for wave in waves)], axis=1)
 
 
 def _follow(times: Array, phase: Array, turns: Array, frequency: float, start: float) -> None:

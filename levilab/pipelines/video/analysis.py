@@ -13,7 +13,7 @@ from analysis.errors import AnalysisError
 from analysis.film.circles import Circle
 from analysis.film.errors import NoMark, SlowMotion
 from analysis.film.mark import Phases, phases_of, without_pull
-from analysis.film.turning import WINDOW_S, Turning, choices_of, spins_of_start, turning_of
+from analysis.film.turning import Turning, choices_of, spins_of_start, turning_of
 from analysis.limits import spin_at_fall
 from analysis.sway import swings_of
 from analysis.uncertainty import Estimate
@@ -76,8 +76,6 @@ _SHOWS_MARK = 0.8
 #: The mark hides an end of the side that is nearer than this [turns]: in ten films of the cross-check 99 % of the
 #: places are within 75 µm, none beyond 3.3 u; with 0.13 within 89 µm, to 7.3 u; 0.18 leaves 31 % fewer, and 75 µm.
 _END = 0.15
-#: How near a camera beside the top is at least [m].
-_NEAREST = 0.3
 #: A mark that turns more slowly would be seen in front in all pictures [Hz].
 _STANDS = 1.0
 #: The nearest choice is the one that was meant if it is nearer than the next one by this factor.
@@ -282,14 +280,16 @@ def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:
         places = without_pull(followed.x + 1j * followed.y, phases.phase)
         followed = replace(followed, x=places.real, y=places.imag)
         rows = followed.y + _MARK * followed.radius * np.sin(angles)
-    late = np.zeros_like(rows) if line_time and not options.beside else rows
+    late = np.zeros_like(rows) if line_time else rows
     seen = times + line_time * rows
-    turning, choices, problem = _turn(seen[marked], _part(phases, marked), late[marked], options, rate)
     scale, base = _scale(film, options, followed), followed.base
     assert scale.value is not None
     size = scale.value
+    aside = options.beside * size * (followed.x - followed.x.mean())
+    turning, choices, problem = _turn(
+        seen[marked], _part(phases, marked), late[marked], aside[marked], options=options, rate=rate
+    )
     if options.beside and turning is not None:
-        turning = _by_sight(turning, size * float(np.std(followed.x)), float(np.ptp(times)))
         clear = _mark_is_off_the_ends(seen, phases, marked, turning)
         followed, times = _of_pictures(followed, clear), times[clear]
         turning = replace(turning, smooth=np.interp(times, seen[marked], turning.smooth))
@@ -311,17 +311,6 @@ def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:
         choices, None if options.beside else _precession(times, x + 1j * y), leaning, rising, fall, at_fall,
         (*_notes(options, followed, leaning), *_notes_on_spin(turning, choices, problem, rate, options)),
     )  # fmt: skip
-
-
-def _by_sight(turning: Turning, sway: float, length: float) -> Turning:
-    """Add to u that the line of sight turns with the place, a sway of some metres, and the phase with it."""
-    turns = np.sqrt(12) * sway / (2 * np.pi * _NEAREST)  # times 1/T: the slope through T seconds of it, at most
-    return replace(
-        turning,
-        u=np.hypot(turning.u, turns / WINDOW_S),
-        u_frequency=float(np.hypot(turning.u_frequency, turns / length)),
-        u_chirp=float(np.hypot(turning.u_chirp, 4 * turns / length**2)),
-    )
 
 
 def _part(phases: Phases, chosen: NDArray[np.bool_]) -> Phases:
@@ -386,7 +375,7 @@ def _precession(times: Array, places: NDArray[np.complex128]) -> Estimate | None
 
 
 def _turn(
-    times: Array, phases: Phases, rows: Array, options: VideoOptions, rate: float
+    times: Array, phases: Phases, rows: Array, aside: Array, *, options: VideoOptions, rate: float
 ) -> tuple[Turning | None, tuple[float, ...], str]:
     """Return how the top turned, the spins that describe its mark, and why there is none of these."""
     try:
@@ -404,7 +393,7 @@ def _turn(
         choices.sort(key=lambda f: abs(abs(f) - (options.near or 0.0)))
         off = [abs(abs(f) - options.near) for f in choices[:2]]
         choices = choices[:1] if off[0] < _NEARER * off[1] else choices
-    turnings = {f: turning_of(times, phases.phase, phases.u, rows, start=f) for f in choices}
+    turnings = {f: turning_of(times, phases.phase, phases.u, rows, aside, start=f) for f in choices}
     best = min(one.u_frequency for one in turnings.values())
     choices = [
         f for f in choices if turnings[f].u_frequency < _WORSE * best

@@ -17,10 +17,10 @@ def seen(random, times, spin, chirp=0.0, more=0.0):
     return (0.3 + spin * times + 0.5 * chirp * times**2 + more + random.normal(0, NOISE, times.size)) % 1
 
 
-def turning(times, phase, rows=None):
+def turning(times, phase, rows=0.0, aside=0.0):
     u = np.full(times.size, NOISE)
     (start, *_), _ = choices_of(spins_of_start(times, phase, u), None)
-    return turning_of(times, phase, u, np.zeros(times.size) if rows is None else rows, start=start)
+    return turning_of(times, phase, u, rows + 0 * times, aside + 0 * times, start=start)
 
 
 def test_spin_and_slope_scatter_as_u_says():
@@ -42,7 +42,8 @@ def test_spin_and_slope_scatter_as_u_says():
 def test_the_bend_of_the_spin_by_drag_moves_no_spin_of_a_short_film(length, sense):
     times = phone_times(length)
     root = 35.0**-0.5 + 3.4e-4 * times  # of 1/spin, under the drag of a disc: 0.14 Hz/s
-    found = turning_of(times, sense * -1 / (3.4e-4 * root) % 1, np.full(times.size, NOISE), 0 * times, start=sense * 35)
+    phase, none = sense * -1 / (3.4e-4 * root) % 1, 0 * times
+    found = turning_of(times, phase, none + NOISE, none, none, start=sense * 35)
     for time, spin, most in (  # a parabola through 1.9 s: 0.08, 0.02 and 0.32 mHz
         (found.middle, found.frequency, 1e-6),
         (found.time, found.spin, 1e-6),
@@ -79,6 +80,17 @@ def test_a_rolling_shutter_and_an_eccentric_mark_do_not_move_the_spin():
     found = turning(times, seen(random, times, spin, more=more), rows)
     assert found.frequency == pytest.approx(spin, abs=4 * found.u_frequency)
     assert found.u_frequency < 1.5 * NOISE * np.sqrt(12 / times.size) / 2.0  # of a straight line through 2 s, nearly
+
+
+def test_the_line_of_sight_of_a_camera_beside_the_top_moves_no_spin():
+    random, times, found = np.random.default_rng(19), phone_times(2.0), []
+    for nearness in np.linspace(1.0, 4.0, 60):  # of 0.25 to 1 m
+        aside = 3e-3 * np.sin(2 * np.pi * (1.1 * times + random.uniform()))
+        one = turning(times, seen(random, times, 31.0, more=-nearness * aside / (2 * np.pi)), aside=aside)
+        found.append((one.frequency - 31.0, one.u_frequency))
+    off, u = np.array(found).T
+    assert np.std(off / u) == pytest.approx(1, abs=0.37)  # 4 of its standard errors
+    assert np.std(off) < 1.4 * NOISE * np.sqrt(12 / times.size) / 2.0  # of a straight line; 3.8 without the sight
 
 
 def test_phases_without_a_turn_and_few_pictures_are_refused():
