@@ -225,13 +225,13 @@ def choose_lines(windows: Sequence[Swings], spin_hz: Array, known: Known) -> lis
     together = whole.sum(axis=1)
     odds = np.exp(together - together.max()) * np.gradient(grid[:, 0])
     weight = (odds / odds.sum()) @ np.exp(terms - whole[:, owner])
-    best, found, squares = terms[np.argmax(together)], [], []
+    best, found = terms[np.argmax(together)], []
     for k, window in enumerate(windows):
         (mine,) = np.nonzero(owner == k)
         chosen = mine[np.argmax(best[mine])]
-        squares.append(float(weight[mine] @ (split[mine] - split[chosen]) ** 2))
-        found.append(replace(choices[chosen], rivals=(), backwards=window.backwards))
-    return [replace(one, mistake=math.sqrt(np.mean(squares))) for one in found]
+        mistake = math.sqrt(float(weight[mine] @ (split[mine] - split[chosen]) ** 2))
+        found.append(replace(choices[chosen], rivals=(), backwards=window.backwards, mistake=mistake))
+    return found
 
 
 def _judge(swings: Swings, spin: float, known: Known, part: float) -> tuple[float, float, float]:

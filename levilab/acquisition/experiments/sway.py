@@ -32,7 +32,7 @@ class SwaySettings(CounterSettings):
 
     interval_s: PositiveFloat = Field(default=2.0, description="time from one reading to the next")
     frames_hz: float = Field(default=120.0, ge=30.0, le=1000.0, description="frames per second of the film")
-    longest_s: PositiveFloat = Field(default=120.0, description="how long is filmed if the top stays up")
+    longest_s: PositiveFloat = Field(default=300.0, description="how long is filmed if the top stays up")
 
     def for_bench(self, config: BenchConfig, model_of: ModelOf) -> Self:
         """See the base.  Raises ConfigError for a real bench."""

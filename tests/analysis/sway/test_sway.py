@@ -268,10 +268,26 @@ def test_a_line_that_is_as_likely_is_in_u():
     assert part == pytest.approx(2e-3 * np.sqrt(0.5), rel=0.1)  # either with a probability of a half
 
 
+def slow_lines(spin):
+    """The slow swings of the top as lines."""
+    return lines(sorted(sorted(modes(field, TOP, HEIGHT, spin).real, key=abs)[:2]))
+
+
+def test_a_window_in_doubt_takes_nothing_from_the_others():
+    """u is no larger with a window in which another line is as likely than without that window."""
+    spins, sure = np.array([25.0, 30.0, 40.0]), [slow_lines(spin) for spin in (25.0, 30.0, 40.0)]
+    backward, forward = sure[1].frequency[:2]
+    doubtful = [sure[0], replace(sure[1], rivals=(lines((backward + 2e-3, forward)),)), sure[2]]
+    three = geometric_magnetism(choose_lines(doubtful, spins, known(0.02526)), spins, known(0.02526))
+    two = geometric_magnetism(choose_lines(sure[::2], spins[::2], known(0.02526)), spins[::2], known(0.02526))
+    assert three.measured.u < 1.02 * two.measured.u
+    assert abs(three.measured.value - two.measured.value) < two.measured.u
+
+
 def test_the_roots_of_the_quartic_give_back_its_gradient():
     b, slope = field(HEIGHT)[:2, 0]
     spins = np.array([25.0, 30.0, 40.0])
-    seen = [lines(sorted(sorted(modes(field, TOP, HEIGHT, spin).real, key=abs)[:2])) for spin in spins]
+    seen = [slow_lines(spin) for spin in spins]
     found = geometric_magnetism(seen, spins, known(0.02526))
     assert found.gradient.value == pytest.approx(abs(slope / (2 * b)), rel=1e-4)
     assert found.of_base.value == pytest.approx(abs(slope / (2 * b)), rel=1e-5)
