@@ -63,11 +63,12 @@ class ReportPart:
         subject: in the title of the page.
         heading: of the page.
         lead: how much was used.
-        result: what follows its text: numbers with their uncertainties, what they mean, the models compared.
+        result: what follows its text: numbers with their uncertainties, what they mean.
         figure: its words.
         values: the numbers alone, for a short report; none: as `result`.
         short_figure: the words of its short figure; None: it has none, and the figure is that of every report.
         inputs: one by one.
+        compared: the models compared, below the figure; none: there is no such section.
         runs_title: of the section with `runs`.
         runs: what belongs to each run rather than to all; none: there is no such section.
     """
@@ -80,6 +81,7 @@ class ReportPart:
     inputs: tuple[InputPart, ...]
     values: tuple[Block, ...] = ()
     short_figure: FigureText | None = None
+    compared: tuple[Block, ...] = ()
     runs_title: str = ""
     runs: tuple[Block, ...] = ()
 

@@ -507,8 +507,9 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
     remarks: list[NotTaken] = []
     others: Counter[str] = Counter()
     for folder in find_runs(root):
+        chosen = options(folder)
         try:
-            chosen, run = options(folder), Run.load(folder)
+            run = Run.load(folder)
             if goes_on := run.continued_in:
                 remarks.append(Skipped(f"{folder}, which was broken off: its run goes on in {goes_on.name}"))
             elif needs.take(run):

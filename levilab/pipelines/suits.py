@@ -10,7 +10,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from analysis.errors import AnalysisError
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
@@ -41,6 +41,7 @@ from levilab.texts.note import of_file
 from levilab.texts.text import Text, how_many, text_of
 
 Tell = Callable[[str], None]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -137,10 +138,23 @@ def _recall(
         inputs = [*places, *(path for one in of_results for path in one.inputs)]
         archive = analysis.archive(inputs, [one.file for one in of_results])
         archives[analysis.name] = archive
-        return analysis.reading(archive, analysis.options_from(given))
+        chosen = analysis.options_from(given)
+        reading = analysis.reading(archive, chosen)
+        return lambda path: with_sound_result(lambda: reading(path), chosen)
 
     def has_result(name: str, source: Source[Any]) -> bool:
-        return archives[name].earlier(source.path, source.data, source.sha256) is not None
+        return (
+            with_sound_result(lambda: archives[name].earlier(source.path, source.data, source.sha256), None) is not None
+        )
+
+    def with_sound_result(read: Callable[[], T], otherwise: T) -> T:
+        """Read by a result; of one that is damaged, and so skipped with its input later, take something else."""
+        try:
+            return read()
+        except ResultError:
+            if errors is None:
+                raise
+            return otherwise
 
     def choose(source: Source[Any], takers: Collection[str]) -> Collection[str]:
         return [name for name in takers if has_result(name, source)] or _made_for(source, takers)

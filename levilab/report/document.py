@@ -84,7 +84,7 @@ def document_of(results: Results, others: Sequence[Section] = (), asked: Asked |
 def blocks_of_part(
     analysis: Analysis[A], found: A, part: ReportPart, asked: Asked, *, deeper: bool = False
 ) -> list[Block]:
-    """Return what one analysis found: doubts, result, figure, notes, what else is known, run by run.
+    """Return what one analysis found: doubts, result, figure, notes, models, what else is known, run by run.
 
     Args:
         analysis: the row of the catalogue.
@@ -123,6 +123,7 @@ def blocks_of_part(
         blocks += [section("Notes and conditions" if under else "Notes", "notes", *both)] if both else []
     else:
         blocks += [section("Notes", "notes", Warnings(notes))] if notes else []
+        blocks += [section("The laws compared", "laws", *part.compared)] if part.compared else []
         blocks += [_budget(analysis, found), *_trials(analysis, found, study, made=asked.crosscheck)]
         blocks += [section(part.runs_title, "runs", *part.runs)] if part.runs else []
     return with_marks(blocks, mark_of(found.sources))
@@ -150,6 +151,11 @@ def _trials(analysis: Analysis[Any], found: Any, study: Study | None, *, made: b
     why = Paragraph("Not made: it takes longer than a report. This makes and keeps it:")
     advice = (why, Code(f"levilab crosscheck {analysis.name} --like {named}")) if made and analysis.name in OWN else ()
     blocks = blocks_of(study, analysis.symbols) if study else advice
+    if made and analysis.name not in OWN:
+        why = Paragraph(
+            "Trials of films take minutes, and none has the parameters of this one. This makes those of other tops:"
+        )
+        yield Section("Cross-check", (why, Code(f"levilab crosscheck {analysis.name}")), anchor="crosscheck")
     if blocks:
         lead = (
             "Synthetic readings with the values, times and scatter of this result went through the same analysis: does "

@@ -415,7 +415,6 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
             *(() if analysis.is_doubtful else (Paragraph(Sentences(*meaning(analysis)), "What it means."),)),
             *_falls(analysis),
             *_laws(analysis),
-            *_count(analysis),
         ),
         figure=FigureText(
             title="Spin-down.",
@@ -431,6 +430,7 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
             caption="The readings with the law that is nearest to them; below, readings and all laws less that law.",
             points=_points(analysis),
         ),
+        compared=(_comparison(analysis), *_count(analysis)),
         runs_title="Run by run",
         runs=_run_by_run(analysis),
         inputs=input_parts(
@@ -461,12 +461,26 @@ def _falls(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
 
 
 def _laws(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
-    """Return the constants of the laws, and how well they fit; of excluded ones the constants can be opened."""
+    """Return the constants of the laws; of excluded ones they can be opened."""
     several = len(analysis.runs) > 1
-    n = analysis.combined.fit(analysis.combined.best).statistics.n
-    low, high = max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)
     u = "Of a mean it comes from the scatter s of the runs, u = s/√N." if several else "ν₀: the spin at first."
     constants = Sentences(VALUE_U, u)
+    out = analysis.combined.verdict.excluded
+    kept = [fit for fit in analysis.combined.fits if fit.name not in out]
+    others = [fit for fit in analysis.combined.fits if fit.name in out]
+    excluded = replace(_constants_table(analysis, others), title="")
+    folded = (
+        Details(Text("Excluded: {laws}", laws=law_names(out)), (Tabular("spindown-laws-excluded", excluded),))
+        if others
+        else None
+    )
+    return (Tabular("spindown-laws", _constants_table(analysis, kept), constants), *([folded] if folded else []))
+
+
+def _comparison(analysis: SpinDownAnalysis) -> Tabular:
+    """Return how well the laws fit."""
+    n = analysis.combined.fit(analysis.combined.best).statistics.n
+    low, high = max(2 - 4 / math.sqrt(n), 0), min(2 + 4 / math.sqrt(n), 4)
     quality = Text(
         "constants: how many were fitted, beside the start of each run; the exponent is common to "
         "all runs. χ²/dof is near 1 where a law leaves nothing but the readings' own uncertainty. "
@@ -479,20 +493,7 @@ def _laws(analysis: SpinDownAnalysis) -> tuple[Block, ...]:
         low=low,
         high=high,
     )
-    out = analysis.combined.verdict.excluded
-    kept = [fit for fit in analysis.combined.fits if fit.name not in out]
-    others = [fit for fit in analysis.combined.fits if fit.name in out]
-    excluded = replace(_constants_table(analysis, others), title="")
-    folded = (
-        Details(Text("Excluded: {laws}", laws=law_names(out)), (Tabular("spindown-laws-excluded", excluded),))
-        if others
-        else None
-    )
-    return (
-        Tabular("spindown-laws", _constants_table(analysis, kept), constants),
-        *([folded] if folded else []),
-        Tabular("spindown-models-compared", quality_table(analysis, QUALITY_IN_WORDS), quality),
-    )
+    return Tabular("spindown-models-compared", quality_table(analysis, QUALITY_IN_WORDS), quality)
 
 
 def _count(analysis: SpinDownAnalysis) -> tuple[Block, ...]:

@@ -131,9 +131,10 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
     tables = (_values(of, one) for one in of.quantities)
     agree: list[Block] = [Paragraph(text)] if (text := agreement(of)) else []
     agree += [Details("Statistics", (Paragraph(text),))] if (text := statistics_of_agreement(of)) else []
-    yield section("Result", "result", Verdict(verdict(of)), *_marks(of), *tables, *agree, _groups(of))
+    yield section("Result", "result", Verdict(verdict(of)), *_marks(of), *tables, *agree)
     if of.quantities and len(of.groups) > 1:
         yield section("Figure", "figure", _picture(of))
+    yield section("Runs", "runs", _groups(of))
     pairs = zip(of.groups, of.marks, strict=True)
     if remarks := tuple(Fact(group.source.name, one.notes) for group, one in pairs if one.notes):
         yield section("Remarks of the analysis", "remarks", Facts(remarks))

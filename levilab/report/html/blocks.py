@@ -1,6 +1,7 @@
 """Blocks as HTML, built of elements, so that no text can become markup; a table of functions, one a kind of block."""
 
 import base64
+import math
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
@@ -264,6 +265,10 @@ def _small_print(text: str) -> Html | str:
 # --- figures -------------------------------------------------------------------------------------------
 
 
+#: Height over width below which a figure shares a printed page with the result above it.
+_WIDE = 0.75
+
+
 def _picture(writer: Writer, block: Picture, _: int) -> Html:
     from levilab.present.style import as_png, as_svg  # with matplotlib
 
@@ -282,7 +287,9 @@ def _picture(writer: Writer, block: Picture, _: int) -> Html:
             if _count_marks(svg, f"{prefix}-{points.gid}") == len(points.texts)
         }
     caption = element("figcaption", element("strong", words(block.title)), " ", words(block.caption))
-    return element("figure", element("div", drawn, class_="card", tabindex="0"), caption, id=prefix)
+    width, height = figure.get_size_inches()
+    size = "card short" if math.isfinite(block.most_inch) else "card wide" if height < _WIDE * width else "card"
+    return element("figure", element("div", drawn, class_=size, tabindex="0"), caption, id=prefix)
 
 
 def _count_marks(svg: str, group: str) -> int:

@@ -156,3 +156,20 @@ def test_paper_is_light_and_holds_what_is_folded(browser, report):
             assert page.locator(above).first.evaluate("one => getComputedStyle(one).breakAfter") == "avoid"
         first = page.locator("tbody tr:first-child").first
         assert first.evaluate("row => getComputedStyle(row).breakBefore") == "avoid"
+
+
+@pytest.mark.parametrize(("sample", "short", "pages"), [("spin-down-1", True, 1), ("lower-limits", False, 3)])
+def test_on_paper_the_figure_shares_a_page_with_the_result(browser, tmp_path, sample, short, pages):
+    with with_drawing(), watch(browser) as page:
+        page.goto(write_report([SAMPLE_DATA / sample], tmp_path / "report.html", short=short).as_uri())
+        margin = dict.fromkeys(("top", "right", "bottom", "left"), "10mm")
+        assert page.pdf(format="A4", margin=margin).count(b"/Type /Page\n") == pages
+
+
+def test_on_paper_a_section_of_nothing_but_what_is_left_out_there_has_no_title(browser, report):
+    with watch(browser) as page:
+        page.goto(report.as_uri())
+        page.emulate_media(media="print")
+        assert page.locator("section:has(> details.on-paper-out)").count()
+        assert not page.locator("#runs").is_visible()
+        assert page.locator("#result").is_visible()

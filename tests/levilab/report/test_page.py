@@ -48,10 +48,18 @@ def column(found, name, head):
     """Return a column of a table of the report, by the first cell of each row."""
     part = spindown_part(found)
     (shown,) = (
-        block.table for block in (*part.result, *part.runs) if isinstance(block, Tabular) and block.name == name
+        block.table
+        for block in (*part.result, *part.compared, *part.runs)
+        if isinstance(block, Tabular) and block.name == name
     )
     k = shown.heads.index(head)
     return {row.cells[0]: row.cells[k] for row in shown.rows}
+
+
+def test_the_result_comes_first_then_the_figure_and_then_how_well_the_laws_fit(page):
+    parts = ("Result", "What it means", "Drag laws", "Figure", "Notes", "The laws compared", "How well they fit")
+    places = [page.text.rindex(part) for part in parts]
+    assert places == sorted(places)
 
 
 def test_nothing_is_fetched_when_the_report_is_opened(page):

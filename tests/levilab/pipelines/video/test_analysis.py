@@ -283,12 +283,13 @@ def test_a_film_is_recalled_from_its_result_and_reported_with_its_still(path, tm
     assert again.origins[0].text.startswith("as levilab analyze found it")
     assert differences(found.runs, again.runs) == []
     assert video.document(again, tmp_path) == video.document(found, tmp_path)
-    ended = command("report", tmp_path, "-o", "page.html", "--no-crosscheck", cwd=tmp_path)
+    ended = command("report", tmp_path, "-o", "page.html", cwd=tmp_path)
     assert ended.status == 0, ended.err
     assert "no sound" not in ended.err
     page = (tmp_path / "page.html").read_text(encoding="utf-8")
     assert "A floating top, filmed" in page
     assert "Uncertainty budget" in page
+    assert "levilab crosscheck video" in page
     assert 'xlink:href="data:image/png;base64' in page
     assert "Report of" not in page  # its tables are no further inputs
 

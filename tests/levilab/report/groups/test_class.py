@@ -131,7 +131,7 @@ def test_other_experiments_have_their_truths_too(experiment, names, tmp_path):
 
 def test_page_and_pdf_begin_with_the_result(of_three, tmp_path):
     page = write_class([of_three], tmp_path / "new" / "class.html").read_text(encoding="utf-8")
-    places = [page.index(f">{title}<") for title in ("Result", "Figure")]
+    places = [page.index(f">{title}<") for title in ("Result", "Figure", "Runs")]
     assert places == sorted(places)
     assert "SYNTHETIC." in page
     assert "rms residual [Hz]" in page
