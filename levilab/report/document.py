@@ -218,8 +218,7 @@ def _title(counts: str, others: Sequence[Section]) -> str:
 
 def _lead(found: Analyzed[Any, Any, Any, Any], part: ReportPart) -> str:
     """Return the amount of data used."""
-    count = sum(map(len, found.grouped_warnings))
-    notes = Text("{n} notes", n=count) if count > 1 else "1 note" if count else "no notes"
+    notes = count_notes(sum(map(len, found.grouped_warnings)))
     return Text("{inputs}, {used}, {notes}", inputs=count_inputs(found.sources), used=part.lead, notes=notes)
 
 
@@ -328,6 +327,11 @@ def notebook_blocks(analysis: Analysis[A], found: A) -> tuple[Block, ...]:
 
 
 # --- words ---------------------------------------------------------------------------------------------
+
+
+def count_notes(count: int) -> str:
+    """Return how many notes."""
+    return Text("{n} notes", n=count) if count > 1 else "1 note" if count else "no notes"
 
 
 def count_inputs(sources: Sequence[Source[Any]]) -> str:

@@ -120,7 +120,8 @@ def _draw_limits(axes: Axes, height: float, analysis: LimitAnalysis, group: Limi
     made_up = {bool(source.synthetic) for source in analysis.sources}
     own = all(analysis.sources[number].synthetic for number in group.runs)
     mark = "(SYNTHETIC)" if len(made_up) > 1 and own and not group.told_apart else ""
-    axes.set_title(Sentences(Sentences(title, mark), group.conditions_text, between="\n"), loc="left", fontsize=8)
+    conditions = Text("{conditions:n}", conditions=group.conditions_text)
+    axes.set_title(Sentences(Sentences(title, mark), conditions, between="\n"), loc="left", fontsize=8)
     axes.legend(
         loc="upper left",
         bbox_to_anchor=(-0.09, -0.44 / height),

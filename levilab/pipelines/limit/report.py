@@ -130,7 +130,10 @@ def limit_part(analysis: LimitAnalysis) -> ReportPart:
         heading="Limits of the spin of a levitated top",
         lead=how_many(n, "top"),
         result=(
-            Paragraph(Sentences(*(text for group in analysis.groups for text in _meaning(group))), "What it means."),
+            Paragraph(
+                Sentences(*dict.fromkeys(text for group in analysis.groups for text in _meaning(group))),
+                "What it means.",
+            ),
             Tabular("limit-statistics", runs_table(analysis), _STATISTICS, first_column_wraps=True),
         ),
         figure=FigureText(

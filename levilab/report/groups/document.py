@@ -44,7 +44,7 @@ from levilab.report.beside import (
     statistics_of_agreement,
     verdict,
 )
-from levilab.report.document import Results, banner_of, count_inputs
+from levilab.report.document import Results, banner_of, count_inputs, count_notes
 from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, write_content, writing_report
 from levilab.report.reproduction import Heading, language_option
@@ -78,15 +78,20 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str) -
     classes = sorted(classes, key=lambda of: -len(of.groups))  # what one group alone measured comes last
     alone = len(classes) == 1
     warnings = dict.fromkeys(unquote(in_language(text)).replace("`", "") for text in _left_out(classes))
-    of_all = [Warnings(tuple((text,) for text in warnings))] if warnings else []
+    notes = [Section("Notes", (Warnings(tuple((text,) for text in warnings)),), anchor="notes")] if warnings else []
     chapters: list[Block] = []
     for k, of in enumerate(classes):
         own = tuple(_blocks(of, deeper=not alone))
         chapters += own if alone else [Section(_subject(of), own, anchor=of.analysis.name, new_page=k > 0)]
     return Document(
         title=Text("Class of {groups}", groups=count_sources(sources)),
-        lead=Text("{inputs}: {subjects}", inputs=count_inputs(sources), subjects=tuple(map(_subject, classes))),
-        blocks=(*of_all, *chapters, _made_by(paths, name)),
+        lead=Text(
+            "{inputs}: {subjects}, {notes}",
+            count_inputs(sources),
+            tuple(map(_subject, classes)),
+            count_notes(len(warnings)),
+        ),
+        blocks=(*chapters, *notes, _made_by(paths, name)),
         banner=banner_of(sources),
         contents=True,
     )
@@ -140,7 +145,7 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
         yield section("Remarks of the analysis", "remarks", Facts(remarks))
     if any(group.source.note for group in of.groups):
         notes = tuple(Fact(group.source.name, (group.source.note,)) for group in of.groups if group.source.note)
-        yield section("Notes of the groups", "notes", Facts(notes))
+        yield section("Notes of the groups", "notes-of-groups", Facts(notes))
 
 
 def _marks(of: Class) -> Iterator[Tabular]:

@@ -79,3 +79,10 @@ def test_no_english_text_is_left_in_a_german_figure(name, path):
     for axes in figure.axes:
         label, room = axes.yaxis.label.get_window_extent(), axes.get_window_extent()
         assert label.height <= room.height
+
+
+@pytest.mark.usefixtures("german")
+def test_the_conditions_above_a_figure_of_limits_have_german_numbers():
+    limit = ANALYSES["limit"]
+    as_png(figure := limit.figure(limit.analyze([SAMPLE_DATA / "upper-limits"])))
+    assert "24,3 g" in figure.axes[0].get_title(loc="left")

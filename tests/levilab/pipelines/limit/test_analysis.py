@@ -339,3 +339,8 @@ def test_a_scene_that_was_measured_is_the_one_compared_with(sample_data, tmp_pat
 def test_how_often_chance_makes_such_a_difference_is_a_number_of_runs(tmp_path, limits, often):
     (file := tmp_path / "lower.csv").write_text(limits, encoding="utf-8")
     assert re.search(f"By chance alone so large a difference comes {often}", LIMIT.analyze([file]).text)
+
+
+def test_of_limits_under_several_conditions_no_sentence_is_said_twice(sample_data):
+    part = limit_part(LIMIT.analyze([sample_data / "upper-limits", sample_data / "loose-washers"]))
+    assert part.result[0].text.count("From 59.5 to 81 Hz a simulated top") == 1

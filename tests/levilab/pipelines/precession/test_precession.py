@@ -143,6 +143,10 @@ def test_figure_and_page_show_what_was_found(tmp_path):
     found = analysis.analyze([sweep_csv(tmp_path / "mine.csv", half=3), run_with_records(tmp_path / "runs", 0.0)])
     page = render([(analysis, found)])
     assert found.text.split(". ")[0].replace("−", "-") in page.replace("−", "-")
+    meaning = next(
+        block.text for block in PRECESSION.part(found).result if getattr(block, "lead", "") == "What it means."
+    )
+    assert "(p = " not in meaning, "the text above says it"
     assert "mean vector" in page
     assert "half the frequency was counted" in page
     assert "left out" in page

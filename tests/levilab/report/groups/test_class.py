@@ -167,6 +167,8 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
     assert of.quantities[0].mean.value == pytest.approx(2.4e-4, rel=0.03)  # the halved spins have 3.3e-4
     assert [line.get_marker() for axes in class_figure(of).axes for line in axes.lines].count(">") == 1
     page = Page(write_class([root], tmp_path / "class.html", tell=(told := []).append).read_text("utf-8")).text
+    assert "spin-down, 2 notes" in page
+    assert page.index(whose) < page.index("Group 5.csv: ")
     assert "Group 5.csv: a table whose columns are not certain, which no search reads: name the file itself" in page
     assert any("Group 5.csv" in text for text in told)
     assert re.search(r"skipped \S*Group 4.csv, line 1: holds 2 readings.* line 3: '10,abc' is no reading", page)
