@@ -369,13 +369,19 @@ def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Sou
 
 def _with_short_names(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
     """Give the sources names that differ: the last part of the path, or more of it."""
-    for parts in range(1, 10):
-        names = ["/".join(source.path.resolve().parts[-parts:]) for source in sources]
-        if max(Counter(names).values(), default=1) == 1:
-            break
+    names = short_paths([source.path for source in sources])
     named = [_name_for_people(source, name, sources) for source, name in zip(sources, names, strict=True)]
     names = named if len({*named}) == len(named) else names
     return tuple(replace(source, name=name) for source, name in zip(sources, names, strict=True))
+
+
+def short_paths(paths: Sequence[Path]) -> list[str]:
+    """Return the last parts of the paths by which they differ."""
+    for parts in range(1, 10):
+        names = ["/".join(path.resolve().parts[-parts:]) for path in paths]
+        if max(Counter(names).values(), default=1) == 1:
+            break
+    return names
 
 
 #: Letters of a note in the name of a group's run; the report has all of it.

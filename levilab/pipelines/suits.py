@@ -34,6 +34,7 @@ from levilab.pipelines.sources import (
     in_words,
     join,
     number_by_kind,
+    short_paths,
 )
 from levilab.runs.find import RECORD, find_run, find_runs
 from levilab.runs.run import Run
@@ -201,8 +202,8 @@ def _names_of_results(shares: Sequence[Sequence[Written]]) -> dict[Path, str]:
     if len(shares) == 1:
         return {}
     files = [one.file for share in shares for one in share]
-    by_folder = len({file.parent for file in files}) == len(files)
-    return {file: str(file.parent if by_folder else file) for file in files}
+    folders = [file.parent for file in files]
+    return dict(zip(files, short_paths(folders if len({*folders}) == len(files) else files), strict=True))
 
 
 def _with_names_of_results(analysis: Analysis[A], found: A, written: Sequence[Written], names: Mapping[Path, str]) -> A:

@@ -64,14 +64,14 @@ def test_several_results_of_one_file_are_all_shown_and_count_once_in_a_class(tmp
     for folder, laws in zip(folders, [(), ("disc",), ("disc", "newton")], strict=True):
         save(row, row.analyze([file], row.options_from({"laws": laws} if laws else {})), folder)
     page = write_report(folders, tmp_path / "report.html").read_text(encoding="utf-8")
-    assert re.findall(r"<h2>[^<]*top: a.csv \(([^<]*)\)</h2>", page) == [str(folder) for folder in folders]
+    assert re.findall(r"<h2>[^<]*top: a.csv \(([^<]*)\)</h2>", page) == ["x1", "x2", "x4"]
     assert "<h3>a.csv</h3>" in page
     assert re.findall(r"--laws (\S+)", page) == ["disc", "disc,newton"]
     page = write_class(folders, tmp_path / "class.html", tell=(told := []).append).read_text(encoding="utf-8")
     assert "a.csv (" in page
     assert "2 runs" not in page
-    left_out = [text for text in told if f"not counted, as a.csv ({folders[0]}) is a result of the same" in text]
-    assert [text.partition(":")[0] for text in left_out] == [f"a.csv ({folder})" for folder in folders[1:]]
+    left_out = [text for text in told if "not counted, as a.csv (x1) is a result of the same" in text]
+    assert [text.partition(":")[0] for text in left_out] == ["a.csv (x2)", "a.csv (x4)"]
     assert all(text in page for text in left_out)
 
 
