@@ -256,7 +256,7 @@ def _small_print(text: str) -> Html | str:
     """Return small print below a table; a long one opens from a line."""
     said = element("p", words(text), class_="note") if text else ""
     return (
-        element("details", element("summary", in_language("What the columns mean"), class_="note"), said)
+        element("details", element("summary", in_language("About this table"), class_="note"), said)
         if len(text) > _LONG
         else said
     )

@@ -39,6 +39,11 @@ def test_cells_of_a_table_that_stacks_have_their_heads():
     assert [given for tag, given in moved.tags if tag == "td"] == [{}, {}]
 
 
+def test_a_long_note_on_a_table_opens_from_a_line_that_suits_rows_and_columns():
+    long = Tabular("one", table("", ("", "here"), [("a", "b")]), "x" * 300)
+    assert re.search(r"About this table\s*x{300}", Page(page_of(Document("t", "", (long,)))).text)
+
+
 def test_no_text_of_any_block_becomes_markup():
     hostile, tame = Page(page_of(document(EVIL))), Page(page_of(document("word")))
     assert [tag for tag, _ in hostile.tags] == [tag for tag, _ in tame.tags]
