@@ -17,7 +17,7 @@ from levilab.formats.typed import read_masses, read_temperature
 from levilab.present.units import split
 from levilab.settings import hint_about, own_words
 from levilab.simulator.keys import SceneError, parse_setting
-from levilab.texts.text import Sentences, Text, text_of
+from levilab.texts.text import Sentences, Text, text_of, verbatim
 
 _TYPES = {"number": "a number", "integer": "a whole number", "string": "a text", "boolean": "true or false"}
 #: Lists as they are typed, by the type of what stands in them.
@@ -124,7 +124,7 @@ def _one_of(texts: Sequence[str]) -> str:
 
 def _describe_schema(schema: Mapping[str, Any]) -> str:
     if "enum" in schema:
-        return _one_of([Text("{name:s}", name=str(one)) for one in schema["enum"]])
+        return _one_of([verbatim(str(one)) for one in schema["enum"]])
     if schema.get("type") == "array":
         each = _describe_schema(schema["items"])
         example = _LISTS.get(schema["items"].get("type"), "[…]")

@@ -10,7 +10,7 @@ from levilab.cli.options import Json, PageLanguage, argument, existing_paths, fl
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
 from levilab.errors import NoneUsable, UsageError, as_typed
 from levilab.pipelines.options import OF_FILES, read_options
-from levilab.texts.text import Text, in_language
+from levilab.texts.text import Text, in_language, verbatim
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -131,16 +131,16 @@ def _print_look(look: "Look") -> None:
         rows = [
             (
                 str(column.index + 1),
-                column.title,
+                verbatim(column.title),
                 QUANTITIES.get(column.quantity or "", (column.quantity or "–",))[0],
                 _unit_of(column),
-                ", ".join(column.values[:_SHOWN]) + " …" * (len(column.values) > _SHOWN),
+                verbatim(", ".join(column.values[:_SHOWN]) + " …" * (len(column.values) > _SHOWN)),
             )
             for column in run.columns
         ]
         heads = ("column", "title", "understood as", "unit", "first values")
         if rows:
-            title = Text("{name:s} ({holds})", name=name, holds=look.holds) if look.holds else name
+            title = Text("{name:s} ({holds})", name=name, holds=look.holds) if look.holds else verbatim(name)
             console.print(draw(table(title, heads, rows)))
         _print_doubts(look, run)
 

@@ -63,7 +63,7 @@ from levilab.formats.titles import (
 from levilab.formats.transposed import LIES, set_upright, tables_of
 from levilab.texts.note import of_file
 from levilab.texts.text import Text as Said
-from levilab.texts.text import text_of
+from levilab.texts.text import text_of, verbatim
 
 TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: No such top floats far below or above these [Hz], linear theory says 21.65 to 80.6: the unit is in doubt there.
@@ -715,17 +715,15 @@ def _which_columns(layout: Layout, names: Collection[str]) -> Doubt | None:
     numeric = [k for k in range(layout.width) if _numbers(layout, k) and not _is_of_another(title.get(k, ""), names)]
     if not numeric:
         return None
+    shown = {k: verbatim(shorten(title[k])) if k in title else Said("column {number}", k + 1) for k in numeric}
     choices = tuple(
-        Choice(
-            Said("{key:s}: {title}", _key(name), shorten(title[k]) if k in title else Said("column {number}", k + 1)),
-            {_key(name): str(k + 1)},
-        )
+        Choice(Said("{key:s}: {title}", _key(name), shown[k]), {_key(name): str(k + 1)})
         for name in names
         for k in numeric
     )
     if _SPIN in names:
         choices += tuple(
-            Choice(Said("{title}, as turns since the start", title=title.get(k, str(k + 1))), {"f": f"{k + 1} [turns]"})
+            Choice(Said("{title:s}, as turns since the start", title.get(k, str(k + 1))), {"f": f"{k + 1} [turns]"})
             for k in numeric
             if len(counted := _numbers(layout, k)) > 2 and {b - a for a, b in pairwise(counted)} == {1}
         )

@@ -32,7 +32,7 @@ from levilab.runs.find import RECORD, find_runs, no_such_path
 from levilab.runs.run import READINGS, Run
 from levilab.texts.note import Note, Weight, of_file
 from levilab.texts.note import kind_of as kind_of_text
-from levilab.texts.text import Sentences, Text, how_many, text_of
+from levilab.texts.text import Sentences, Text, how_many, text_of, verbatim
 
 #: A file of this name keeps its folder out of searches of the folders above.
 SKIP = ".levilab-skip"
@@ -372,7 +372,7 @@ def _with_short_names(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
     names = short_paths([source.path for source in sources])
     named = [_name_for_people(source, name, sources) for source, name in zip(sources, names, strict=True)]
     names = named if len({*named}) == len(named) else names
-    return tuple(replace(source, name=name) for source, name in zip(sources, names, strict=True))
+    return tuple(replace(source, name=verbatim(name)) for source, name in zip(sources, names, strict=True))
 
 
 def short_paths(paths: Sequence[Path]) -> list[str]:

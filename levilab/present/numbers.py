@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.numbers import digits, with_minus
 from levilab.present.units import unit
-from levilab.texts.text import Text, fields_of
+from levilab.texts.text import Text, fields_of, verbatim
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -210,7 +210,7 @@ def short_name(name: str) -> str:
     >>> short_name("20261120T101500Z-spin-7f3a")
     'spin-7f3a'
     """
-    return re.sub(r"^\d{8}T\d{6}Z-", "", name)
+    return verbatim(re.sub(r"^\d{8}T\d{6}Z-", "", name))
 
 
 def plain(value: float | None, count: int = 3) -> str:

@@ -17,7 +17,7 @@ from levilab.present.tables import table
 from levilab.present.units import split
 from levilab.present.words import setting_in_words, settings_in_words, value_in_words
 from levilab.runs.run import RunRecord
-from levilab.texts.text import Text, in_language, text_from
+from levilab.texts.text import Text, in_language, text_from, verbatim
 
 #: Events printed in the page; more stay in the run folder.
 MOST_EVENTS = 100
@@ -89,7 +89,7 @@ def describe(parts: Sequence[About]) -> Input:
     source = parts[0].source
     own = (_fold_listing(block) for one in parts for block in one.part.blocks)
     return Input(
-        name=source.name if len({one.source.name for one in parts}) == 1 else source.path.name,
+        name=source.name if len({one.source.name for one in parts}) == 1 else verbatim(source.path.name),
         facts=tuple(fact for fact in _facts(source, parts) if any(fact.texts)),
         blocks=(*_changes(source), *_events(source), *with_marks(own, mark_of([source]))),
     )
@@ -116,9 +116,9 @@ def _facts(source: Source[Any], parts: Sequence[About]) -> list[Fact]:
     instruments = [Fact(kind.capitalize(), _instrument(about)) for kind, about in record.instruments.items()]
     return [
         Fact("Synthetic", made_up),
-        Fact("Group", (record.group,) if record.group else ()),
-        Fact("Run", (source.path.name,) if source.path.name != source.name else ()),
-        Fact("Note", (record.note,) if record.note else ()),
+        Fact("Group", (verbatim(record.group),) if record.group else ()),
+        Fact("Run", (verbatim(source.path.name),) if source.path.name != source.name else ()),
+        Fact("Note", (verbatim(record.note),) if record.note else ()),
         Fact("Temperature", () if record.temperature_c is None else (f"{record.temperature_c:g} °C",)),
         Fact("Washers", () if record.washers_kg is None else (washers_text(record.washers_kg),)),
         Fact("When", (*_when(record), *_local_start(source))),

@@ -115,6 +115,15 @@ class Sentences(Text):
         return tuple(self.values.values())
 
 
+def verbatim(text: str) -> str:
+    """Return a text of a person, such as a name or a title, which stands in each language as it was typed.
+
+    >>> in_language("result", "de"), in_language(verbatim("result"), "de")
+    ('Ergebnis', 'result')
+    """
+    return Text("{text:s}", text)
+
+
 def how_many(n: int, noun: str) -> str:
     """Return a number of things, which other languages can say.
 

@@ -26,7 +26,7 @@ from levilab.pipelines.sources import Weighed, note_of
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.units import name_with_unit
 from levilab.texts.note import reword
-from levilab.texts.text import Sentences, Text
+from levilab.texts.text import Sentences, Text, verbatim
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ def law_names(laws: Iterable[str], power: str = "power") -> str:
 
 def short_law(law: str) -> str:
     """Return the name of a drag law where room is short."""
-    return Text("{name:s}", name=_PERSONS[law]) if law in _PERSONS else law.capitalize()
+    return verbatim(_PERSONS[law]) if law in _PERSONS else law.capitalize()
 
 
 def verdict_of_run(run: SpinDown) -> str:

@@ -50,7 +50,7 @@ from levilab.report.page import FORMATS, UnknownFormat, newest_of, write_content
 from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
 from levilab.texts.note import of_file
-from levilab.texts.text import Sentences, Text, in_language, spoken
+from levilab.texts.text import Sentences, Text, in_language, spoken, verbatim
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -143,8 +143,9 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
     pairs = zip(of.groups, of.marks, strict=True)
     if remarks := tuple(Fact(group.source.name, one.notes) for group, one in pairs if one.notes):
         yield section("Remarks of the analysis", "remarks", Facts(remarks))
-    if any(group.source.note for group in of.groups):
-        notes = tuple(Fact(group.source.name, (group.source.note,)) for group in of.groups if group.source.note)
+    noted = [group.source for group in of.groups if group.source.note]
+    if noted:
+        notes = tuple(Fact(source.name, (verbatim(source.note),)) for source in noted)
         yield section("Notes of the groups", "notes-of-groups", Facts(notes))
 
 

@@ -71,6 +71,15 @@ def test_an_answer_is_kept_analyzed_and_reported(doubtful):
     assert (again.status, "is read as my.csv.levilab.toml says" in again.out) == (0, True)
 
 
+def test_no_title_of_a_file_is_translated(tmp_path):
+    """Each has a German word in the table of texts."""
+    (tmp_path / "my.csv").write_text("time [s],spin [Hz],readings,result\n0,38,1,time\n9,37,2,time\n", "utf-8")
+    shown = command("open", "my.csv", "--language", "de", cwd=tmp_path).out
+    assert all(title in shown for title in ("time [s]", "spin [Hz]", "readings", "result", "time, time"))
+    (tmp_path / "p.csv").write_text("readings,micros\n" + "".join(f"{n},{26316 * n}\n" for n in range(9)), "utf-8")
+    assert "readings, als Umdrehungen seit" in command("open", "p.csv", "--language", "de", cwd=tmp_path).out
+
+
 def test_a_note_on_the_file_is_said_once(tmp_path):
     (tmp_path / "my.csv").write_text("t [s],f [Hz],f_std [Hz]\n" + "0,38,1\n9,37,1\n19,36,1\n30,35,1\n", "utf-8")
     ended = command("open", "my.csv", cwd=tmp_path)

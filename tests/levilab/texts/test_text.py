@@ -31,7 +31,7 @@ from levilab.pipelines.precession.words import miscount_as_text
 from levilab.pipelines.sources import OTHER_COLUMNS
 from levilab.pipelines.tune.advice import MET
 from levilab.present.document.blocks import in_language_of_reader
-from levilab.present.numbers import with_uncertainty
+from levilab.present.numbers import short_name, with_uncertainty
 from levilab.present.tables import table
 from levilab.present.units import split
 from levilab.present.words import settings_in_words
@@ -236,8 +236,8 @@ def test_a_name_keeps_its_point_and_a_number_gets_a_comma():
     assert in_language(listed, "de") == "1,5; 2,0 Hz and 0,12(3) Hz"
     said = Text("{name}: {value}", name="d0.1.csv", value=with_uncertainty(Estimate(39.853, 0.031, "Hz")))
     assert in_language(said, "de") == "d0.1.csv: 39,853(31) Hz"
-    shown = table("", ["input", "spin"], [["z1.5.csv", "1.50"]], numbers=["spin"])
-    assert in_language_of_reader(shown, "de").rows[0].cells == ("z1.5.csv", "1,50")
+    shown = table("", ["input", "spin"], [["z1.5.csv", "1.50"], [short_name("result"), "—"]], numbers=["spin"])
+    assert [row.cells for row in in_language_of_reader(shown, "de").rows] == [("z1.5.csv", "1,50"), ("result", "—")]
     drive = settings_in_words({"output": False, "frequency_hz": 49.4925, "amplitude_vpp": 4.9654, "burst_phase_deg": 9})
     assert in_language(drive, "de") == "Ausgang aus; letzter Antrieb 49,4925 Hz; 4,9654 Vss; Startphase des Bursts 9 °"
     over = Text("{longest:g} s are over ({experiment:s}.longest_s)", longest=9, experiment="sway")
