@@ -7,7 +7,7 @@ folder is for the analyses of the runs and files in it.  A result that was writt
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -107,7 +107,7 @@ def recall_suiting(
     """
     errors: list[DataError] | None = [] if skips else None
     places, written = _split(paths)
-    shares = _without_shared_inputs(written)
+    shares = _without_shared_inputs(written, [*_results_of(places)])
     names = _names_of_results(shares)
     done = []
     for k, results in enumerate(shares):
@@ -181,15 +181,23 @@ def _skipping(errors: list[DataError] | None) -> Iterator[None]:
         errors.append(error)
 
 
-def _without_shared_inputs(written: Sequence[Written]) -> list[list[Written]]:
-    """Return the results in lists, in none of which an analysis has an input twice."""
-    shares: list[list[Written]] = [[]]
-    for one in {one.file.resolve(): one for one in written}.values():
+def _results_of(places: Sequence[Path]) -> Iterator[Written]:
+    """Yield the results that lie in folders and beside data files; a damaged one is for who reads it."""
+    for place in places:
+        with suppress(ResultError):
+            found = results_in(place if place.is_dir() else place.parent)
+            yield from (one for one in found if place.is_dir() or place.resolve() in map(Path.resolve, one.inputs))
+
+
+def _without_shared_inputs(written: Sequence[Written], of_places: list[Written]) -> list[list[Written]]:
+    """Return the results in lists, in none of which an analysis has an input twice; the first one is with places."""
+    shares, files = [[*of_places]], {one.file.resolve() for one in of_places}
+    for one in {one.file.resolve(): one for one in written if one.file.resolve() not in files}.values():
         free = (share for share in shares if not any(_share_inputs(one, other) for other in share))
         if (share := next(free, None)) is None:
             shares.append(share := [])
         share.append(one)
-    return shares
+    return [shares[0][len(of_places) :], *shares[1:]]
 
 
 def _share_inputs(one: Written, other: Written) -> bool:

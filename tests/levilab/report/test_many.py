@@ -102,3 +102,14 @@ def test_an_input_that_cannot_be_used_is_named_and_ends_nothing(tmp_path, write,
         assert len(re.findall(f"skipped {root / name}.{{0,99}}{doubt}", page)) == 1
     assert "group-1" in page
     assert "good.csv" in page
+
+
+@pytest.mark.usefixtures("undrawn_figures")
+def test_a_file_with_a_result_and_another_result_of_it_are_both_shown(tmp_path):
+    file = shutil.copy(SAMPLE_DATA / "spin-down-1" / "readings.csv", tmp_path / "a.csv")
+    row = ANALYSES["spindown"]
+    own, *_ = save(row, row.analyze([file]))
+    save(row, row.analyze([file], row.options_from({"laws": ("disc",)})), tmp_path / "x2")
+    paths = [tmp_path / "a.csv", own, tmp_path / "x2"]
+    page = write_report(paths, tmp_path / "report.html").read_text(encoding="utf-8")
+    assert re.findall(r"<h2>[^<]*top: (a.csv[^<]*)</h2>", page) == ["a.csv", "a.csv (x2)"]
