@@ -18,6 +18,7 @@ from levilab.formats.understanding import understand
 from levilab.pipelines.correction import ENDING, read_correction, read_file_options, write_correction
 from levilab.pipelines.look import Look, look_as_kept, look_at
 from levilab.pipelines.options import read_options
+from levilab.pipelines.result import relative
 from levilab.texts.text import Text, text_of
 
 #: The largest file that is taken in [bytes]: an hour of sound, two million rows of an oscilloscope.
@@ -175,7 +176,7 @@ class Opened:
             wanted = Text("a film: the diameter of the top's rim, which is its scale, is wanted below")
             look, problem = Look(one.path, size, ()), {"problem": wanted}
         of_film = {} if one.rim_mm is None else {"rim_mm": one.rim_mm}
-        about = {"file": key, "options": used | of_film, "film": bool(size)}
+        about = {"file": key, "options": used | of_film, "film": bool(size), "typed": relative(one.path, Path.cwd())}
         return look.as_dict() | about | {"words": [*one.words, *one.words_of_film]} | problem
 
     def keep(self, key: str) -> str:

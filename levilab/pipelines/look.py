@@ -14,7 +14,7 @@ from levilab.errors import LevilabError
 from levilab.formats.columns import Choice, Doubt, DoubtfulRows
 from levilab.formats.table import read_table
 from levilab.formats.texts import locate
-from levilab.formats.titles import COMPONENTS, MAGNITUDE
+from levilab.formats.titles import COMPONENTS, MAGNITUDE, dimension
 from levilab.formats.understanding import UnderstoodColumn, UnderstoodRun, understand
 from levilab.formats.waveforms.header import NoWaveform
 from levilab.formats.waveforms.record import read_record
@@ -50,6 +50,8 @@ _TABLES = (
 _SPIN_DOWN = _TABLES[2]
 #: Points of a small plot at most, the samples that it shows, and the largest table that is read for it [bytes].
 _POINTS, _SAMPLES, _LARGEST = 400, 4000, 30 << 20
+#: Dimensions that a small plot shows in the unit of the file.
+_IN_OWN_UNIT = frozenset({"flux density", "length"})
 #: First values of a record.
 _SHOWN = 5
 
@@ -88,12 +90,12 @@ class Look:
     problem: str = ""
     channels: tuple[str, ...] = ()
     rate: float | None = None
-    plots: Mapping[int, Plot] = field(default_factory=dict)
+    plots: Mapping[int, tuple[Plot, ...]] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as JSON has it."""
         runs = [{**asdict(run), "path": str(run.path)} for run in self.runs]
-        plots = {str(number): asdict(plot) for number, plot in self.plots.items()}
+        plots = {str(number): [asdict(plot) for plot in drawn] for number, drawn in self.plots.items()}
         about = {"path": str(self.path), "name": name_of(self.path), "holds": self.holds, "problem": self.problem}
         return about | {"channels": list(self.channels), "rate": self.rate, "runs": runs, "plots": plots}
 
@@ -160,10 +162,10 @@ def _look_at_table(path: Path, options: Mapping[str, Any], *, plots: bool) -> Lo
     if not plots:
         return Look(path, _count_tables(found.runs), found.runs)
     given = {name: options[name] for name in ("columns", "skip_doubtful") if options.get(name)}
-    runs, drawn = list(found.runs), dict[int, Plot | None]()
+    runs, drawn = list(found.runs), dict[int, tuple[Plot, ...]]()
     for k, run in enumerate(runs):
         try:
-            drawn[k] = _plot_of_table(run, given, wanted)
+            drawn[k] = _plots_of_table(run, given, wanted)
         except DoubtfulRows as error:
             doubt = Doubt("rows", text_of(error), None, (Choice(Text("Leave such rows out"), {}),))
             runs[k] = replace(run, doubts=(doubt,), problem=doubt.text)
@@ -186,19 +188,31 @@ def _with_known_columns(
     return tuple(replace(run, columns=found.get(run.path, run.columns)) for run in runs)
 
 
-def _plot_of_table(run: UnderstoodRun, given: Mapping[str, Any], wanted: tuple[Any, Any]) -> Plot | None:
-    """Return the first two quantities of a table, one against the other; None: too large.  Raises LevilabError."""
+def _plots_of_table(run: UnderstoodRun, given: Mapping[str, Any], wanted: tuple[Any, Any]) -> tuple[Plot, ...]:
+    """Return the first two quantities of a table, or each component of a field, against the first.
+
+    Fields and lengths stay in the unit of the file; a spin in Hz shows whether its unit was understood.  A table that
+    is too large has none.  Raises LevilabError.
+    """
     if run.problem or (run.path.is_file() and run.path.stat().st_size > _LARGEST):
-        return None
+        return ()
     table = read_table(run.path, quantities=wanted[0], needed=wanted[1], **given)
     names = [name for name in wanted[0] if name in table.columns and name in QUANTITIES]
-    if "drive_frequency_hz" in wanted[1]:
-        names = list(wanted[1])
-    y = table.columns[names[1] if len(names) > 1 else names[0]]
-    x = table.columns[names[0]] if len(names) > 1 else np.arange(1.0, len(y) + 1)
-    step = max(1, -(-len(y) // _POINTS))
-    axes = [(QUANTITIES[name][0], QUANTITIES[name][1][0]) for name in names[:2]]
-    return Plot(tuple(x[::step].tolist()), tuple(y[::step].tolist()), *([("reading", ""), *axes][-2:]))
+    first, *others = wanted[1] if "drive_frequency_hz" in wanted[1] else names
+    count = len(table.columns[first])
+    step = max(1, -(-count // _POINTS))
+    of_file = {one.quantity: one for one in run.columns if one.quantity and dimension(one.quantity) in _IN_OWN_UNIT}
+
+    def points(name: str) -> tuple[tuple[float, ...], tuple[str, str]]:
+        words, (unit, *_) = QUANTITIES[name]
+        own = of_file.get(name)
+        values = table.columns[name][::step] / (own.factor if own else 1.0)
+        return tuple(values.tolist()), (words, own.unit if own else unit)
+
+    x, x_axis = points(first) if others else (tuple(range(1, count + 1, step)), ("reading", ""))
+    components = [name for name in others if dimension(name) == "flux density" and name != MAGNITUDE]
+    drawn = components or others[:1] or [first]
+    return tuple(Plot(x, y, x_axis, y_axis) for y, y_axis in map(points, drawn))
 
 
 def _look_at_record(path: Path, record: Waveform | PulseTimes, channel: str | None) -> Look:
@@ -211,10 +225,10 @@ def _look_at_record(path: Path, record: Waveform | PulseTimes, channel: str | No
         plot = Plot(tuple(record.times[1 : len(turns) + 1].tolist()), tuple((1 / turns).tolist()),
                     ("time", "s"), ("1 / time between pulses", "Hz"))  # fmt: skip
         holds = Text("{n} times of pulses ({format:s})", n=len(record.times), format=record.format)
-        return Look(path, holds, (run,), plots={0: plot})
+        return Look(path, holds, (run,), plots={0: (plot,)})
     chosen = record.signal(channel)
     columns: list[UnderstoodColumn] = []
-    plots: dict[int, Plot] = {}
+    plots: dict[int, tuple[Plot, ...]] = {}
     for k, signal in enumerate(record.signals):
         first = next(islice(record.read(k), 1), np.zeros(0))[:_SAMPLES]
         values = tuple(digits(value, 4) for value in first[:_SHOWN])
@@ -223,7 +237,7 @@ def _look_at_record(path: Path, record: Waveform | PulseTimes, channel: str | No
         if k == chosen:
             times = record.times_of(0, len(first))
             axes = (("time", "s"), (signal.name, signal.unit))
-            plots[0] = Plot(tuple(times.tolist()), tuple(first.tolist()), *axes)
+            plots[0] = (Plot(tuple(times.tolist()), tuple(first.tolist()), *axes),)
     run = UnderstoodRun(path, "", 0, tuple(columns), warnings=record.warnings)
     rate, said = digits(record.rate, 6), "{format:s}: {seconds:n} s, {rate:n} samples a second"
     holds = Text(said, format=record.format, seconds=digits(record.duration, 3), rate=rate)

@@ -84,7 +84,7 @@ function show() {
   by("keep").disabled = Boolean(look.problem) || !look.words.length || Boolean(look.options.rim_mm);
   by("again").disabled = !look.words.length;
   by("command").parentElement.hidden = asks;
-  write("command", ["levilab analyze", look.name, ...look.words].map((word, k) => k && /[^\w.,=/-]/.test(word) ? `"${word}"` : word).join(" "));
+  write("command", ["levilab analyze", look.typed, ...look.words].map((word, k) => k && /[^\w.,=/-]/.test(word) ? `"${word}"` : word).join(" "));
   const used = look.runs.flatMap(({columns}) => columns).filter(({quantity}) => quantity).map(({title, quantity, unit}) => phrase("{column} is {quantity} in {unit}", {column: title || phrase("a column"), quantity: wordsOf(quantity), unit}));
   write("news", inWords(look.problem) || `${look.name}: ${used.join(", ")}`);
 }
@@ -133,11 +133,10 @@ function runOf(run, number) {
   body.append(...run.columns.map((column) => rowOf(column, run)));
   table.append(make("caption", phrase("columns of {name}", {name: run.name || look.name}), "hidden"), top, body);
   box.append(table);
-  if (look.plots[number]) {
+  for (const [k, {x, x_axis: [xName], y_axis: [yName]}] of (look.plots[number] || []).entries()) {
     const canvas = make("canvas");
-    canvas.id = `plot-${number}`;
+    canvas.id = `plot-${number}-${k}`;
     canvas.setAttribute("role", "img");
-    const {x, x_axis: [xName], y_axis: [yName]} = look.plots[number];
     canvas.setAttribute("aria-label", phrase("{count} points: {y} against {x}", {count: x.length, y: phrase(yName), x: phrase(xName)}));
     box.append(canvas);
   }
@@ -225,15 +224,15 @@ by("samples").addEventListener("click", async ({target: {value: name}}) => {
   if (name) await takeFiles([new File([await (await fetch(`page/${name}`)).blob()], name)], token, open, (text) => write("said", text));
 });
 
-// --- the small plot ---
+// --- the small plots ---
 
 function draw(number) {
-  const canvas = by(`plot-${number}`), plot = look.plots[number];
-  if (!canvas) return;
-  const values = Float64Array.from(plot.y);
-  drawReadings(sheet(canvas), {
-    x: Float64Array.from(plot.x), low: values, high: values, u: null, fit: null, single: true, xAxis: [...plot.x_axis, 1], yAxis: [...plot.y_axis, 1],
-  }, -1);
+  for (const [k, plot] of (look.plots[number] || []).entries()) {
+    const canvas = by(`plot-${number}-${k}`), values = Float64Array.from(plot.y);
+    if (canvas) drawReadings(sheet(canvas), {
+      x: Float64Array.from(plot.x), low: values, high: values, u: null, fit: null, single: true, xAxis: [...plot.x_axis, 1], yAxis: [...plot.y_axis, 1],
+    }, -1);
+  }
 }
 new ResizeObserver(() => look?.runs.forEach((_, k) => draw(k))).observe(by("runs"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => look?.runs.forEach((_, k) => draw(k)));

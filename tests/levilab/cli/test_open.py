@@ -140,7 +140,8 @@ def test_a_record_shows_its_channels_and_the_chosen_one():
     look = look_at(ROOT / "sample_data" / "scope-files" / "rigol-ds1000z.csv", {"channel": "2"})
     assert look.problem == ""
     assert [column.quantity for column in look.runs[0].columns][:2] == [None, "signal"]
-    assert len(look.plots[0].x) == len(look.plots[0].y) > 100
+    (plot,) = look.plots[0]
+    assert len(plot.x) == len(plot.y) > 100
 
 
 def test_several_runs_side_by_side_are_shown_each():

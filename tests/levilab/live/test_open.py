@@ -14,6 +14,7 @@ import pytest
 from levilab.errors import UsageError
 from levilab.live.opened import LONGEST_NAME, MOST_FILES, Opened, OpenedFile, plain_name
 from levilab.pipelines.correction import read_correction
+from levilab.pipelines.look import look_at
 from levilab.texts.text import Text, as_tables
 from support.browser import PHONE
 from support.live_pages import PATIENCE_S, address, carry_out_here, request, serving, until, wait_for
@@ -62,7 +63,7 @@ def test_a_file_is_dropped_corrected_kept_and_analyzed(hall, watched, monkeypatc
     until(page, "levilab.look.options.columns?.f")
     page.get_by_role("button", name="ms (3 min)").press("Enter")
     until(page, "levilab.look.plots['0']")
-    assert page.evaluate("levilab.look.plots['0'].y[0]") == pytest.approx(38, abs=0.01)
+    assert page.evaluate("levilab.look.plots['0'][0].y[0]") == pytest.approx(38, abs=0.01)
     assert page.get_by_label("unit of Wert").input_value() == "rad/s"
     assert '--columns "t=1 [ms],f=2 [rad/s]"' in page.inner_text("#command")
     page.get_by_role("button", name="Keep for the next time").press("Enter")
@@ -130,6 +131,8 @@ def test_an_answer_is_shown_in_one_order_and_nothing_before_it_is_whole(hall, wa
     go_on["analyze"].set()
     until(page, "document.getElementById('writing').textContent.startsWith('The report is being')")
     until(page, f"JSON.stringify({ANSWER}) === '[1,2,1,1,1,false,true]'")
+    sizes = "['clientWidth', 'scrollWidth'].map((name) => document.getElementById('figures')[name])"
+    assert len({*page.evaluate(sizes)}) == 1  # nothing is cut
     assert page.inner_text("#verdict") == "The disc law fits.\n\nC = 2.34(1)."
     assert not page.locator("#verdict-more").is_visible()  # in a fold
     assert page.locator("#progress").is_visible()
@@ -155,9 +158,9 @@ def test_a_choice_in_the_table_changes_how_it_is_read(hall, watched):
     until(page, "document.querySelector('.doubt')?.textContent.startsWith('three.csv, line 5: ')")
     assert page.get_by_role("button", name="Analyze").is_disabled()
     page.get_by_role("button", name="Leave such rows out").click()
-    until(page, "levilab.look.plots['0']?.y[0] < 40")
+    until(page, "levilab.look.plots['0']?.[0].y[0] < 40")
     assert page.inner_text("#command").endswith(" --skip-doubtful")
-    assert page.evaluate("levilab.look.plots['0'].y[0]") == pytest.approx(38, abs=0.01)
+    assert page.evaluate("levilab.look.plots['0'][0].y[0]") == pytest.approx(38, abs=0.01)
     assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     page.get_by_role("button", name="Undo corrections").click()
     until(page, "levilab.look.problem")
@@ -295,7 +298,7 @@ def test_a_film_is_followed_in_its_pictures_once_its_scale_is_known(hall, watche
     page.get_by_label("Rim of the top").fill("30")
     page.get_by_label("Rim of the top").press("Enter")
     until(page, "levilab.look.options.rim_mm === 30")
-    assert page.inner_text("#command") == "levilab analyze top.mp4 --rim 30"
+    assert page.inner_text("#command").endswith("top.mp4 --rim 30")
     assert not page.inner_text("#problem")
     page.get_by_role("button", name="Analyze").press("Enter")
     wait_for(lambda: len(asked) == 2)
@@ -303,6 +306,22 @@ def test_a_film_is_followed_in_its_pictures_once_its_scale_is_known(hall, watche
     assert asked[1][:2] == ["report", str(film)]
     with pytest.raises(UsageError, match="a diameter in mm"):
         hall.opened.look(key, {"rim_mm": "wide"})
+
+
+def test_a_dropped_file_is_typed_from_the_folder_of_the_command(tmp_path, monkeypatch):
+    opened = Opened(tmp_path / "lab" / "opened")
+    key = asyncio.run(opened.receive("my.csv", _pieces(b"t [s],f [Hz]\n0,38\n9,37\n")))
+    for here, typed in (("lab", "opened/my.csv"), ("lab/opened", "my.csv"), ("", "lab/opened/my.csv")):
+        monkeypatch.chdir(tmp_path / here)
+        assert opened.look(key)["typed"] == typed
+
+
+def test_a_field_is_drawn_in_its_own_unit_each_component(tmp_path):
+    rows = "".join(f"{n / 100},{30 + n},{40 + n},-20\n" for n in range(50))
+    (tmp_path / "my.csv").write_text(f"t (s),Bx (µT),By (µT),Bz (µT)\n{rows}", "utf-8")
+    drawn = look_at(tmp_path / "my.csv", {}).plots[0]
+    assert {plot.y_axis[1] for plot in drawn} == {"µT"}
+    assert [plot.y[0] for plot in drawn] == pytest.approx([30, 40, -20])
 
 
 def test_the_words_of_a_file_are_options_of_the_command_line(tmp_path):
