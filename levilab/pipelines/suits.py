@@ -2,7 +2,8 @@
 
 A run is for the analyses of its experiment; where there are none, for those that take its records.  A data file is for
 the analyses that read it; where one of them reads it by columns that no other analysis reads, for that one alone.  A
-folder is for the analyses of the runs and files in it.  A result that was written before says itself what suits.
+folder is for the analyses of the runs and files in it.  A result that was written before says itself what suits; beside
+inputs without one its input is for their analyses, too, or it would be missing in what they are compared by.
 """
 
 from collections import Counter
@@ -42,6 +43,9 @@ from levilab.texts.note import of_file
 from levilab.texts.text import Text, how_many, text_of
 
 Tell = Callable[[str], None]
+#: An input as each analysis takes it; and such inputs → the analyses that each of them gets.
+Taken = Mapping[str, Source[Any]]
+Choose = Callable[[Sequence[Taken]], list[Collection[str]]]
 T = TypeVar("T")
 
 
@@ -77,7 +81,7 @@ def suiting(paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None =
         chosen = analysis.options_from(given)
         return lambda _: chosen
 
-    return _suiting([find_run(path) for path in paths], options, _made_for, tell)
+    return _suiting([find_run(path) for path in paths], options, _each_made_for, tell)
 
 
 def analyze_suiting(
@@ -157,8 +161,11 @@ def _recall(
                 raise
             return otherwise
 
-    def choose(source: Source[Any], takers: Collection[str]) -> Collection[str]:
-        return [name for name in takers if has_result(name, source)] or _made_for(source, takers)
+    def choose(inputs: Sequence[Taken]) -> list[Collection[str]]:
+        stored = [{name for name, source in taken.items() if has_result(name, source)} for taken in inputs]
+        each = list(zip(stored, _each_made_for(inputs), strict=True))
+        of_others = {name for own, suiting in each if not own for name in suiting}
+        return [own | of_others.intersection(suiting) if own else suiting for own, suiting in each]
 
     results = {name: [path for one in of for path in one.inputs] for name, of in own.items()}
     done = []
@@ -243,13 +250,17 @@ def _split(paths: Sequence[Path]) -> tuple[list[Path], list[Written]]:
 # --- the rule ------------------------------------------------------------------------------------------
 
 
-def _made_for(source: Source[Any], takers: Collection[str]) -> Collection[str]:
+def _each_made_for(inputs: Sequence[Taken]) -> list[Collection[str]]:
+    return [_made_for(taken) for taken in inputs]
+
+
+def _made_for(taken: Taken) -> Collection[str]:
     """Return those of the analyses which take an input that are made for it."""
-    rows = catalogue.ANALYSES
-    if source.run:
-        own = _of_experiment(source.run)
-        return [name for name in takers if name in own] if own else takers
-    return [name for name in takers if rows[name].particular] or takers
+    run = next(iter(taken.values())).run
+    if run:
+        own = _of_experiment(run)
+        return [name for name in taken if name in own] if own else taken
+    return [name for name in taken if catalogue.ANALYSES[name].particular] or taken
 
 
 def _of_experiment(run: Run) -> list[str]:
@@ -259,7 +270,7 @@ def _of_experiment(run: Run) -> list[str]:
 def _suiting(
     paths: Sequence[Path],
     options: Callable[[Analysis[Any]], Callable[[Path], InputOptions]],
-    choose: Callable[[Source[Any], Collection[str]], Collection[str]],
+    choose: Choose,
     tell: Tell | None,
     more: Mapping[str, Sequence[Path]] | None = None,
     *,
@@ -270,7 +281,7 @@ def _suiting(
     Args:
         paths: run folders, data files, folders to search.
         options: an analysis → how it reads an input.
-        choose: an input, and the analyses that take it → those that get it.
+        choose: which of them each input gets.
         tell: see `suiting`.
         more: analysis → paths that are for it alone.
         skipped: where the errors of paths that are skipped go; None: no path is skipped.
@@ -279,15 +290,16 @@ def _suiting(
     readers = {name: options(row) for name, row in rows.items()}
     taken: dict[str, list[tuple[Path, Found[Any]]]] = {name: [] for name in rows}
     unusable: list[NoneUsable] = []
+    looks: list[tuple[Path, dict[str, Found[Any]]]] = []
     for path in paths:
         with _skipping(skipped):
             found, errors = _look(path, readers)
-            chosen = _chosen(found, choose)
-            if not chosen:
+            if not found:
                 raise _refusal(path, errors)
             unusable += [error for error in errors.values() if isinstance(error, NoneUsable)]
-            for name, one in chosen.items():
-                taken[name].append((path, one))
+            looks.append((path, found))
+    for path, name, one in _chosen(looks, choose):
+        taken[name].append((path, one))
     for name, inputs in (more or {}).items():
         for path in inputs:
             with _skipping(skipped):
@@ -303,6 +315,21 @@ def _suiting(
         if tell and file not in used and reason not in said:
             tell(reason)
     return done
+
+
+def _chosen(
+    looks: Sequence[tuple[Path, dict[str, Found[Any]]]], choose: Choose
+) -> Iterator[tuple[Path, str, Found[Any]]]:
+    """Yield what each analysis found at each path, with the inputs that it gets, where it gets any."""
+    found = [(path, name, one) for path, at in looks for name, one in at.items()]
+    inputs: dict[Path, dict[str, Source[Any]]] = {}
+    for _, name, one in found:
+        for source in one.sources:
+            inputs.setdefault(source.path, {})[name] = source
+    chosen = dict(zip(inputs, choose([*inputs.values()]), strict=True))
+    for path, name, one in found:
+        if own := tuple(source for source in one.sources if name in chosen[source.path]):
+            yield path, name, replace(one, sources=own)
 
 
 def _look(
@@ -321,21 +348,6 @@ def _look(
         except AnalysisError as error:
             errors[name] = DataError("{path:s}: {error}", path=path, error=error)
     return found, errors
-
-
-def _chosen(
-    found: Mapping[str, Found[Any]], choose: Callable[[Source[Any], Collection[str]], Collection[str]]
-) -> dict[str, Found[Any]]:
-    """Return what was found, each input with the analyses that get it."""
-    takers: dict[Path, list[str]] = {}
-    for name, one in found.items():
-        for source in one.sources:
-            takers.setdefault(source.path, []).append(name)
-    parts = {
-        name: replace(one, sources=tuple(s for s in one.sources if name in choose(s, takers[s.path])))
-        for name, one in found.items()
-    }
-    return {name: one for name, one in parts.items() if one.sources}
 
 
 def _refusal(path: Path, errors: Mapping[str, DataError]) -> DataError:

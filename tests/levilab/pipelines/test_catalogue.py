@@ -211,3 +211,19 @@ def test_what_makes_an_answer_doubtful_comes_before_it():
     assert [type(block).__name__ for block in result.blocks[:2]] == ["Warnings", "Verdict"]
     assert "LOOSE WASHERS" in repr(result.blocks[0])
     assert not any("LOOSE WASHERS" in repr(section) for section in others if section.title == "Notes")
+
+
+@pytest.mark.usefixtures("two")
+def test_a_result_of_one_analysis_takes_no_input_from_those_of_the_others(tmp_path):
+    """Beside an input without results; where each has one, these are what a person asked for."""
+    one, other = (spin_down_csv(tmp_path / name, seed=k) for k, name in enumerate(("a.csv", "b.csv")))
+    row = catalogue.ANALYSES["second"]
+    save_found(row, row.analyze([one]))
+
+    def inputs(*paths):
+        return {row.name: [source.name for source in found.sources] for row, found in recall_suiting(paths, {})}
+
+    assert inputs(one) == {"second": ["a.csv"]}
+    assert inputs(one, other) == inputs(tmp_path) == {"spindown": ["a.csv", "b.csv"], "second": ["a.csv", "b.csv"]}
+    save_found(row, row.analyze([other]))
+    assert inputs(tmp_path) == {"second": ["a.csv", "b.csv"]}
