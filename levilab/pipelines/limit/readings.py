@@ -12,6 +12,7 @@ from analysis.arrays import Array
 from analysis.errors import AnalysisError
 from analysis.limits import U_OF_WAY, spin_at_fall
 from analysis.rotation import track_of_field
+from analysis.spindown.fall import STOPPED_ABOVE_HZ
 from levilab.errors import DoesNotSuit
 from levilab.formats.columns import NoSuchColumn, NoTable, TableError
 from levilab.formats.table import FEWEST, Table, must_be_positive, read_table
@@ -98,7 +99,8 @@ def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> Limi
     near: about where the spin is at first, to 10 % [Hz].
 
     Raises:
-        DoesNotSuit: in the record no top falls after three windows or more, or its folds cannot be distinguished.
+        DoesNotSuit: in the record no top falls after three windows or more, but is stopped by hand, or its folds cannot
+            be distinguished.
     """
     try:
         track = track_of_field(record.times, record.field, near=near)
@@ -114,9 +116,18 @@ def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> Limi
             falls.append(spin_at_fall(track.time[part], track.frequency[part], u, (one.end - reach, one.end + reach)))
     if not falls:
         raise DoesNotSuit("{path:s}: no top falls in it after {n} windows whose spin is certain", path, FEWEST)
-    seen = Text("{name:s}: {n} of {tops} tops fall in this record", path.name, len(falls), len(track.flights))
-    notes = (*record.warnings, of_file("falls", seen, "advice"))
-    return LimitReadings(np.array([one.value for one in falls]), np.array([one.u for one in falls]), notes)
+    spins, u_spins = np.array([(one.value, one.u) for one in falls], dtype=float).T
+    tops, notes, stopped = len(track.flights), [*record.warnings], spins > STOPPED_ABOVE_HZ
+    if stopped.any():
+        said = (
+            "{name:s}: {n} of {tops} tops are lost at {hz:.3g} Hz or above and are left out: no top falls so early, was "
+            "it stopped?"
+        )
+        notes.append(of_file("stopped", Text(said, path.name, int(stopped.sum()), tops, float(spins[stopped].min()))))
+    if stopped.all():
+        raise DoesNotSuit(notes[-1])
+    seen = Text("{name:s}: {n} of {tops} tops fall in this record", path.name, int((~stopped).sum()), tops)
+    return LimitReadings(spins[~stopped], u_spins[~stopped], (*notes, of_file("falls", seen, "advice")))
 
 
 def _single_column(path: Path, *, guess: bool) -> Table | None:

@@ -5,7 +5,7 @@ import importlib.util
 import numpy as np
 import pytest
 
-from levilab.errors import DataError
+from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import LimitOptions, SpinDownOptions, SpinOptions
 from levilab.pipelines.spin.figure import spin_figure
@@ -65,6 +65,16 @@ def test_a_long_record_gives_the_drag_law_and_the_limit(long):
     limit = ANALYSES["limit"].analyze([long])
     truth = 37.0 * np.exp(-3.2e-3 * 163.2)
     assert limit.sources[0].readings.limit == pytest.approx([truth], abs=4 * limit.sources[0].readings.u[0])
+
+
+def test_a_top_that_is_stopped_by_hand_shows_no_lower_limit(tmp_path):
+    stopped = synthetic_flight(np.random.default_rng(58), duration=60.0, up=(0.0, 40.0), start_hz=42.0)
+    path = phone(tmp_path / "stopped.csv", *stopped[:2])
+    with pytest.raises(DoesNotSuit, match=r"1 of 1 tops are lost at 37 Hz or above and are left out"):
+        ANALYSES["limit"].analyze([path])
+    assert [analysis.name for analysis, _ in analyze_suiting([path], {})] == ["spindown", "spin"]
+    (file := tmp_path / "mine.csv").write_text("38.1\n37.9\n38\n", encoding="utf-8")
+    assert "Hz above it, more than a tilt explains: was the top stopped?" in ANALYSES["limit"].analyze([file]).text
 
 
 def test_a_spin_that_is_held_is_compared_with_the_drive(tmp_path, long):
