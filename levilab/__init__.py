@@ -245,8 +245,8 @@ def analyze(
             with columns as in data files (`time_s`, `spin_frequency_hz`, …, or titles that files may have, with their
             units), or several; a dictionary of such columns, a Series with its index in seconds, an object of xarray;
             or arrays: (times [s], spin frequencies [Hz]) and, third, their standard uncertainties, one or an array; of
-            other kinds (times, light), (heights [m], flux densities [T]), (drive, precession [Hz]), or limits alone
-            [Hz].  Arrays of `uncertainties` have their u with them.
+            the kinds "spin" (times, light), "field" (heights [m], flux densities [T]) and "precession" (drive,
+            precession [Hz]), or limits alone [Hz].  Arrays of `uncertainties` have their u with them.
         kind: the analysis; None for the one that is made for the data.
         time: times of readings [s], which with frequency take the place of data.
         frequency: spin frequencies at these times [Hz].

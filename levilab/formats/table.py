@@ -41,7 +41,7 @@ class Table:
     `columns` are canonical (`time_s`, `spin_frequency_hz`, …): SI, float64, shape (rows,), all finite but for a run's
     other channels, where NaN is a value that was not known; `lines`, shape (rows,), is the 1-based line of `path` that
     each row stands in; `header` are the titles in the file; `factors` are those to SI that the file's numbers were
-    multiplied by.
+    multiplied by, and `numbers` those of its columns, from 1 on.
     """
 
     path: Path
@@ -50,6 +50,7 @@ class Table:
     header: tuple[str, ...]
     lines: "NDArray[np.int64]"
     factors: Mapping[str, float] = field(default_factory=dict)
+    numbers: Mapping[str, int] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Return the number of readings."""
@@ -266,7 +267,8 @@ def _table(
         u = Said("that of both counts") if companion(total.name) in columns else _WHOLE_TURNS
         columns, lines = _differences(columns, total.name), lines[1:]
         notes.append(of_file("turns", Said(_OF_TOTALS, name=name, label=shorten(total.label), u=u)))
-    return Table(path, columns, tuple(notes), header, lines, {c.name: c.factor for c in kept if not c.inverse})
+    factors = {c.name: c.factor for c in kept if not c.inverse}
+    return Table(path, columns, tuple(notes), header, lines, factors, {c.name: c.index + 1 for c in kept})
 
 
 def _in_si(kept: "Mapping[Column, NDArray[np.float64]]") -> "dict[str, NDArray[np.float64]]":

@@ -103,7 +103,8 @@ def _refuse_what_is_no_spin(time: pd.Series[Any], spin: pd.Series[Any]) -> None:
     if spin.min() >= _LEAST_HZ and spin.max() >= _SLOWEST_HZ:
         return
     of_turns = "times of a turn are inverted first, analyze((t, 1 / T)); " if spin.min() > 0 else ""
-    expected = f"spin frequencies in Hz are expected; {of_turns}of a detector's light say so: kind='spin', or light=…"
+    others = "of other numbers say which: kind='spin', or light=…, kind='field' for (heights, flux densities)"
+    expected = f"spin frequencies in Hz are expected; {of_turns}{others}"
     raise UsageError("data", expected, value=seen.format("numbers"))
 
 

@@ -120,8 +120,8 @@ def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> Limi
     tops, notes, stopped = len(track.flights), [*record.warnings], spins > STOPPED_ABOVE_HZ
     if stopped.any():
         said = (
-            "{name:s}: {n} of {tops} tops are lost at {hz:.3g} Hz or above and are left out: no top falls so early, was "
-            "it stopped?"
+            "{name:s}: {n} of {tops} tops are lost at {hz:.3g} Hz or above and are left out: no top falls so early, "
+            "was it stopped?"
         )
         notes.append(of_file("stopped", Text(said, path.name, int(stopped.sum()), tops, float(spins[stopped].min()))))
     if stopped.all():

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from analysis.spindown.readings import check_readings
 from analysis.spindown.tilt import Release
 from levilab.errors import DataError, DoesNotSuit
-from levilab.formats.columns import TableError
+from levilab.formats.columns import SHORTHANDS, TableError
 from levilab.formats.table import FEWEST, Table, read_table, refuse
 from levilab.formats.understanding import (
     LEAST_FALL,
@@ -284,7 +284,7 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
     middle, step = float(np.median(frequency)), float(np.median(np.diff(time)))
     if not is_possible_spin(middle):
         spins = possible_spins(middle / table.factors.get("spin_frequency_hz", 1.0)).items()
-        say = _say_unit(Text("f=NAME [{unit:s}] ({spin:n} Hz)", unit, digits(spin, 3)) for unit, spin in spins)
+        say = _say_unit(table, "f", {unit: Text("{spin:n} Hz", digits(spin, 3)) for unit, spin in spins})
         if not say and is_possible_spin(1e3 * middle):
             say = "; if its point stands behind the thousands, write the numbers without it"
         text = "{name:s}: the spin is about {spin:.4g} Hz, a Levitron spins at 20 to 60 Hz{say}"
@@ -300,9 +300,7 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
     loss, factor = math.log(first / last) / lasts, table.factors.get("time_s", 1.0)
     if loss > 0 and not is_possible_loss(loss):
         units = possible_times(loss * factor).items()
-        say = _say_unit(
-            Text("t=NAME [{unit:s}] ({length})", unit, length_of(lasts / factor * of)) for unit, of in units
-        )
+        say = _say_unit(table, "t", {unit: length_of(lasts / factor * of) for unit, of in units})
         text = "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz in {length}, in air it takes minutes{say}"
         return [_doubt(Text(text, table.path.name, first, last, length_of(lasts), say))]
     if first > FASTEST_BY_HAND_HZ and FALLS_BETWEEN_HZ[1] < last / 2 < FALLS_BETWEEN_HZ[0]:
@@ -315,10 +313,11 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
     return []
 
 
-def _say_unit(columns: Iterable[str]) -> str:
-    """Return the advice to say the unit of a column."""
-    meant = tuple(columns)
-    return Text("; say the unit with the column: {columns}", columns=meant) if meant else ""
+def _say_unit(table: Table, key: Literal["t", "f"], units: Mapping[str, str]) -> str:
+    """Return the advice to say the unit of a column, with what its numbers are in each."""
+    n = table.numbers.get(SHORTHANDS[key], 0)
+    meant = tuple(Text('"{key:s}={n} [{unit:s}]" ({value})', key, n, unit, value) for unit, value in units.items())
+    return Text("; say the unit: `columns` = {columns}", columns=meant) if meant and n else ""
 
 
 #: Beyond these a number is no measurement: 3000 years (a clock in ms since 1970 shows 1.8e12), and spins whose powers

@@ -197,7 +197,7 @@ GUESSES = {
     "levilab.analyze(str(folder / 'spin-down-[12]')).inputs": lambda names: names == ("spin-down-1", "spin-down-2"),
     "levilab.analyze(levilab.runs(folder), 'limit').inputs": lambda names: "lower-limits" in names,
     "repr(levilab.analyze((1000 * t, f))).splitlines()[1]": lambda line: "in 52.8 h, in air it takes minutes" in line,
-    "levilab.analyze((1000 * t, f)).warnings[0]": lambda text: text.endswith("with the column: t=NAME [ms] (3.17 min)"),
+    "levilab.analyze((1000 * t, f)).warnings[0]": lambda text: text.endswith('columns = "t=1 [ms]" (3.17 min)'),
     "levilab.analyze((1000 * t, f)).summary()": lambda text: text.startswith("Before you use the numbers. "),
     # the other commands
     "levilab.__version__": lambda text: text[0].isdigit(),
@@ -311,6 +311,7 @@ REFUSED = {
     "run.truth": "take record.synthetic_how",
     "motion.hight": "did you mean height",
     "levilab.analyze((seconds, light))": "kind='spin', or light=",
+    "levilab.analyze((np.linspace(0.03, 0.1, 9), np.linspace(0.02, 0.002, 9)))": "kind='field' for (heights, flux",
     "levilab.analyze(np.array([]))": "an empty array: at least 3 readings are expected",
     "levilab.analyze(([], []))": "an empty array: at least 3 readings are expected",
     "levilab.analyze(time=[], frequency=[])": "an empty array: at least 3 readings are expected",

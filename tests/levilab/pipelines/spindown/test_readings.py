@@ -74,7 +74,7 @@ def test_readings_closer_than_a_turn_are_doubted(tmp_path):
     assert ": the readings lie 10 ms apart, the top needs 25.9 ms for a turn;" in said["ms"][0]
     assert said["s"] == ()
     assert (
-        " from 40 to 37.2 Hz in 30 h, in air it takes minutes; say the unit with the column: t=NAME [s] (30 s)"
+        ' from 40 to 37.2 Hz in 30 h, in air it takes minutes; say the unit: `columns` = "t=1 [s]" (30 s)'
         in said["h"][0]
     )
 
