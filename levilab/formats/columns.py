@@ -232,6 +232,8 @@ def choose_columns(
             warnings += [_angular(path, header[index])] * (name == quantity)
             unit = "rad/s"
         factor = _factor(path, name, header[index], unit)
+        if titles[index].unit and not unit:
+            warnings.append(_taken_in_si(path, name, header[index], titles[index].unit))
         says_unit = not implied_unit(meant[index]) or is_unit(meant[index])  # rpm does, omega does not
         sure = bool(unit) and (name in stated or says_unit)
         columns.append(Column(name, index, header[index], factor, unit=unit or _SI[dimension(name)], written=sure))
@@ -485,6 +487,12 @@ def _angular(path: Path, label: str) -> str:
         "if it counts turns, say so with its column, as f=NAME [Hz]"
     )
     return of_file("angular", Text(said, shorten(str(path), 200), shorten(label)))
+
+
+def _taken_in_si(path: Path, name: str, label: str, unit: str | None) -> str:
+    said = "{path:s}: column '{label:s}' is taken in {si:s}: '{unit:s}' is no unit of {kind} known here"
+    kind = dimension(name)
+    return of_file("unknown unit", Text(said, shorten(str(path), 200), shorten(label), _SI[kind], unit, kind))
 
 
 def _unknown_unit(path: Path, label: str, title: Title) -> str:

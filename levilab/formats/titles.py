@@ -26,6 +26,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "frequency": {
         "Hz": 1, "hertz": 1, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, "μHz": 1e-6, "1/s": 1, "rps": 1, "U/s": 1,
         "rpm": PER_MINUTE, "1/min": PER_MINUTE, "U/min": PER_MINUTE, "UPM": PER_MINUTE, "hercios": 1,
+        **dict.fromkeys(("krpm", "1000rpm", "1000/min", "1000U/min", "103/min"), 1000 * PER_MINUTE),  # and 10³ min⁻¹
         "rad/s": PER_RADIAN, "rad_s": PER_RADIAN, "rad_per_s": PER_RADIAN,
         "°/s": 1 / 360, "deg/s": 1 / 360, "deg_s": 1 / 360, "grad/s": 1 / 360,
     },
@@ -214,6 +215,12 @@ OTHER_SENSORS: Mapping[str, str] = {"lx": "the light sensor", "hPa": "the barome
 MOTION_SENSORS: Mapping[str, str] = {"m/s2": "the accelerometer", "rad/s": "the gyroscope"}
 
 
+#: Columns of the phone app Sensor Logger, the same of all sensors; what they are of its magnetometer, and of others.
+SENSOR_LOGGER = ("time", "seconds_elapsed", "z", "y", "x")
+LOGGED_FIELD = ("", "t [s]", "Bz [μT]", "By [μT]", "Bx [μT]")
+LOGGED = ("", "t [s]", "z axis", "y axis", "x axis")
+
+
 def motion_sensor(titles: Sequence[str]) -> tuple[str, str] | None:
     """Return the first title of a phone's sensor of its own motion, and the sensor; None without its three axes.
 
@@ -356,8 +363,8 @@ def _title_of_name(label: str, unit: str) -> Title | None:
     of_turns = _TIME_OF_TURNS.fullmatch(name)
     if of_turns and unit_factor(unit, "time"):
         return Title("spin_frequency_hz", unit, inverse=True, turns=int(of_turns["number"]))
-    if (name in TURNS or label == "U") and unit_factor(f"/{unit}", "frequency"):
-        return Title("spin_frequency_hz", f"/{unit}")
+    if (name in TURNS or label == "U") and (factor := unit_factor(f"/{unit}", "frequency")):
+        return Title("spin_frequency_hz", {1.0: "1/s", PER_MINUTE: "1/min"}.get(factor, f"/{unit}"))
     if name in PERIODS and unit_factor(unit, "time"):
         return Title("spin_frequency_hz", unit, inverse=True)
     return Title(NAMES[name], unit, angular=name in _ANGULAR_NAMES) if name in NAMES else None

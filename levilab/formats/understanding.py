@@ -42,11 +42,14 @@ from levilab.formats.titles import (
     COMPANIONS,
     EXAMPLES,
     LISTED,
+    LOGGED,
+    LOGGED_FIELD,
     NAMES,
     NEED_UNITS,
     OTHER_SENSORS,
     OVER_TIME,
     QUANTITIES,
+    SENSOR_LOGGER,
     TOTAL,
     Title,
     as_a_period,
@@ -220,9 +223,19 @@ def _known(look: "_Look", layout: Layout, part: Part, request: "Request") -> "Pl
 def _column(k: int, layout: Layout, used: Column | None) -> UnderstoodColumn:
     title = layout.header[k] if k < len(layout.header) else ""
     values = tuple(row[k] if k < len(row) else "" for row in layout.sample[:_SHOWN])
+    values = tuple(map(_shorten_number, values)) if layout.aligned else values
     if used is None:
         return UnderstoodColumn(k, title, None, "", 1.0, inverse=False, values=values)
     return UnderstoodColumn(k, title, used.name, used.unit, used.factor, inverse=used.inverse, values=values)
+
+
+def _shorten_number(cell: str) -> str:
+    """Return a cell of a spreadsheet with 6 digits at most, which holds 1981.9199999999998 where it shows 1981.92."""
+    number = re.fullmatch(r"-?(\d+)\.\d+", cell)
+    if not number:
+        return cell
+    places = max(6 - len(number[1].lstrip("0")), 0)
+    return np.format_float_positional(float(cell), places, trim="-")
 
 
 # --- questions about units -----------------------------------------------------------------------------
@@ -614,6 +627,8 @@ def _looks_at(file: Path, text: Text, request: Request) -> Iterator[_Look]:
     except TableError as error:
         yield _Look(text.path, name, text, error=error)
         return
+    if tuple(titles) == SENSOR_LOGGER:
+        titles = LOGGED_FIELD if text.path.stem.casefold().startswith("magnetometer") else LOGGED
     if len(tables) > 1:
         yield from (look for table in tables for look in _looks_at(file, table, request))
         return
@@ -784,6 +799,13 @@ def no_column(path: Path, name: str, header: Sequence[str], doubt: Doubt | None 
         unit = shorten(read_title(foreign).unit or "")
         said = "column '{title:s}' is in {unit:s}, which is no unit of {kind}: {do}"
         text = Said(said, shorten(foreign), unit, dimension(name), how_else(foreign, name))
+        asks = "'{title:s}' is in {unit:s}, which is no unit of {kind}: {question}"
+        asked = Said(asks, shorten(foreign), unit, dimension(name), doubt.text) if doubt else ""
+        doubt = replace(doubt, text=asked) if doubt else None
+    elif tuple(header) == LOGGED:
+        said = "Sensor Logger names its files by the sensor: are x, y and z of {name:s} those of the magnetometer?"
+        text, columns = Said(said, path.name), {"t": "2", "bx": "5 [μT]", "by": "4 [μT]", "bz": "3 [μT]"}
+        doubt = Doubt("column", text, None, (Choice(Said("the magnetometer, in μT"), columns),))
     elif nearly:
         said = "no column is known to be {name:s}; '{title:s}' could become one: {do}"
         text = Said(said, name, shorten(nearly), how_else(nearly, name))

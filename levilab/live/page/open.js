@@ -119,7 +119,7 @@ function doubtOf({kind, text, choices}) {
 
 /** Names of columns in full: a choice may have them as the option --columns has, t and f. */
 const canonical = (columns) => Object.fromEntries(Object.entries(columns).map(([key, to]) =>
-  [{t: "time_s", f: "spin_frequency_hz", u: "spin_frequency_u_hz", z: "height_m", b: "flux_density_t"}[key] || key, to]));
+  [{t: "time_s", f: "spin_frequency_hz", u: "spin_frequency_u_hz", z: "height_m", b: "flux_density_t", bx: "flux_density_x_t", by: "flux_density_y_t", bz: "flux_density_z_t"}[key] || key, to]));
 
 /** A run: a table of its columns, each with what it is taken for, and a small plot. */
 function runOf(run, number) {

@@ -4,9 +4,11 @@ import json
 import re
 import sys
 
+import numpy as np
 import pytest
+import xlsxwriter
 
-from levilab.formats.titles import UNITS, dimension
+from levilab.formats.titles import UNITS, dimension, read_title
 from levilab.pipelines.look import QUANTITIES, look_at
 from support.commands import command
 from support.paths import ROOT
@@ -78,6 +80,56 @@ def test_no_title_of_a_file_is_translated(tmp_path):
     assert all(title in shown for title in ("time [s]", "spin [Hz]", "readings", "result", "time, time"))
     (tmp_path / "p.csv").write_text("readings,micros\n" + "".join(f"{n},{26316 * n}\n" for n in range(9)), "utf-8")
     assert "readings, als Umdrehungen seit" in command("open", "p.csv", "--language", "de", cwd=tmp_path).out
+
+
+@pytest.mark.parametrize("unit", ["krpm", "1000/min", "10^3/min", "10³ min⁻¹", "1000 rpm", "1000 U/min"])
+def test_thousands_of_turns_a_minute_are_a_unit(tmp_path, unit):
+    for title, columns in ((f"n [{unit}]", {}), ("n", {"t": "1", "f": f"2 [{unit}]"})):
+        (tmp_path / "my.csv").write_text(f"t / min,{title}\n0,2.4\n1,2.2\n2,2.0\n", "utf-8")
+        (look,) = look_at(tmp_path / "my.csv", {"columns": columns}).plots[0]
+        assert look.y == pytest.approx([40, 36.667, 33.333], abs=1e-3)
+
+
+def test_an_unknown_unit_is_named(tmp_path):
+    (tmp_path / "my.csv").write_text(
+        "t / min,n / kturns\n" + "".join(f"{t},{2.4 - t / 9}\n" for t in range(9)), "utf-8"
+    )
+    asked = command("open", "my.csv", "--language", "de", cwd=tmp_path).out
+    assert "„n / kturns“ ist in kturns, was keine Einheit dieser Größe ist (Frequenz): welche Spalte" in asked
+    assert "enthält die Drehfrequenz?" in asked
+    taken = command("open", "my.csv", "--columns", "f=2", cwd=tmp_path)
+    assert "'n / kturns' is taken in Hz: 'kturns' is no unit of frequency known here" in taken.out + taken.err
+
+
+@pytest.mark.parametrize("name", ["Magnetometer.csv", "MagnetometerUncalibrated.csv", "Gyroscope.csv", "top.csv"])
+def test_sensor_logger_names_its_sensor_in_the_name_of_the_file(tmp_path, name):
+    """Its columns are those of each sensor; the first is the time since 1970 in ns."""
+    turns = 2 * np.pi * 21 * np.arange(900) / 100
+    rows = zip(np.arange(900) / 100, 30 * np.cos(turns), 30 * np.sin(turns), strict=True)
+    lines = (f"{1.7e18 + 1e9 * t:.0f},{t:.4f},-20.5,{y:.3f},{x:.3f}\n" for t, x, y in rows)
+    (tmp_path / name).write_text("time,seconds_elapsed,z,y,x\n" + "".join(lines), "utf-8")
+    words = ("analyze", name, "--no-save", "--near", "21")
+    ended = command(*words, cwd=tmp_path)
+    if not name.startswith("Magnetometer"):
+        assert (ended.status, f"are x, y and z of {name} those of the magnetometer?" in ended.err) == (1, True)
+        (doubt,) = look_at(tmp_path / name, {}).runs[0].doubts
+        columns = ",".join(f"{key}={to}" for key, to in doubt.choices[0].columns.items())
+        ended = command(*words, "--columns", columns, cwd=tmp_path)
+    assert "21.00" in ended.out
+
+
+def test_a_cell_is_shown_as_a_spreadsheet_shows_it(tmp_path):
+    with xlsxwriter.Workbook(tmp_path / "my.xlsx") as book:
+        sheet = book.add_worksheet()
+        sheet.write_row(0, 0, ["t [s]", "f [Hz]", "p"])
+        sheet.write_row(1, 0, [0, 39.9759420572424, 1981.9199999999998])
+        sheet.write_row(2, 0, [1e9 + 0.2, 37, 1.5e-7])
+    columns = look_at(tmp_path / "my.xlsx", {}).runs[0].columns
+    assert [column.values for column in columns] == [("0", "1000000000"), ("39.9759", "37"), ("1981.92", "1.5e-07")]
+
+
+def test_turns_a_minute_have_their_usual_unit():
+    assert [read_title(f"Umdrehungen pro {word}").unit for word in ("Minute", "Sekunde", "h")] == ["1/min", "1/s", "/h"]
 
 
 def test_a_note_on_the_file_is_said_once(tmp_path):
