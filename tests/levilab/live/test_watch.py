@@ -196,7 +196,7 @@ def test_a_watch_that_fails_fails_alone_and_names_the_error(tmp_path, monkeypatc
 class Flood:
     """A socket with a question at any time.  It is closed after 1000 answers."""
 
-    query_params = MappingProxyType({"run": "one"})
+    query_params, headers, cookies = MappingProxyType({"run": "one"}), MappingProxyType({}), MappingProxyType({})
 
     def __init__(self):
         self.answers = 0
