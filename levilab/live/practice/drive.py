@@ -263,7 +263,8 @@ class PracticeDrive:
             say(Text("the top follows the drive at {drive:.2f} Hz", drive=drive), "the top follows the drive")
         elif off > _LOST_HZ:
             hold.is_lost = True
-            say(Text("the drive has lost the top: {again}", again=_AGAIN[int(np.sign(self._set.frequency_hz - drive))]))
+            again = _AGAIN[int(np.sign(self._set.frequency_hz - drive))]
+            say(Text("the drive has lost the top near {drive:.1f} Hz: {again}", drive=drive, again=again))
         elif off <= _SWINGS_HZ and drive >= hold.at_hz + _TUNED_UP_HZ and not self.tuned_up:
             self.tuned_up = True
             say("the top follows the drive up", "the top follows the drive")

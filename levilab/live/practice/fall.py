@@ -48,7 +48,7 @@ def cause_of_fall(
         held: how a drive held it.
         hides: whether the masses that float are to be found.
     """
-    after = "" if after_s is None else Text(" after {seconds:.0f} s", seconds=after_s)
+    after = "" if after_s is None else Text(" after {seconds:.0f} s", seconds=after_s) if after_s >= 1.0 else " at once"
     if base_deg := abs(math.degrees(scene.base.tilt_rad)):
         scene = scene.changed({"base.tilt_rad": 0.0})  # the theory is of an upright base
     found = _stability(scene.model_dump_json())

@@ -27,7 +27,7 @@ from levilab.live.practice.drive import GATE_S, TRIGGER_V, PracticeDrive
 from levilab.live.practice.experiments import PRACTICE, PracticeExperiment, settings_for
 from levilab.live.practice.fall import cause_of_fall
 from levilab.live.practice.seeds import keys_of_seed, seed_of_group
-from levilab.live.practice.tasks import TASKS, Look, Tasks
+from levilab.live.practice.tasks import FAST_HZ, TASKS, Look, Tasks
 from levilab.live.practice.top import PracticeTop
 from levilab.pipelines.spindown.readings import release_of
 from levilab.runs.events import RunEvent
@@ -202,6 +202,8 @@ class PracticeProcess:
         self.drive.take_count(spin)
         if self.drive.took_hold:
             self.tasks.reach("catch")
+        if self.drive.follows and spin is not None and spin >= FAST_HZ:
+            self.tasks.reach("fast")
         if not self.drive.yields:  # while it does no other instrument keeps it waiting
             self._field = bench.magnetometer.flux_density()
 
@@ -339,7 +341,7 @@ class PracticeProcess:
         self._request(plan, command)  # raises where it is not possible
         if plan.experiment in NEED_A_TOP and not plan.scene and not self.top.floats():
             raise CommandRefused("the top is down, and this run begins with one that floats: put the top back first")
-        self._wanted, self._stopped = command, ""
+        self._wanted, self._stopped, self._paused = command, "", False
 
     def _change_bench(self, command: ask.ChangeBench) -> None:
         if command.values or self.tasks.name:

@@ -107,6 +107,8 @@ def _say_slope(b: float) -> str:
     return Text("b = {value:g} is not it: look at the line of the result once more, and record another", value=b)
 
 
+#: The spin of the task "fast" [Hz].
+FAST_HZ = 57.0
 TASKS: dict[str, Task] = {
     "catch": Task(
         "Catch it", "Let the drive take hold of the top: match the spin, then drive on.",
@@ -127,7 +129,7 @@ TASKS: dict[str, Task] = {
     "fast": Task(
         "Reach 57 Hz", "Take the top up with the drive. At 0.1 Hz/s it is lost near 61 Hz: more slowly it goes on.",
         "the air takes the more the faster the top spins, and a ramp takes its part of the drive's torque, too",
-        "frequency", lambda look: look.is_held and (look.spin_hz or 0.0) >= 57.0,
+        "frequency", lambda look: look.is_held and (look.spin_hz or 0.0) >= FAST_HZ,
     ),
     "guess": Task(
         "Find n", "The drag goes as ω to the n. Record a spin-down in this air of another kind, analyze it, and say n.",

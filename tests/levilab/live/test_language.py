@@ -40,7 +40,8 @@ def hall(tmp_path):
 
 
 def measure(hall, run=""):
-    said = Text("the drive has lost the top: {again}", again="switch it off, match the spin, and go up more slowly")
+    again = "switch it off, match the spin, and go up more slowly"
+    said = Text("the drive has lost the top near {drive:.1f} Hz: {again}", drive=61.2, again=again)
     drive = Drive("SQU", 30.25, 10.0, output=True)
     wave = np.zeros(50, np.float32)
     publish(
@@ -120,7 +121,7 @@ def test_a_page_in_german_stays_german_and_nothing_is_cut(viewport, hall, watche
     measure(hall)
     until(page, "levilab.data.bench && !document.getElementById('controls').disabled")
     assert page.evaluate("levilab.data.bench.text") == (
-        "der Antrieb hat den Kreisel verloren: ausschalten, angleichen und langsamer hinauf"
+        "der Antrieb hat den Kreisel nahe 61,2 Hz verloren: ausschalten, angleichen und langsamer hinauf"
     )
     until(page, "document.getElementById('spin-value').textContent == '30,5000'")
     assert page.inner_text("#field-value") == "1,250"
