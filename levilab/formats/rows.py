@@ -222,9 +222,7 @@ def _read_lines(
     )
     refused = refused if lines else [*remarks[:1], *refused]
     notes += _notes_on_refused(refused, len(lines), skip=skip_doubtful, may_skip=not drop_unended)
-    notes += [left_out(error.line or 0, line, "is no reading") for error, line in remarks[:_MOST_NAMED]]
-    if len(remarks) > _MOST_NAMED:
-        notes.append(Note("words", Said("{n} rows without a number are left out, these and others", len(remarks))))
+    notes += _notes_on_remarks(remarks, len(lines) + len(refused))
     return Rows(numbers, np.array(lines, np.int64), (*notes, *_doubts_about(time)))
 
 
@@ -254,6 +252,16 @@ def _notes_on_refused(
         many = "{n} doubtful rows are left out, as `skip_doubtful` says: lines {places:s}"
         one = "{n} doubtful row is left out, as `skip_doubtful` says: line {places:s}"
         yield Note("doubtful", Said(one if len(numbers) == 1 else many, len(numbers), _places(numbers)))
+
+
+def _notes_on_remarks(remarks: Sequence[tuple[TableError, str]], others: int) -> Iterator[str]:
+    """Yield the note on lines of words, which are left out; others: number of the other rows."""
+    if len(remarks) == 1:
+        yield left_out(remarks[0][0].line or 0, remarks[0][1], "is no reading")
+    elif remarks:
+        said = "{n} of {rows} rows are no readings, as '{first:s}', and are left out: lines {places:s}"
+        first, places = shorten(" ".join(remarks[0][1].split())), _places([str(error.line) for error, _ in remarks])
+        yield Note("words", Said(said, len(remarks), others + len(remarks), first, places))
 
 
 def _places(numbers: Sequence[str]) -> str:

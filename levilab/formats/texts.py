@@ -101,7 +101,9 @@ def must_be_file(path: Path) -> None:
     if path.is_dir():
         names = name_files(path, (*TEXTS, *SPREADSHEETS)) or name_files(path)
         advice = Said("name one in it: {names:s}" if names else "there are no files in it", names=names)
-        raise TableError(path, "is a folder; a data file is expected: {advice}", advice)
+        raise TableError(
+            path, "is a folder, which levilab analyze, report and class take; here a file is expected: {advice}", advice
+        )
     if not path.exists():  # also for a name that no file can have
         raise FileNotFoundError
     if not path.is_file():

@@ -128,6 +128,21 @@ def test_a_cell_is_shown_as_a_spreadsheet_shows_it(tmp_path):
     assert [column.values for column in columns] == [("0", "1000000000"), ("39.9759", "37"), ("1981.92", "1.5e-07")]
 
 
+def test_a_folder_is_for_other_commands(tmp_path):
+    (tmp_path / "runs").mkdir()
+    (tmp_path / "runs" / "a.csv").touch()
+    said = "levilab: runs: is a folder, which levilab analyze, report and class take; here a file is expected: "
+    assert command("open", "runs", cwd=tmp_path).err == f"{said}name one in it: a.csv\n"
+
+
+def test_broken_rows_are_counted_in_one_sentence(tmp_path):
+    rows = "".join(f"{10 * k},{'x' if k % 3 == 1 else 38 - k / 3}\n" for k in range(20))
+    (tmp_path / "my.csv").write_text(f"t,f\n{rows}", "utf-8")
+    ended = command("open", "my.csv", cwd=tmp_path)
+    (note,) = re.findall(r".* left out.*", ended.out + ended.err)
+    assert note == "note: my.csv: 7 of 20 rows are no readings, as '10,x', and are left out: lines 3, 6, 9, 12, 15, …"
+
+
 def test_turns_a_minute_have_their_usual_unit():
     assert [read_title(f"Umdrehungen pro {word}").unit for word in ("Minute", "Sekunde", "h")] == ["1/min", "1/s", "/h"]
 
