@@ -17,20 +17,18 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.errors import ShapesDiffer, TooFewReadings
+from analysis.stability import vertical_mode
 from analysis.sway.joint import Corrections, Joint, fit_together
 from analysis.sway.known import Known
 from analysis.sway.lines import Swings
-from analysis.sway.orbit import NoSwing, slow_swings, small_swings
+from analysis.sway.orbit import NoSwing, pumps, slow_swings, small_swings
 from analysis.sway.vertical import vertical_swing
 from analysis.uncertainty import Estimate, partly_believed, propagate
 
-#: The shift at finite amplitude is known to this part of it: it is computed without a vertical swing of its own.
+#: The shift at finite amplitude is known to this part of it.
 SHIFT_U = 0.035
 #: The next order of the shift: part of it that it is uncertain by, over the square of the sum of amplitudes² [1/m⁴].
 NEXT_SHIFT_U = 5e10
-#: A vertical swing of its own shifts the split, too: relative standard uncertainty, over the square of the energy of
-#: the lines beside the slow swings over theirs, times the fourth power of the difference from the beat [1/Hz⁴].
-RISE_U = 250.0
 #: Where the beat of the slow swings comes near the vertical swing, they exchange energy with it, and the shift's next
 #: orders count: relative standard uncertainty of the split, times A⁴ over the fourth power of the difference [Hz⁴/m⁴],
 #: as full motions of 120 tops over the whole window of masses have it; differences below NEAREST_HZ count as that.
@@ -259,12 +257,9 @@ def _away(swings: Swings) -> float:
 
 
 def _doubt(swings: Swings) -> float:
-    """Return the relative standard uncertainty of a split from the vertical swing, of its own and by the slow ones."""
-    away = _away(swings)
-    beside = float(np.sum(swings.beside**2)) / swings.size
+    """Return the relative standard uncertainty of a split from the energy that the swings exchange."""
     size = swings.size * math.exp(8 * swings.size_u**2)  # the root mean square of A⁴ goes into u
-    exchange = RESONANCE_U * size**2 / max(away, NEAREST_HZ) ** 4
-    return min(exchange + RISE_U * beside**2 * away**4, 1.0)
+    return min(RESONANCE_U * size**2 / max(_away(swings), NEAREST_HZ) ** 4, 1.0)
 
 
 def _split(share: float, spin: float, small: Array, known: Known) -> tuple[float, float]:
@@ -288,13 +283,22 @@ def _split(share: float, spin: float, small: Array, known: Known) -> tuple[float
     return sum(slow), half
 
 
-def _shift(swings: Swings, spin: float, height: float, known: Known) -> tuple[float, float]:
-    """Return by how much finite amplitude shifts the slow swings, of a point in the mean field of the magnet [Hz]."""
+def _shift(swings: Swings, spin: float, height: float, known: Known) -> Array:
+    """Return by how much finite amplitude shifts the slow swings, of a point in the mean field of the magnet [Hz].
+
+    Each swing and the line beside it, at the other swing ± the vertical one, push each other apart.  In the steady
+    motion there is no such line: that part of its shift is replaced by the one that belongs to the distance as seen.
+    """
     top = replace(known.top_at(height), stiffnesses=None)
-    still = small_swings(known.field, top, height, spin)
     amplitudes = float(swings.amplitude[0]), float(swings.amplitude[1])
-    moving = slow_swings(known.field, top, height, spin, amplitudes)
-    return moving[0] - still[0], moving[1] - still[1]
+    still = np.array(small_swings(known.field, top, height, spin))
+    moving = np.array(slow_swings(known.field, top, height, spin, amplitudes))
+    pump, own = pumps(known.field, top, height, spin, amplitudes), vertical_mode(known.field, top, height)
+    steady = pump / ((moving[1] - moving[0]) ** 2 - own**2)
+    beat, vertical = float(swings.frequency[1] - swings.frequency[0]), swings.vertical.value
+    apart = beat - vertical
+    before = np.sqrt(np.maximum(apart**2 - 4 * pump / (beat + vertical), 0.0))
+    return np.asarray(moving - still + np.array([-1.0, 1.0]) * (np.sign(apart) * (abs(apart) - before) / 2 - steady))
 
 
 def _lean(swings: Swings, spin: float, height: float, known: Known) -> float:

@@ -91,8 +91,6 @@ class Swings:
         u: standard uncertainties, same shape [Hz].
         amplitude: same shape [m].
         vertical: the vertical swing, as the lines beside the slow swings and the heights have it [Hz].
-        beside: amplitudes of the lines at forward less vertical and at backward plus vertical swing, which may be taken
-            for the backward and for the forward swing that are near, shape (2,) [m].
         noise: standard deviation of a coordinate [m].
         misfit: −2 times the logarithm of the likelihood and the priors, but for a constant.
         backwards: amplitude of the strongest line where a precession would be that turns against the spin [m].
@@ -106,7 +104,6 @@ class Swings:
     u: Array
     amplitude: Array
     vertical: Vertical
-    beside: Array
     noise: float
     misfit: float
     backwards: float = 0.0
@@ -390,7 +387,6 @@ def _fit(
         u=u[:count],
         amplitude=np.abs(amplitudes[:count]),
         vertical=Vertical(float(q[-3]), float(u[-3])),
-        beside=np.abs(sizes[:2]),
         noise=noise,
         misfit=2 * t.size * math.log(noise**2) + float(off @ off) + 2 * float(np.linalg.norm(amplitudes / widths)) ** 2,
     )

@@ -97,6 +97,26 @@ def slow_swings(
     return float(low), float(high)
 
 
+def pumps(
+    field: AxialField, top: SymmetricTop, height: float, spin_hz: float, amplitudes: tuple[float, float]
+) -> Array:
+    """Return how strongly the other swing couples each one to the line beside it, of the vertical swing [Hz³].
+
+    Stiffnesses change with height, so that a product of either swing and the vertical one moves the other swing.  To
+    lowest order backward and forward swing are shifted by ∓ and ± this over beat² − vertical².
+
+    field, top, height, spin_hz, amplitudes: as of `slow_swings`.
+    """
+    tilt, slope, bend, third = top.moment * field(np.array([height]))[:4, 0]
+    rates = 2 * np.pi * np.array(small_swings(field, top, height, spin_hz))
+    turning = top.axial * 2 * np.pi * spin_hz
+    lean = slope / 2 / (top.transverse * rates**2 - turning * rates - tilt)  # over the place
+    inertia = 2 * top.mass * rates + lean**2 * (2 * top.transverse * rates - turning)
+    coupling = third / 2 + bend / 2 * lean.sum() + slope * lean.prod()
+    others = np.array(amplitudes)[::-1]
+    return np.asarray((coupling * others) ** 2 / (2 * top.mass * np.abs(inertia)) / (2 * np.pi) ** 3)
+
+
 def _loads(field: Array, x: NDArray[np.complex128], lean: NDArray[np.complex128], upright: Array) -> tuple[Array, ...]:
     """Return sideways force, vertical force and sideways torque of a moment of 1 A m² off the axis.
 

@@ -105,11 +105,9 @@ class Sensor:
             squares = (2 * np.pi * frequency) ** 2 + 0.5 * (2 * math.pi * swings.vertical.value) ** 2
             return np.array([self.gain / self._of_lean(2 * one / self.gravity) for one in squares.tolist()])
 
-        rise = swings.vertical.value
         return replace(
             swings,
             amplitude=swings.amplitude * share(swings.frequency),
-            beside=swings.beside * share(swings.frequency[1::-1] + np.array([-rise, rise])),
             size_u=self.relative_u,
             rivals=tuple(map(self.corrected, swings.rivals)),
         )
