@@ -25,7 +25,7 @@ from levilab.present.document.blocks import (
 )
 from levilab.present.tables import table
 from levilab.software import software_versions
-from levilab.texts.text import ENGLISH, Text, how_many, spoken
+from levilab.texts.text import ENGLISH, Text, how_many, spoken, verbatim
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,8 @@ class Heading:
         byline = " · ".join(filter(None, (self.course, self.author, self.date)))
         if not self.title:
             return replace(document, byline=byline)
-        return replace(document, title=self.title, lead=f"{document.title}: {document.lead}", byline=byline)
+        lead = Text("{title}: {lead}", document.title, document.lead)
+        return replace(document, title=verbatim(self.title), lead=lead, byline=byline)
 
 
 #: With more inputs the commands of analyses name none.

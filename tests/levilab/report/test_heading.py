@@ -4,6 +4,7 @@ import re
 
 import pytest
 
+from levilab.present.document.blocks import Document, in_language_of_reader
 from levilab.report.page import write_report
 from levilab.report.reproduction import Heading
 from support.pages import Page
@@ -32,6 +33,12 @@ def test_a_short_one_has_no_more_and_names_the_command_that_makes_it(tmp_path):
     assert "Made by: levilab report" in text
     assert "--short --title" in text
     assert "readings.csv" not in text
+
+
+def test_a_title_of_a_person_is_not_translated_and_what_stands_below_it_is():
+    document = Heading("Result").above(Document("Figure", "no notes", ()))
+    said = in_language_of_reader(document, "de")
+    assert (said.title, said.lead) == ("Result", "Abbildung: keine Hinweise")
 
 
 def test_a_short_one_of_few_spin_downs_is_one_page_without_criteria(tmp_path):
