@@ -137,7 +137,7 @@ function runOf(run, number) {
     const canvas = make("canvas");
     canvas.id = `plot-${number}-${k}`;
     canvas.setAttribute("role", "img");
-    canvas.setAttribute("aria-label", phrase("{count} points: {y} against {x}", {count: x.length, y: phrase(yName), x: phrase(xName)}));
+    canvas.setAttribute("aria-label", phrase("{count} points: {y} against {x}", {count: x.length, y: look.channels.length ? yName : phrase(yName), x: phrase(xName)}));
     box.append(canvas);
   }
   return box;
@@ -230,7 +230,7 @@ function draw(number) {
   for (const [k, plot] of (look.plots[number] || []).entries()) {
     const canvas = by(`plot-${number}-${k}`), values = Float64Array.from(plot.y);
     if (canvas) drawReadings(sheet(canvas), {
-      x: Float64Array.from(plot.x), low: values, high: values, u: null, fit: null, single: true, xAxis: [...plot.x_axis, 1], yAxis: [...plot.y_axis, 1],
+      x: Float64Array.from(plot.x), low: values, high: values, u: null, fit: null, single: true, xAxis: [...plot.x_axis, 1], yAxis: [...plot.y_axis, 1, look.channels.length > 0],
     }, -1);
   }
 }

@@ -245,7 +245,8 @@ function nearest(x, toX, px) {
   return best;
 }
 
-const named = ([label, unit]) => unit ? `${phrase(label)} [${unit}]` : phrase(label);
+/** The name of an axis with its unit; one that is `typed` is a person's, in any language the same. */
+const named = ([label, unit, , typed]) => `${typed ? label : phrase(label)}${unit ? ` [${unit}]` : ""}`;
 
 export function upright(c, text, x, y) {
   c.save();

@@ -172,6 +172,18 @@ def test_a_choice_in_the_table_changes_how_it_is_read(hall, watched):
     assert page.evaluate(nameless) == []
 
 
+def test_the_name_of_a_channel_is_not_translated(hall, watched):
+    page, file = watched(), hall.root.parent / "scope.csv"
+    drawn = "CanvasRenderingContext2D.prototype.fillText = (text) => (window.drawn ||= []).push(text)"
+    page.add_init_script(drawn)
+    rows = "".join(f"{n},{n % 7}\n" for n in range(60))
+    file.write_text(f"X,time,Start,Increment,\nSequence,Volt,0.0,1e-3\n{rows}")
+    page.goto(f"{address(hall)}open?file={hall.opened.add(file)}&language=de#{hall.doors.token}")
+    until(page, "window.drawn?.length")
+    assert {"Zeit [s]", "time [V]"} <= {*page.evaluate("window.drawn")}
+    assert page.get_by_role("img", name="60 Punkte: time über Zeit").count() == 1
+
+
 def test_nothing_that_a_file_contains_becomes_markup(hall, watched):
     page, hostile, file = watched(), '<img src=x onerror="window.hacked=1">', hall.root.parent / "hostile.csv"
     rows = (f"{1.7e9 + t + 0.123:.9f};{f:.14f};{hostile}\n" for t, f in zip(TIME, SPIN, strict=True))
