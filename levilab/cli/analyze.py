@@ -304,10 +304,14 @@ def write_and_print(
     left_out: why other analyses have no result; tables: whether tables are printed.
     """
     from levilab.pipelines.catalogue import print_analysis
+    from levilab.pipelines.sources import LeftOut
     from levilab.pipelines.suits import left_out_of, remarks, texts_of
+    from levilab.texts.note import Note
 
     failures: list[LevilabError] = []
+    named = {text.skipped.path for text in left_out if isinstance(text, Note) and text.skipped}
     said = remarks([found.remarks for _, found in results])
+    said = [one for one in said if not (isinstance(one, LeftOut) and one.path in named)]
     messages = [*left_out, *texts_of(said)]
     for analysis, found in results:
         if save:

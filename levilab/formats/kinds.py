@@ -14,6 +14,7 @@ class Kind:
         suffixes: how the names of such files end.
         marks: (place, bytes) in the first 64 bytes that show it; any of them suffices.
         plural: of the name without the article; empty: with an s.
+        may_hold_readings: whether a person may have saved the readings themselves as such a file.
     """
 
     name: str
@@ -21,6 +22,7 @@ class Kind:
     suffixes: tuple[str, ...] = ()
     marks: tuple[tuple[int, bytes], ...] = ()
     plural: str = ""
+    may_hold_readings: bool = True
 
     @property
     def several(self) -> str:
@@ -49,6 +51,10 @@ def _program(name: str, suffixes: str, program: str, menu: str) -> Kind:
     return Kind(name, f"in {program}: {menu}", tuple(suffixes.split()))
 
 
+def _page(name: str, advice: str, suffixes: str) -> Kind:
+    return Kind(name, advice, tuple(suffixes.split()), may_hold_readings=False)
+
+
 #: The first row that fits decides: names of programs' own files before the marks of what these are made of.
 KINDS = (
     _program("a Logger Pro file", ".cmbl .gmbl", "Logger Pro", "File, Export As, CSV"),
@@ -64,8 +70,8 @@ KINDS = (
     _program("a MATLAB file", ".mat", "MATLAB", "writematrix([t f], 'run.csv')"),
     _program("a Numbers spreadsheet", ".numbers", "Numbers", "File, Export To, Excel"),
     _program("a binary Excel file", ".xlsb", "Excel", "File, Save As, .xlsx"),
-    Kind("a text document", "copy its table into a spreadsheet", (".docx", ".doc", ".odt", ".rtf", ".pages")),
-    Kind("a presentation", "copy its table into a spreadsheet", (".pptx", ".ppt", ".odp", ".key")),
+    _page("a text document", "copy its table into a spreadsheet", ".docx .doc .odt .rtf .pages"),
+    _page("a presentation", "copy its table into a spreadsheet", ".pptx .ppt .odp .key"),
     Kind(
         "a picture",
         "the numbers that it shows are needed, as CSV or a spreadsheet",
@@ -75,13 +81,20 @@ KINDS = (
             (8, b"WEBP"),
             *((4, mark) for mark in (b"ftyphei", b"ftypmif1", b"ftypavif")),
         ),
+        may_hold_readings=False,
     ),
     AUDIO,
     Kind("a WAV recording", "levilab analyze spin reads it", (".wav",), ((0, b"RIFF"), (0, b"RIFX"), (0, b"RF64"))),
     Kind("a NumPy array", "levilab analyze spin reads it", (".npy",), ((0, b"\x93NUMPY"),)),
     Kind("a ZIP or Excel file", "unpack it, or save it as CSV", (".zip", ".xlsx", ".ods"), ((0, b"PK\x03\x04"),)),
     Kind("an old Excel file", "in Excel: File, Save As, .xlsx", (".xls",), ((0, b"\xd0\xcf\x11\xe0"),)),
-    Kind("a PDF document", "export the table in it from the program that wrote it", (".pdf",), ((0, b"%PDF"),)),
+    Kind(
+        "a PDF document",
+        "export the table in it from the program that wrote it",
+        (".pdf",),
+        ((0, b"%PDF"),),
+        may_hold_readings=False,
+    ),
     Kind(
         "a packed archive",
         "unpack it",
@@ -89,7 +102,7 @@ KINDS = (
         ((0, b"\x1f\x8b"), (0, b"7z\xbc\xaf"), (0, b"Rar!"), (0, b"BZh9"), (0, b"\xfd7zXZ")),
     ),
     Kind("a JSON file", "name it if it holds a table; of a run, name the folder", (".json", ".jsonl"), ((0, b"{"),)),
-    Kind("a Markdown page", "name it if it holds a table", (".md", ".markdown")),
+    _page("a Markdown page", "name it if it holds a table", ".md .markdown"),
     Kind("an HTML or XML page", "copy its table into a spreadsheet", (".html", ".htm", ".xml"), ((0, b"<"),)),
     Kind("an HDF5 file", "in Python: pandas.read_hdf(…).to_csv(…)", (".h5", ".hdf5"), ((0, b"\x89HDF"),)),
     Kind("a MATLAB file", "in MATLAB: writematrix([t f], 'run.csv')", (), ((0, b"MATLAB 5.0"),)),
@@ -97,8 +110,8 @@ KINDS = (
     Kind("a Parquet file", "in Python: pandas.read_parquet(…).to_csv(…)", (".parquet",), ((0, b"PAR1"),)),
     Kind("a database", "export its table as CSV", (".db", ".sqlite"), ((0, b"SQLite format 3"),)),
 )
-OTHER = Kind("a file of another kind", plural="other files")
-REPORT = Kind("a report of levilab", plural="reports of levilab")
+OTHER = Kind("a file of another kind", plural="other files", may_hold_readings=False)
+REPORT = Kind("a report of levilab", plural="reports of levilab", may_hold_readings=False)
 #: What stands in a page and in a PDF that levilab wrote.
 _OF_LEVILAB = (b"<title>levilab: ", b"/Keywords(levilab)")
 EMPTY = Kind("an empty file", "record again")

@@ -228,15 +228,15 @@ class Analysis(Needs[Any], Generic[A]):
         if not skips or len(sources) == 1:
             return [one(source) for source in sources], []
         done: list[Done] = []
-        errors: list[DataError] = []
+        errors: list[tuple[DataError, Path]] = []
         for source in sources:
             try:
                 done.append(one(source))
             except DataError as error:
-                errors.append(error)
+                errors.append((error, source.path))
         if not done:
-            raise errors[-1]
-        return done, [str(Skipped(text_of(error))) for error in errors]
+            raise errors[-1][0]
+        return done, [Skipped(text_of(error), path=path).note for error, path in errors]
 
     def about_inputs(self, sources: Sequence[Source[Any]], options: Any) -> Iterable[str]:
         """Return what to know of the inputs before using the numbers."""

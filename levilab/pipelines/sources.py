@@ -17,7 +17,7 @@ import numpy as np
 
 from analysis.remarks import Remark
 from levilab.errors import DataError, DoesNotSuit, NoneUsable
-from levilab.formats.columns import NoSuchColumn
+from levilab.formats.columns import NoSuchColumn, TableError
 from levilab.formats.kinds import AUDIO, OTHER, Kind, kind_of
 from levilab.formats.texts import locate
 from levilab.formats.understanding import SeveralRuns
@@ -226,6 +226,11 @@ class Skipped:
     def __str__(self) -> str:
         return Text("skipped {things}", things=self.reason)
 
+    @property
+    def note(self) -> Note:
+        """The note about it, which keeps it."""
+        return Note(f"skipped {self.kind}".rstrip(), str(self), names_input=True, skipped=self)
+
 
 @dataclass(frozen=True)
 class LeftOut:
@@ -233,10 +238,12 @@ class LeftOut:
 
     Attributes:
         kind: of file, with what to do.
+        why: the reason of the one analysis that was asked for, of a table with columns that it reads; else empty.
     """
 
     path: Path
     kind: Kind = field(compare=False)
+    why: str = field(default="", compare=False)
 
     def __str__(self) -> str:
         return in_words([self])
@@ -256,6 +263,8 @@ class NothingSuits(DoesNotSuit):
 
 #: Of texts and spreadsheets.
 OTHER_COLUMNS = Kind("a table with other columns", "name one to see why", plural="tables with other columns")
+#: Of the right columns, as of a top that does not fall.
+UNSUITABLE = Kind("a table that does not suit", "name one to see why", plural="tables that do not suit")
 #: Files of a kind that are named beside their number, and files of a folder with names at all, and what to do.
 _NAMED, FEW = 2, 8
 
@@ -526,7 +535,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
             broken.append(Skipped(text_of(error), type(error).__name__, folder))
     found.sort(key=_begun)
     files = data_files(root)
-    remarks += [LeftOut(file, _kind(file)) for file in other_files(root)]
+    remarks += [LeftOut(file, kind_of_unused(file)) for file in other_files(root)]
     for file in files:
         with _skipping(file, broken, remarks):
             found += _at(file, needs, lambda path: replace(options(path), guess=False))
@@ -536,9 +545,8 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
         text = Text("{path:s}: {why}", path=str(root), why=_nothing_found(needs, kinds, broken, left_out))
         if not broken:
             raise NothingSuits(text, left_out)
-        raise NoneUsable(text, reasons={one.path: str(one) for one in broken})
-    notes = tuple(of_file(f"skipped {one.kind}", str(one)) for one in broken)
-    return Found(tuple(found), notes, (*kinds, *remarks))
+        raise NoneUsable(text, reasons={one.path: one.note for one in broken})
+    return Found(tuple(found), tuple(one.note for one in broken), (*kinds, *remarks))
 
 
 @contextmanager
@@ -549,13 +557,15 @@ def _skipping(file: Path, broken: list[Skipped], remarks: list[NotTaken]) -> Ite
     except NoRate as error:
         remarks.append(Skipped(text_of(error)))
     except DoesNotSuit as error:
-        remarks.append(LeftOut(file, OTHER_COLUMNS if isinstance(error, NoSuchColumn) else _kind(file)))
+        kind = OTHER_COLUMNS if isinstance(error, NoSuchColumn) else kind_of_unused(file)
+        fits = kind is OTHER_COLUMNS and not isinstance(error, TableError)
+        remarks.append(LeftOut(file, UNSUITABLE, text_of(error)) if fits else LeftOut(file, kind))
     except DataError as error:
         broken.append(Skipped(text_of(error), type(error).__name__, file))
 
 
-def _kind(file: Path) -> Kind:
-    """Return the kind of a file that is left out."""
+def kind_of_unused(file: Path) -> Kind:
+    """Return the kind of a file that no analysis reads."""
     try:
         kind = kind_of(file)
     except OSError as error:
@@ -624,7 +634,9 @@ def _nothing_found(
 ) -> str:
     seen = [*map(str, others)]
     seen += [f"{len(broken)} that cannot be used, as {broken[0].reason}"] if broken else []
-    seen += [files_by_kind(left_out)] if any(one.kind is not OTHER for one in left_out) else []
+    seen += [one.why for one in left_out if one.why]
+    rest = [one for one in left_out if not one.why]
+    seen += [files_by_kind(rest)] if any(one.kind is not OTHER for one in rest) else []
     if not seen:
         return "holds no run and no data file; name a run folder, a data file, or a folder with some of them"
     only = "no {runs} to analyze in this folder (found only {found}); name a run folder or a data file"

@@ -23,6 +23,7 @@ from levilab.pipelines.result import Archive, ResultError, Written, is_of_anothe
 from levilab.pipelines.result import save as save_files
 from levilab.pipelines.sources import (
     FEW,
+    OTHER_COLUMNS,
     Found,
     LeftOut,
     NothingSuits,
@@ -39,13 +40,14 @@ from levilab.pipelines.sources import (
 )
 from levilab.runs.find import RECORD, find_run, find_runs
 from levilab.runs.run import Run
-from levilab.texts.note import of_file
 from levilab.texts.text import Text, how_many, text_of
 
 Tell = Callable[[str], None]
 #: An input as each analysis takes it; and such inputs → the analyses that each of them gets.
 Taken = Mapping[str, Source[Any]]
 Choose = Callable[[Sequence[Taken]], list[Collection[str]]]
+#: Paths that are skipped, and why.
+Errors = list[tuple[Path, DataError]]
 T = TypeVar("T")
 
 
@@ -109,7 +111,7 @@ def recall_suiting(
         tell: called with the reason why no analysis can use a file or a run in a folder.
         skips: whether an input that cannot be used is skipped with a note, as long as there is another one.
     """
-    errors: list[DataError] | None = [] if skips else None
+    errors: Errors | None = [] if skips else None
     places, written = _split(paths)
     shares = _without_shared_inputs(written, [*_results_of(places)])
     names = _names_of_results(shares)
@@ -118,11 +120,11 @@ def recall_suiting(
         recalled = _recall(places if k == 0 else [], results, given, tell, errors)
         done += [(analysis, _with_names_of_results(analysis, found, results, names)) for analysis, found in recalled]
     if errors and not done:
-        raise errors[0]
+        raise errors[0][1]
     done.sort(key=lambda one: [*catalogue.ANALYSES].index(one[0].name))
     if errors:
         first, found = done[0]
-        notes = (of_file("skipped", str(Skipped(text_of(error)))) for error in errors)
+        notes = (Skipped(text_of(error), path=path).note for path, error in errors)
         done[0] = first, replace(found, warnings=(*found.warnings, *notes))
     return done
 
@@ -132,7 +134,7 @@ def _recall(
     written: Sequence[Written],
     given: Mapping[str, Any],
     tell: Tell | None,
-    errors: list[DataError] | None,
+    errors: Errors | None,
 ) -> list[tuple[Analysis[Any], Any]]:
     """Read or make the results of inputs; errors: where those of inputs that are skipped go, None: none is skipped."""
     own = {name: [one for one in written if one.analysis == name] for name in catalogue.ANALYSES}
@@ -171,21 +173,21 @@ def _recall(
     done = []
     for one in _suiting(places, options, choose, tell, results, skipped=errors):
         chosen, archive = one.analysis.options_from(given), archives[one.analysis.name]
-        with _skipping(errors):
+        with _skipping(errors, one.found.sources[0].path):
             found = one.analysis.recall_found(one.paths, one.found, archive, chosen, skips=errors is not None)
             done.append((one.analysis, found))
     return done
 
 
 @contextmanager
-def _skipping(errors: list[DataError] | None) -> Iterator[None]:
-    """Keep the error of an input that is skipped; with None no input is."""
+def _skipping(errors: Errors | None, path: Path) -> Iterator[None]:
+    """Keep the error of an input at a path that is skipped; with None no input is."""
     try:
         yield
     except DataError as error:
         if errors is None:
             raise
-        errors.append(error)
+        errors.append((path, error))
 
 
 def _results_of(places: Sequence[Path]) -> Iterator[Written]:
@@ -274,7 +276,7 @@ def _suiting(
     tell: Tell | None,
     more: Mapping[str, Sequence[Path]] | None = None,
     *,
-    skipped: list[DataError] | None = None,
+    skipped: Errors | None = None,
 ) -> list[Suiting]:
     """Return the analyses with the inputs that they take.
 
@@ -292,7 +294,7 @@ def _suiting(
     unusable: list[NoneUsable] = []
     looks: list[tuple[Path, dict[str, Found[Any]]]] = []
     for path in paths:
-        with _skipping(skipped):
+        with _skipping(skipped, path):
             found, errors = _look(path, readers)
             if not found:
                 raise _refusal(path, errors)
@@ -302,7 +304,7 @@ def _suiting(
         taken[name].append((path, one))
     for name, inputs in (more or {}).items():
         for path in inputs:
-            with _skipping(skipped):
+            with _skipping(skipped, path):
                 taken[name].append((path, find(path, rows[name], readers[name])))
     done = [
         Suiting(rows[name], tuple(path for path, _ in those), join([one for _, one in those]))
@@ -394,13 +396,16 @@ def _usable_runs(root: Path) -> list[Run]:
 def remarks(of_each: Sequence[Sequence[NotTaken]]) -> list[NotTaken]:
     """Join the remarks of several analyses; runs and files that were left out count only if all of them did."""
     said = list(dict.fromkeys(remark for those in of_each for remark in those))
-    return [one for one in said if isinstance(one, Skipped) or all(one in those for those in of_each)]
+    joined = [one for one in said if isinstance(one, Skipped) or all(one in those for those in of_each)]
+    if len(of_each) == 1:
+        return joined
+    return [LeftOut(one.path, OTHER_COLUMNS) if isinstance(one, LeftOut) and one.why else one for one in joined]
 
 
 def left_out_of(remarks: Sequence[NotTaken]) -> list[dict[str, str]]:
     """Return the files that are left out, for programs."""
     return [
-        {"path": one.path.as_posix(), "kind": one.kind.name.partition(" ")[2], "advice": one.kind.advice}
+        {"path": one.path.as_posix(), "kind": one.kind.name.partition(" ")[2], "advice": one.why or one.kind.advice}
         for one in remarks
         if isinstance(one, LeftOut)
     ]
@@ -409,13 +414,14 @@ def left_out_of(remarks: Sequence[NotTaken]) -> list[dict[str, str]]:
 def texts_of(remarks: Sequence[NotTaken]) -> list[str]:
     """Return remarks as lines of text: runs and files that are left out in one, a few files by name in their own."""
     left_out = [one for one in remarks if isinstance(one, LeftOut)]
-    few = len(left_out) <= FEW
+    few, unexplained = len(left_out) <= FEW, [one for one in left_out if not one.why]
     things = (*(str(one) for one in remarks if isinstance(one, SkippedRuns)), *number_by_kind([] if few else left_out))
     skipped = "skipped {things}" if few else "skipped {things} (levilab analyze --json names the files)"
     return [
         *(str(one) for one in remarks if isinstance(one, Skipped)),
         *([Text(skipped, things=things)] if things else []),
-        *([in_words(left_out)] if few and left_out else []),
+        *(str(Skipped(one.why)) for one in left_out if few and one.why),
+        *([in_words(unexplained)] if few and unexplained else []),
     ]
 
 

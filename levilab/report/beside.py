@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -134,6 +134,7 @@ class Class:
         found: what it found.
         model: the law whose constants are compared, that of most seeds; empty where the analysis has one model.
         others: the law of each group's seed where that is another one, by the group's name.
+        unread: why inputs could not be used, by their names.
     """
 
     analysis: Analysis[Any]
@@ -142,6 +143,7 @@ class Class:
     groups: tuple[Group, ...]
     quantities: tuple[Compared, ...]
     others: Mapping[str, str]
+    unread: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def marks(self) -> tuple[Mark, ...]:
@@ -174,8 +176,8 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
             source,
             _model(part, model).get("statistics", {}),
             part.get("best_model", "") if part.get("decided", True) else "undecided",
-            tuple(map(_plain, texts)),
-            tuple(_plain(text) for text in texts if is_doubt(text)),
+            tuple(map(plain_text, texts)),
+            tuple(plain_text(text) for text in texts if is_doubt(text)),
         )
         for source, part, texts in zip(found.sources, parts, said, strict=True)
     )
@@ -214,7 +216,7 @@ def _common(parts: Sequence[Mapping[str, Any]]) -> list[str]:
     return [name for name in first if all(name in other for other in others)][:_MOST_QUANTITIES]
 
 
-def _plain(text: str) -> str:
+def plain_text(text: str) -> str:
     """Return a message without backquotes, which stand for a terminal's bold letters."""
     return unquote(in_language(text)).replace("`", "")
 
@@ -334,9 +336,10 @@ def count_marks(of: Class) -> str:
     named: dict[str, list[str]] = {GOOD: [], LOOK: [], REPEAT: []}
     for group, one in zip(of.groups, of.marks, strict=True):
         named[one.word].append(group.source.name)
+    named[REPEAT] += of.unread
     good = len(named[GOOD])
     said = "{n} of {all} results is good." if good == 1 else "{n} of {all} results are good."
-    texts: list[str] = [Text(said, n=good, all=len(of.groups))]
+    texts: list[str] = [Text(said, n=good, all=len(of.groups) + len(of.unread))]
     texts += [Text("To repeat: {names}.", names=enumeration(named[REPEAT]))] if named[REPEAT] else []
     return Sentences(*texts, *([Text("To look at: {names}.", names=enumeration(named[LOOK]))] if named[LOOK] else []))
 
@@ -363,7 +366,7 @@ def finding(of: Class) -> str:
 
 def verdict(of: Class) -> str:
     """Return whose results are good, and the mean of each quantity beside the truth."""
-    if len(of.groups) == 1:
+    if len(of.groups) == 1 and not of.unread:
         (group,), (mark,) = of.groups, of.marks
         return Text("{name:s} alone measured this: {mark}.", name=group.source.name, mark=mark.word)
     texts = [

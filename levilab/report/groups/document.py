@@ -8,9 +8,8 @@ from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import unquote
 from levilab.files import check_writable
-from levilab.pipelines.sources import OTHER_COLUMNS, LeftOut
+from levilab.pipelines.sources import OTHER_COLUMNS, LeftOut, kind_of_unused, number_by_kind, short_paths
 from levilab.pipelines.suits import recall_suiting, remarks
 from levilab.present.document.blocks import (
     Block,
@@ -41,6 +40,7 @@ from levilab.report.beside import (
     count_readings,
     count_sources,
     finding,
+    plain_text,
     statistics_of_agreement,
     verdict,
 )
@@ -49,8 +49,9 @@ from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, write_content, writing_report
 from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
+from levilab.texts.note import Note as NoteOnData
 from levilab.texts.note import of_file
-from levilab.texts.text import Sentences, Text, in_language, spoken, verbatim
+from levilab.texts.text import Sentences, Text, spoken, verbatim
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -66,18 +67,19 @@ _ROWS = {GOOD: "best", LOOK: "", REPEAT: "outlier"}
 _FROM_CLASS, _TRUTH, _FROM_TRUTH = "from the others [u]", "truth", "from the truth [u]"
 
 
-def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str) -> Document:
+def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str, others: str = "") -> Document:
     """Return the document of a class.
 
     Args:
         classes: the groups, by each analysis.
         paths: as they were typed.
         name: of the document's file.
+        others: about files that hold no readings.
     """
     sources = list({source.path.resolve(): source for of in classes for source in of.found.sources}.values())
-    classes = sorted(classes, key=lambda of: -len(of.groups))  # what one group alone measured comes last
     alone = len(classes) == 1
-    warnings = dict.fromkeys(unquote(in_language(text)).replace("`", "") for text in _left_out(classes))
+    texts = [*(text for of in classes for text in of.found.warnings if not _is_unread(text)), others]
+    warnings = dict.fromkeys(plain_text(text) for text in texts if text)
     notes = [Section("Notes", (Warnings(tuple((text,) for text in warnings)),), anchor="notes")] if warnings else []
     chapters: list[Block] = []
     for k, of in enumerate(classes):
@@ -97,19 +99,33 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str) -
     )
 
 
-def _left_out(classes: Sequence[Class]) -> list[str]:
-    """Return warnings about all inputs, and the tables of which no analysis made a result."""
+def _is_unread(text: str) -> bool:
+    return isinstance(text, NoteOnData) and text.skipped is not None
+
+
+def _left_out(results: Results, told: Sequence[str]) -> tuple[dict[Path, str], str]:
+    """Return why inputs that can hold readings were not used, and a sentence about all other files."""
     said = (
         "{file}: a table whose columns are not certain, which no search reads: name the file itself, or keep its "
         "columns with `levilab open`"
     )
-    warnings = [text for of in classes for text in of.found.warnings]
-    unread = (
-        str(one.path)
-        for one in remarks([of.found.remarks for of in classes])
-        if isinstance(one, LeftOut) and one.kind == OTHER_COLUMNS
-    )
-    return [*warnings, *(Text(said, file=file) for file in unread if not any(file in text for text in warnings))]
+    used = {source.path for _, found in results for source in found.sources}
+    noted = [*(text for _, found in results for text in found.warnings), *told]
+    unread = {text.skipped.path: text.skipped.reason for text in noted if isinstance(text, NoteOnData) and text.skipped}
+    left_out = [one for one in remarks([found.remarks for _, found in results]) if isinstance(one, LeftOut)]
+    for one in left_out:
+        if one.kind == OTHER_COLUMNS:
+            unread.setdefault(one.path, Text(said, file=str(one.path)))
+        elif one.kind.may_hold_readings:
+            why = Text("{file:s}: {kind} ({advice})", str(one.path), kind=one.kind.name, advice=one.kind.advice)
+            unread.setdefault(one.path, one.why or why)
+    named = [LeftOut(path, kind_of_unused(path)) for path in unread if path.is_file()]
+    others = [one for one in {*named, *left_out} if not one.kind.may_hold_readings]
+    others.sort(key=lambda one: one.path)
+    names = tuple(one.path.name for one in others)
+    about = Text("without readings: {kinds} ({names:s})", number_by_kind(others), names) if others else ""
+    left_out_paths = {one.path for one in others}
+    return {path: unread[path] for path in sorted(unread) if path not in used | left_out_paths}, about
 
 
 def _each_reading_once(results: Results) -> Results:
@@ -156,8 +172,9 @@ def _marks(of: Class) -> Iterator[Tabular]:
         for group, mark in zip(of.groups, of.marks, strict=True)
         if mark.word != GOOD
     ]
+    rows += [Row((name, REPEAT, Text("not read: {problem}", why)), _ROWS[REPEAT]) for name, why in of.unread.items()]
     note = Text(
-        "repeat: no value, or one more than {far:.0f} u from its truth, or a doubt about the "
+        "repeat: not read, no value, or one more than {far:.0f} u from its truth, or a doubt about the "
         "readings; look: a warning, or, where no truth is known, more than {far:.0f} u from the "
         "others.",
         far=FAR,
@@ -290,17 +307,26 @@ def write_class(
         form.check()
     with writing_report(output):
         check_writable(output)
-    results = _each_reading_once(recall_suiting(paths, given or {}, tell, skips=True))
+    told: list[str] = []
+    results = _each_reading_once(recall_suiting(paths, given or {}, told.append, skips=True))
     classes = [class_of(analysis, found) for analysis, found in results]
+    classes.sort(key=lambda of: -len(of.groups))  # what one group alone measured comes last
+    unread, others = _left_out(results, told)
+    of_files = dict(zip(short_paths([*unread]), map(plain_text, unread.values()), strict=True))
+    classes[0] = replace(classes[0], unread=of_files)
     date = newest_of(results)
     if form:
-        document = (heading or Heading()).above(class_document(classes, paths, output.name))
+        document = (heading or Heading()).above(class_document(classes, paths, output.name, others))
         content = form.content(in_language_of_reader(replace(document, date=date, language=spoken())))
     else:
         content = class_workbook(classes, date)
     write_content(output, content)
     if tell:
-        for text in dict.fromkeys(_left_out(classes)):
+        kept = (
+            text for text in (*told, *(text for of in classes for text in of.found.warnings)) if not _is_unread(text)
+        )
+        unusable = (Text("not read: {problem}", why) for why in unread.values())
+        for text in dict.fromkeys([*kept, *unusable, *([others] if others else [])]):
             tell(text)
         found = tuple(Text("{subject} ({n})", subject=_subject(one), n=len(one.groups)) for one in classes)
         tell(Text("groups or runs side by side: {found}", found=found))

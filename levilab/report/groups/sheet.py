@@ -49,7 +49,7 @@ def class_workbook(classes: Sequence[Class], date: datetime | None) -> bytes:
             ):
                 sheet = book.add_worksheet(title)
                 _write(sheet, bold, heads, rows)
-                sheet.conditional_format(1, 1, len(of.groups), 1, red)
+                sheet.conditional_format(1, 1, len(of.groups) + len(of.unread), 1, red)
     return buffer.getvalue()
 
 
@@ -104,6 +104,7 @@ def _groups(of: Class) -> tuple[list[str], list[list[Cell]]]:
         fit = [group.statistics.get(name) for name in ("n", "rms_residual", "reduced_chi_square")]
         own = [column[k] for column in columns]
         rows.append([*about, *own, *fit, group.best_model])
+    rows += [[name, in_language(REPEAT), in_language(why)] for name, why in of.unread.items()]
     return heads, rows
 
 

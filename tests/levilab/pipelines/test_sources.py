@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from levilab.cli.analyze import write_and_print
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.sources import Readings, Skipped, SkippedRuns, collect, sha256_of
+from levilab.pipelines.options import LimitOptions, SpinDownOptions
+from levilab.pipelines.sources import NothingSuits, Readings, Skipped, SkippedRuns, collect, sha256_of
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import analyze_suiting, left_out_of, remarks, save, texts_of
 from levilab.report.page import write_report
@@ -196,6 +197,28 @@ def test_reports_of_levilab_are_named_as_such_and_need_no_advice(tmp_path):
         write_report([tmp_path / "run.csv"], tmp_path / name)
     (text,) = texts_of(remarks([found.remarks for _, found in analyze_suiting([tmp_path], {})]))
     assert text == "nothing to analyze in 2 reports of levilab (report.html, report.pdf)"
+
+
+def test_one_analysis_says_why_a_table_with_its_columns_does_not_suit(tmp_path):
+    (tmp_path / "a.csv").write_text("spin_frequency_hz\n21.7\n21.4\n21.6\n21.5\n", encoding="utf-8")
+    spin_down_csv(tmp_path / "b.csv")
+    found = collect([tmp_path], ANALYSES["limit"], lambda _: LimitOptions())
+    (text,) = texts_of(remarks([found.remarks]))
+    assert "b.csv: its spins differ by" in text
+    assert "nothing to analyze" not in text
+    (tmp_path / "a.csv").unlink()
+    with pytest.raises(NothingSuits, match=r"found only \S*b.csv: its spins differ"):
+        collect([tmp_path], ANALYSES["limit"], lambda _: LimitOptions())
+    assert left_out_of(remarks([found.remarks]))[0]["kind"] == "table that does not suit"
+    (text,) = texts_of(remarks([found.remarks, found.remarks]))
+    assert text == "nothing to analyze in a table with other columns (b.csv: name one to see why)"
+
+
+def test_a_damaged_spreadsheet_is_named_once(tmp_path, capsys):
+    spin_down_csv(tmp_path / "run.csv")
+    (tmp_path / "damaged.xlsx").write_bytes(b"PK\x03\x04" + bytes(300))
+    write_and_print(analyze_suiting([tmp_path], {}, (told := []).append), told, save=False, out=None, as_json=False)
+    assert capsys.readouterr().err.count("damaged.xlsx") == 1
 
 
 def test_sound_without_the_extra_is_counted_with_what_to_install(tmp_path, sample_data, monkeypatch):

@@ -166,12 +166,28 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
     assert of.quantities[0].used == tuple(group.source.name != "Group 2" for group in of.groups)
     assert of.quantities[0].mean.value == pytest.approx(2.4e-4, rel=0.03)  # the halved spins have 3.3e-4
     assert [line.get_marker() for axes in class_figure(of).axes for line in axes.lines].count(">") == 1
-    page = Page(write_class([root], tmp_path / "class.html", tell=(told := []).append).read_text("utf-8")).text
-    assert "spin-down, 2 notes" in page
-    assert page.index(whose) < page.index("Group 5.csv: ")
-    assert "Group 5.csv: a table whose columns are not certain, which no search reads: name the file itself" in page
-    assert any("Group 5.csv" in text for text in told)
-    assert re.search(r"skipped \S*Group 4.csv, line 1: holds 2 readings.* line 3: '10,abc' is no reading", page)
+    (root / "Group 6.xlsx").write_bytes(b"PK\x03\x04" + bytes(300))
+    (root / "Group 7.csv").write_bytes(b"")
+    (root / "photo.jpg").write_bytes(b"\xff\xd8\xff" + bytes(300))
+    unread = {
+        "Group 4.csv": ", line 1: holds 2 readings.* line 3: '10,abc' is no reading",
+        "Group 5.csv": ": a table whose columns are not certain, which no search reads: name the file itself",
+        "Group 6.xlsx": ": is a damaged ZIP or Excel file",
+        "Group 7.csv": r": an empty file \(record again\)",
+    }
+    for paths in ([root], [*root.iterdir()]):
+        written = write_class(paths, tmp_path / "class.html", tell=(told := []).append)
+        page = Page(written.read_text("utf-8")).text
+        assert f"2 of 7 results are good. To repeat: Group 2, {', '.join([*unread][:-1])} and Group 7.csv." in page
+        for name, why in unread.items() if paths == [root] else ():
+            assert re.search(rf"{name} repeat not read: \S*{name[:-4]}.*{why}", page)
+            assert sum(name in text for text in told) == 1
+        assert "without readings: a picture (photo.jpg)" in told
+        assert "without readings: a picture (photo.jpg)" in page
+        assert "1 note" in page
+        write_class(paths, book := tmp_path / "class.xlsx")
+        rows = CalamineWorkbook.from_path(book).get_sheet_by_name("spindown groups").to_python()
+        assert {row[0] for row in rows if row[1] == REPEAT} == {"Group 2", *unread}
     assert re.search(r"Group 2 repeat C₃/₂: \+\d+\.\d u from its truth", page)
 
 
