@@ -26,9 +26,9 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "frequency": {
         "Hz": 1, "hertz": 1, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, "μHz": 1e-6, "1/s": 1, "rps": 1, "U/s": 1,
         "rpm": PER_MINUTE, "1/min": PER_MINUTE, "U/min": PER_MINUTE, "UPM": PER_MINUTE, "hercios": 1,
-        **dict.fromkeys(("krpm", "1000rpm", "1000/min", "1000U/min", "103/min"), 1000 * PER_MINUTE),  # and 10³ min⁻¹
         "rad/s": PER_RADIAN, "rad_s": PER_RADIAN, "rad_per_s": PER_RADIAN,
         "°/s": 1 / 360, "deg/s": 1 / 360, "deg_s": 1 / 360, "grad/s": 1 / 360,
+        **dict.fromkeys(("krpm", "1000rpm", "1000/min", "1000U/min", "103/min"), 1000 * PER_MINUTE),  # and 10³ min⁻¹
     },
     "voltage": {"V": 1, "mV": 1e-3, "μV": 1e-6, "uV": 1e-6, "kV": 1e3},
     "length": {"m": 1, "cm": 1e-2, "mm": 1e-3, "μm": 1e-6, "um": 1e-6},

@@ -286,7 +286,7 @@ def test_the_commonest_mistakes_are_answered_in_german(typed, says, tmp_path, mo
     assert done.status in {1, 2}
     assert says in " ".join(line.strip("│ ") for line in done.err.splitlines())
     if typed.startswith("open"):
-        assert "welche Spalte enthält Zeit und welche Drehfrequenz?" in done.out
+        assert "welche Spalte enthält die Zeit und welche die Drehfrequenz?" in done.out
         assert "mit ihren Nummern: levilab open" in done.out
 
 
