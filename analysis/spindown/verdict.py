@@ -95,7 +95,9 @@ def _kind(fits: Mapping[str, Statistics], name: str, best: str) -> str:
         return "needless"
     if fit.difference <= TIED:
         return "tied"
-    more = fit.n_parameters > fits[best].n_parameters
-    if LAWS[name].contains(LAWS[best]) or (more and fit.misfit - fits[best].misfit <= TIED):
+    worse = fit.difference
+    if fit.n_parameters > fits[best].n_parameters:  # what more constants cost in the criterion excludes no law
+        worse = min(worse, fit.misfit - fits[best].misfit)
+    if LAWS[name].contains(LAWS[best]) or worse <= TIED:
         return "needless"
-    return "weak" if fit.difference <= EXCLUDED else "excluded"
+    return "weak" if worse <= EXCLUDED else "excluded"

@@ -27,6 +27,8 @@ COVERAGE = math.erf(1 / math.sqrt(2))
 FALSE_ALARM = 0.01
 #: Degrees of freedom up to which a standard deviation of pulls says nothing.
 LONG_TAILS = 8
+#: Scatter in u from which on 1 u holds half of the truths at most: the normal distribution has its quartiles at 0.674.
+MISLEADS = 1.48
 _NUMBER = re.compile(r"(\d+(?:\.\d+)?)")
 
 
@@ -122,6 +124,17 @@ class Spread:
     def u_coverage(self) -> float:
         """Standard error of the share."""
         return math.sqrt(self.wanted_coverage * (1 - self.wanted_coverage) / self.n)
+
+    @property
+    def excess(self) -> float:
+        """Factor by which the pulls scatter more than wanted; 1 where that is not judged or chance explains it."""
+        wider = self.deviation - self.wanted_deviation
+        return self.deviation / self.wanted_deviation if wider > self.room * self.u_deviation else 1.0
+
+    @property
+    def misleads(self) -> bool:
+        """Whether a reader is misled: a bias above 1 u, or 1 u that holds half of the truths, not 68 %."""
+        return self.verdict is Verdict.WRONG and (abs(self.mean) > 1 or self.excess > MISLEADS)
 
     @property
     def room(self) -> float:

@@ -116,10 +116,23 @@ def as_text(study: Study, symbols: Mapping[str, str] | None = None) -> str:
 
 
 def not_right_as_text(study: Study, symbols: Mapping[str, str]) -> str:
-    """Return in which quantities the pulls find the analysis wrong; empty where they do not."""
-    wrong = [_name(one.quantity, symbols) for one in study.spreads if one.verdict is Verdict.WRONG]
-    said = "For readings such as these the analysis is not right in {wrong}: trust the stated u of {wrong} less."
-    return Text(said, wrong=enumeration(wrong)) if wrong else ""
+    """Return by how much the pulls find the analysis wrong; empty where they do not."""
+    wrong = [_wrong(one, _name(one.quantity, symbols)) for one in study.spreads if one.verdict is Verdict.WRONG]
+    return Text("In simulated readings like these {wrong}.", wrong=enumeration(wrong)) if wrong else ""
+
+
+def _wrong(spread: Spread, symbol: str) -> str:
+    """Return the largest error of the estimates, or of their u, with its size."""
+    if abs(spread.mean) > spread.room * spread.u_mean:
+        too_large = "{symbol} comes out {size:.1f} u too large on average"
+        said = too_large if spread.mean > 0 else "{symbol} comes out {size:.1f} u too small on average"
+        return Text(said, symbol=symbol, size=abs(spread.mean))
+    if spread.excess > 1:
+        return Text("{symbol} scatters by {times:.1f} times its u", symbol=symbol, times=spread.excess)
+    return Text(
+        "{symbol} is within 1 u in {share:.0f} % of the trials instead of {wanted:.0f} %",
+        symbol=symbol, share=100 * spread.coverage, wanted=100 * spread.wanted_coverage,
+    )  # fmt: skip
 
 
 def _about_laws(study: Study) -> Iterator[str]:

@@ -73,10 +73,16 @@ def draw_fit(axes: Axes, kind: str, frame: pd.DataFrame, residual: str, curves: 
 
 
 def draw_column(axes: Axes, x: str, y: str, frame: pd.DataFrame, style: str = "-") -> None:
-    """Draw a column against another one, in the units of axes, with bars where its u is known."""
+    """Draw a column against another one, in the units of axes, with bars where its u is known.
+
+    Of yes and no there is nothing in between, and no line.
+    """
+    style = "o" if frame[y].dtype == bool else style
     at, values = (frame[one].to_numpy(dtype=float) * _factor(one) for one in (x, y))
     axes.errorbar(at, values, yerr=_bars(frame, y), fmt=style, elinewidth=0.8)
     axes.set(xlabel=_label(x), ylabel=_label(y))
+    if frame[y].dtype == bool:
+        axes.set_yticks([0, 1], ["no", "yes"])
 
 
 def draw_windows(axes: Axes, frame: pd.DataFrame) -> None:

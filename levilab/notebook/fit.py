@@ -139,6 +139,7 @@ class FittedModel(Named[Quantity]):
         super().__init__(values, f"the {entry.name} model's")
         self.name, self.statistics, self.covariance = entry.name, dict(entry.statistics), entry.covariance
         self._entry, self._of, self._number = entry, of, number
+        self.symbols = of.analysis.symbols
 
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (dict(self), self._entry, self._of, self._number)

@@ -275,7 +275,10 @@ class Named(Helpful, dict[str, V]):
     Attributes:
         what: which names these are, for messages.
         elsewhere: name → where it is found.
+        symbols: name → symbol in tables, by which a value is found, too, where no other one has it.
     """
+
+    symbols: Mapping[str, str] = MappingProxyType({})
 
     def __init__(self, values: Mapping[str, V], what: str, elsewhere: Mapping[Any, str] | None = None) -> None:
         super().__init__(values)
@@ -294,10 +297,13 @@ class Named(Helpful, dict[str, V]):
         return f"result.{self.elsewhere[name]}" if name in self.elsewhere else ""
 
     def __missing__(self, name: str) -> V:
+        named = [one for one in self if self.symbols.get(one) == name]
+        if len(named) == 1:
+            return self[named[0]]
         where = self._elsewhere(name)
         advice = f"take {where}" if where else meant(str(name), self) if len(self) else "there are none"
         with border:
             raise NoSuchName(str(name), f"not among {self.what}: {advice}")
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return type(self), (dict(self), self.what, self.elsewhere)
+        return type(self), (dict(self), self.what, self.elsewhere), {"symbols": dict(self.symbols)}

@@ -268,7 +268,9 @@ class AnalysisResult(Exportable):
             name: f"{where}[{model!r}][{name!r}]" for model, of in reversed(models.items()) for name in of
         }  # the first law that has it
         elsewhere |= {model: f"{where}[{model!r}]" for model in models}
-        return Named(values, f"{what}{law}", elsewhere)
+        named = Named(values, f"{what}{law}", elsewhere)
+        named.symbols = self.analysis.symbols
+        return named
 
     @bare
     def __getitem__(self, name: str) -> Quantity:
@@ -409,7 +411,11 @@ class AnalysisResult(Exportable):
 
     def to_latex(self) -> str:
         """Return the values as a small table of LaTeX; `levilab.report(result, …, tables=True)` writes all tables."""
-        rows = [rf"  {to_latex(name)} & {one._repr_latex_()} \\" for name, one in self.items()]
+        symbols = self.analysis.symbols
+        rows = [
+            rf"  {to_latex(symbols.get(name, name.replace('_', ' ')))} & {one._repr_latex_()} \\"
+            for name, one in self.items()
+        ]
         return "\n".join([r"\begin{tabular}{ll}", *rows, r"\end{tabular}"])
 
     def report(self, output: str | PathLike[str] = "report.html", **options: Any) -> Path:

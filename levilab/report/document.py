@@ -107,14 +107,24 @@ def blocks_of_part(
     )
     study = _study(analysis, found, made=asked.crosscheck)
     not_right = not_right_as_text(study, analysis.symbols) if study else ""
-    grave = (*([(not_right,)] if not_right else []), *grave)
+    if study and any(one.misleads for one in study.spreads):
+        grave, not_right = ((not_right,), *grave), ""
+    beside = [Paragraph(not_right)] if not_right else []
     doubts = [Warnings(grave)] if grave else []
     of = class_of(analysis, found) if len({source.group for source in found.sources if source.group}) > 1 else None
     why = ["levilab class says why."] if of and any(one.word != GOOD for one in of.marks) else []
     whose = [Paragraph(Sentences(count_marks(of), *why))] if of else []
     core = part.values or tuple(one for one in part.result if isinstance(one, Tabular))[:1]
     blocks = [
-        section("Result", "result", *doubts, Verdict(_verdict(found)), *whose, *(core if asked.short else part.result)),
+        section(
+            "Result",
+            "result",
+            *doubts,
+            Verdict(_verdict(found)),
+            *whose,
+            *(core if asked.short else part.result),
+            *beside,
+        ),
         section("Figure", "figure", picture_of(analysis, found, part, short=asked.short)),
     ]
     if asked.short:

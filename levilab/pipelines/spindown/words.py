@@ -329,9 +329,8 @@ def _value(estimate: Estimate) -> str:
 
 #: What a tilt costs that the readings do not show: docs/crosscheck.md has the numbers.
 TILT_ALLOWED = (
-    "the fits allow for a tilt of the moment, which these readings do not make certain: u is larger than that of a "
-    "plain fit, and of a top without a tilt C comes out too large and n too small, by less than one u; `tilt` = none "
-    "is for a top that is known to have none: where there is one, laws and constants come out wrong by many u"
+    "u allows for a tilt of the moment, which these readings leave open; for a top that is known to have none: `tilt` "
+    "= none"
 )
 
 

@@ -10,6 +10,7 @@ in a form of its own.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar
 
@@ -94,6 +95,19 @@ class Code:
     """
 
     text: str
+
+
+#: An option of a command and its value.
+_OPTION = re.compile(r'(--[\w-]+ (?:"[^"\n]*"|[^\s"-]\S*))')
+
+
+def with_options(code: str) -> list[str]:
+    """Return the parts of commands, in which an option with its value is one part.
+
+    >>> with_options("levilab acquire limit --mock --seed 2 --out class")
+    ['levilab acquire limit --mock ', '--seed 2', ' ', '--out class']
+    """
+    return [part for part in _OPTION.split(code) if part]
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from levilab.present.document.blocks import (
     Tabular,
     Verdict,
     Warnings,
+    with_options,
 )
 from levilab.present.document.typesetting import typeset
 from levilab.present.tables import Row, Table
@@ -162,7 +163,8 @@ def _bullets(_: Writer, block: Bullets, __: int) -> Html:
 
 
 def _code(_: Writer, block: Code, __: int) -> Html:
-    return element("pre", element("code", block.text))
+    parts = (element("span", part) if part.startswith("-") else part for part in with_options(block.text))
+    return element("pre", element("code", *parts))
 
 
 def _question(_: Writer, block: Question, __: int) -> Html:

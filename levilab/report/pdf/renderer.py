@@ -34,6 +34,7 @@ from levilab.present.document.blocks import (
     Tabular,
     Verdict,
     Warnings,
+    with_options,
 )
 from levilab.present.document.typesetting import typeset
 from levilab.present.tables import Table
@@ -293,7 +294,10 @@ def _lines(text: str) -> list[Text]:
 
 def _monospace(text: str) -> Text:
     """Return a line in letters of one width, divided anywhere; nothing is typeset."""
-    parts = _divisible(_plain(text))
+    parts: list[Any] = []
+    for part in with_options(text):
+        pieces = _divisible(_plain(part))
+        parts += [["whole", part]] if part.startswith("-") and len(pieces) == 1 else pieces
     return parts[0] if len(parts) == 1 else parts
 
 

@@ -54,6 +54,12 @@ def test_a_law_with_more_constants_is_needless_only_where_it_fits_as_well(worse,
     assert ("mixed" in found.needless) is needless
 
 
+def test_no_number_of_constants_excludes_a_law():
+    found = judged(disc=fit(18.0), mixed=fit(24.0, p=5))  # AICc charges 11 for three more of them
+    assert found.weak == ("mixed",)
+    assert judged(disc=fit(18.0), mixed=fit(28.1, p=5)).excluded == ("mixed",)
+
+
 def test_of_laws_that_fit_alike_none_is_singled_out_before_one_with_fewer_constants():
     found = judged(mixed=fit(18.0, p=3), disc=fit(21.7, p=2), stokes=fit(90.0, p=2))
     assert found.best == "disc"  # whose constants are shown

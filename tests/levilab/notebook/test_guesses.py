@@ -108,7 +108,12 @@ GUESSES = {
     "result.c32 == result['c32'] == result.values.c32": bool,
     "result.to_dict()['c32']": lambda found: list(found) == ["value", "u", "unit"],
     "json.loads(result.to_json())['best_model']": lambda law: law == "disc",
-    "result.to_latex()": lambda text: r"c32 & $0.0002369(4)\,\mathrm{(rad/s)^{-1/2}/s}$ \\" in text,
+    "result.to_latex()": lambda text: (
+        r"C\raisebox{-.4ex}{\scriptsize 3/2} & $0.0002369(4)\,\mathrm{(rad/s)^{-1/2}/s}$ \\" in text
+        and r"\_" not in text
+    ),
+    "result.models['power']['n'] is result.models['power']['exponent']": bool,
+    "pickle.loads(pickle.dumps(result.values))['C₃/₂'] == result['C₃/₂'] == result['c32']": bool,
     "result.report(new / 'r.html', crosscheck=False)": lambda path: path.stat().st_size > 20_000,
     "result.df": lambda frame: "c32" in set(frame["name"]),
     "result.data.shape == (20, 6)": bool,
@@ -220,6 +225,9 @@ GUESSES = {
     "levilab.sweep('undriven', spin_hz=[18, 30], duration=0.5).plot().axes[0].lines[0].get_ydata().tolist()": (
         lambda survived: survived == [0, 1]
     ),
+    "levilab.sweep('undriven', spin_hz=[18, 30], duration=0.5).plot().axes[0].lines[0].get_linestyle()": (
+        lambda style: style == "None"
+    ),
     "(s := result.params['start_frequency'], turn := s.to('rad/s'), turn.interval[1] / s.interval[1], turn / s)[2:]": (
         lambda ratios: ratios[0] == ratios[1].n == pytest.approx(2 * np.pi) and ratios[1].s < 1e-12
     ),
@@ -319,7 +327,6 @@ REFUSED = {
     "levilab.analyze((t, f, 'u'))": "an array of u, …: numbers are expected",
     "levilab.analyze('none/*.csv')": "no file or folder in",
     "levilab.analyze(levilab.runs(folder))": "analyze each kind by itself",
-    "result.models['power']['n']": "did you mean exponent",
     "result.plot('residual')": "did you mean residuals?",
     "result.plot('fit', model='disk')": "known are stokes, newton, disc",
     "result.plot('all', ax=ax)": "go with one panel",

@@ -10,6 +10,7 @@ import pytest
 from levilab.pipelines.suits import recall_suiting
 from levilab.present.document.blocks import (
     Banner,
+    Code,
     Document,
     Note,
     Paragraph,
@@ -22,6 +23,7 @@ from levilab.present.document.blocks import (
 from levilab.present.style import as_pdf as as_pdf_page
 from levilab.present.tables import table
 from levilab.report.document import document_of
+from levilab.report.html.page import page_of
 from levilab.report.page import write_report
 from levilab.report.pdf.renderer import NoTypst, as_pdf, files_of, fonts, settle
 from levilab.report.reproduction import Asked
@@ -65,6 +67,16 @@ def test_no_text_becomes_markup_or_ends_the_setting():
     assert files["main.typ"] == template, "the template is the same whatever the text is"
     assert b"@preview" not in template
     assert b"eval(" not in template
+
+
+def test_an_option_and_its_value_stand_on_one_line():
+    document = Document("t", "", (Code('levilab acquire limit --group "Group 1" --mock --set limit.repetitions=10'),))
+    (line,) = data_of(document)["before"][0]["lines"]
+    assert [part for part in line if isinstance(part, list)] == [
+        ["whole", '--group "Group 1"'], ["whole", "--set limit.repetitions=10"],
+    ]  # fmt: skip
+    assert as_pdf(document).startswith(b"%PDF")
+    assert "<span>--set limit.repetitions=10</span>" in page_of(document)
 
 
 def test_the_date_is_that_of_the_data_and_never_the_present_one():

@@ -1,6 +1,7 @@
 """The cross-check with a result's own parameters: right for right analyses, the same each time, kept beside the run."""
 
 import json
+import re
 import shutil
 from dataclasses import replace
 
@@ -16,10 +17,10 @@ from levilab.crosscheck.subject import Trial
 from levilab.crosscheck.table import as_text, crosscheck_table
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.present.document.blocks import Warnings
+from levilab.present.document.blocks import Paragraph, Warnings
 from levilab.report.document import document_of
 from levilab.report.reproduction import Asked
-from support.paths import ROOT
+from support.paths import ROOT, SAMPLE_DATA
 
 CHEAP = (
     ("precession", "precession-sweep"),
@@ -151,23 +152,34 @@ def test_the_table_says_what_is_wanted_of_each_row(runs):
     assert "not judged" not in as_text(many)
 
 
-def test_a_wrong_analysis_is_named_and_begins_each_report(monkeypatch, sample_data, tmp_path):
+@pytest.mark.parametrize(
+    ("of_trial", "said", "begins"),
+    [
+        ((0, 0.5), r"mean scatters by 2\.\d times its u", True),
+        ((-0.6, 1), r"mean comes out 0\.\d u too small on average", False),
+        ((1.5, 1), r"mean comes out 1\.\d u too large on average", True),
+    ],
+)
+def test_a_wrong_analysis_is_named_with_its_size(monkeypatch, tmp_path, of_trial, said, begins):
+    """Above the answer only where that misleads."""
+    bias, part = of_trial
+
     def off(random):
         trial = real.trial(random)
-        return Trial([replace(one, u=one.u / 2) for one in trial.pulls])
+        return Trial([replace(one, estimate=one.estimate + bias * one.u, u=one.u * part) for one in trial.pulls])
 
-    shutil.copytree(sample_data / "lower-limits", tmp_path / "run")
+    shutil.copytree(SAMPLE_DATA / "lower-limits", tmp_path / "run")
     found = result("limit", tmp_path / "run")
     real = OWN["limit"](found)
     monkeypatch.setattr("levilab.crosscheck.own.study.OWN", {"limit": lambda _: Own("wrong", off, 0.001)})
     checked = study_result("limit", found, (row := ANALYSES["limit"]).settings_of(found), 100)
     assert not checked.holds
-    said = "For readings such as these the analysis is not right in mean: trust the stated u of mean less."
-    assert said in as_text(checked)
+    (said,) = re.findall(rf"In simulated readings like these {said}\.", as_text(checked))
     for stored in (False, True):
         for short in (False, True):
             result_first, *_ = document_of([(row, found)], (), Asked(short=short, crosscheck=False)).blocks
-            assert (result_first.blocks[0] == Warnings(((said,),))) is stored
+            assert (result_first.blocks[0] == Warnings(((said,),))) is (stored and begins)
+            assert (result_first.blocks[-1] == Paragraph(said)) is (stored and not begins)
         store([checked], found.place)
     assert crosscheck_table([checked]).rows[0].cells[-1] == "NO"
 

@@ -136,6 +136,7 @@ def test_a_result_says_that_a_tilt_was_allowed_for_and_what_leaves_it_out(tmp_pa
         for tilt in ("auto", "none")
     }
     assert said == {"auto": True, "none": False}
+    assert len(TILT_ALLOWED.split()) <= 25
 
 
 def test_a_wobble_is_seen_where_there_is_one_and_not_in_noise():

@@ -64,7 +64,8 @@ def test_the_commands_of_a_worksheet_find_the_numbers_of_its_key(experiment, tmp
     monkeypatch.setattr("levilab.report.worksheets.document.SHEETS", SHORT)
     sheet, seeds = SHORT[experiment], {"Group 1": 41}
     (file,) = write_worksheets([experiment], tmp_path, seeds, keys=False)
-    commands = re.findall(r"levilab [^\n<]+", re.search(r"<pre>.*?</pre>", file.read_text("utf-8"), re.DOTALL)[0])
+    typed = re.search(r"<pre>.*?</pre>", file.read_text("utf-8"), re.DOTALL)[0]
+    commands = re.findall(r"levilab [^\n]+", re.sub("<[^>]+>", "", typed))
     assert len(commands) == len(sheet.commands("", 0))
     for command in commands:
         levilab(*shlex.split(command.replace("&quot;", '"'))[1:])
