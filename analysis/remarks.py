@@ -50,7 +50,7 @@ Kind = Literal[
     "scan scatters",  # χ²/dof
     "scan overstated",  # χ²/dof
     "contradicts",  # the parameter; found, stated, u of the stated one
-    "scan bends",  # probability of residuals that keep their sign over that many heights
+    "scan bends",  # p of the runs test, where runs are too few
     "no ring",  # rms of the residuals, largest flux density [T]
     "no strength",
     "stray reading",  # height [m], distance from the others in u

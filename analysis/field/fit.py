@@ -42,6 +42,8 @@ SAME_HEIGHT_M = 1e-5
 _MOST_TURNS = 8
 #: A field below this multiple of the background's u counts as none.
 _NO_FIELD = 5.0
+#: The Durbin–Watson statistic of residuals in no order; it is smaller where neighbours are alike.
+_BY_CHANCE = 2.0
 #: A χ² less probable than this: the model, or the stated uncertainty, is wrong.
 NO_FIT = 1e-3
 #: A χ² more improbably small than this: the stated uncertainties are mostly common to all readings.
@@ -49,8 +51,8 @@ _TOO_GOOD = 1e-4
 #: A scan that leaves more than this share of the calliper's u has learned nothing; scan and calliper may differ by so
 #: many u.
 LEARNS_NOTHING, APART = 0.9, 3.0
-#: Residuals whose rms is above this part of the largest reading are those of another field: heights that are set to
-#: 1 mm leave 0.02.
+#: Residuals whose rms is above this part of the largest reading, and that keep their sign over many heights, are those
+#: of another field; heights that are set to 2 mm leave 0.05 in the mean, in no order.
 _MOST_LEFT = 0.05
 #: Where no prior says how thick the ring is, the search begins at this part of its inner radius.
 _START_THICKNESS = 0.3
@@ -114,6 +116,12 @@ class Statistics:
     degrees_of_freedom: int
     durbin_watson: float | None
     runs_test_p: float | None
+
+    @property
+    def keeps_sign(self) -> bool:
+        """Whether the residuals have too few runs of one sign for chance."""
+        few = self.durbin_watson is not None and self.durbin_watson < _BY_CHANCE
+        return few and self.runs_test_p is not None and self.runs_test_p < NO_FIT
 
     @property
     def reduced_chi_square(self) -> float | None:
@@ -435,8 +443,7 @@ def _describe_scan(problem: _Problem, values: Array, sigma: Array) -> FieldScan:
     }
     scan = FieldScan(parameters, covariance, free, known, statistics, problem.z, problem.b, sigma)
     leverage = found.leverage[: len(problem.z)]
-    explained = statistics.chi_square is not None and factor == 1.0
-    return replace(scan, remarks=(*misfit, *_doubts(scan, explained=explained), *_outliers(scan, leverage)))
+    return replace(scan, remarks=(*misfit, *_doubts(scan), *_outliers(scan, leverage)))
 
 
 def _statistics(problem: _Problem, values: Array, sigma: Array) -> Statistics:
@@ -461,7 +468,7 @@ def _misfit(statistics: Statistics) -> tuple[float, list[Remark]]:
     reduced = statistics.reduced_chi_square
     if reduced is None or statistics.chi_square is None:
         p = statistics.runs_test_p
-        return 1.0, [Remark("scan bends", values=(p,))] if p is not None and p < NO_FIT else []
+        return 1.0, [Remark("scan bends", values=(p,))] if p is not None and statistics.keeps_sign else []
     if float(chdtrc(statistics.degrees_of_freedom, statistics.chi_square)) < NO_FIT:
         return reduced, [Remark("scan scatters", values=(reduced,))]
     if float(chdtr(statistics.degrees_of_freedom, statistics.chi_square)) < _TOO_GOOD:
@@ -544,20 +551,15 @@ def parts_of(scan: FieldScan, height_u: ArrayLike | float) -> dict[str, tuple[UP
     }
 
 
-def _doubts(scan: FieldScan, *, explained: bool) -> list[Remark]:
-    """Return remarks: scan and calliper contradict each other, no ring has the field, or it is not significant.
-
-    Args:
-        scan: the fit.
-        explained: whether the stated uncertainties explain its residuals.
-    """
+def _doubts(scan: FieldScan) -> list[Remark]:
+    """Return remarks: scan and calliper contradict each other, no ring has the field, or it is not significant."""
     said = []
     for name in scan.fitted:
         prior, found = scan.known.prior(name), scan.parameters[name].value
         if prior is not None and found is not None and abs(found - prior.value) > APART * prior.u:
             said.append(Remark("contradicts", name=name, values=(found, prior.value, prior.u)))
     left, largest = scan.statistics.rms_residual, float(np.abs(scan.flux_density).max())
-    if left > _MOST_LEFT * largest and not explained:
+    if left > _MOST_LEFT * largest and scan.statistics.keeps_sign:
         said.append(Remark("no ring", values=(left, largest)))
     strength = scan.parameters["strength"]
     if strength.value is not None and strength.u is not None and abs(strength.value) < 3 * strength.u:
