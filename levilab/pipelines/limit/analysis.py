@@ -12,7 +12,7 @@ from analysis import stability
 from analysis.errors import AnalysisError
 from analysis.limits import Comparison, Sample, Statistics, combine, compare, nearest_edge, spins_of_window, summarize
 from analysis.numbers import digits
-from analysis.spindown.fall import STOPPED_ABOVE_HZ
+from analysis.spindown.fall import FALLS_BETWEEN_HZ, STOPPED_ABOVE_HZ
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.limit.readings import LimitReadings
@@ -479,7 +479,7 @@ def _beside_theory(limits: Limits) -> Iterable[str]:
     why, one = "", theory.get(RESONANCE)
     if (off > 0) == lower:
         why = ": a real top is tilted and moves, and is lost sooner"
-        if lower and edge.expected + off > STOPPED_ABOVE_HZ:
+        if lower and off > STOPPED_ABOVE_HZ - FALLS_BETWEEN_HZ[1]:
             why = ", more than a tilt explains: was the top stopped?"
         elif lower and one:
             why = Text(": a real top is tilted, leans ever more towards {hz:.2f} Hz, the {name}, and falls sooner",

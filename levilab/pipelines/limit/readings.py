@@ -106,18 +106,19 @@ def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> Limi
         track = track_of_field(record.times, record.field, near=near)
     except AnalysisError as error:
         raise DoesNotSuit("{path:s}: {error}", path, error) from error
-    falls = []
+    falls, slowing = [], []
     for one in track.flights:
         part = slice(one.first, one.last)
         known = not any(spin.doubtful for spin in track.spins[part])
         if one.ended and known and one.last - one.first >= FEWEST:
             reach = math.sqrt(3) * one.u_end  # of an even distribution of this u
             u = float(np.median(track.u[part]))
+            slowing.append(track.frequency[one.last - 1] < track.frequency[one.first])
             falls.append(spin_at_fall(track.time[part], track.frequency[part], u, (one.end - reach, one.end + reach)))
     if not falls:
         raise DoesNotSuit("{path:s}: no top falls in it after {n} windows whose spin is certain", path, FEWEST)
     spins, u_spins = np.array([(one.value, one.u) for one in falls], dtype=float).T
-    tops, notes, stopped = len(track.flights), [*record.warnings], spins > STOPPED_ABOVE_HZ
+    tops, notes, stopped = len(track.flights), [*record.warnings], np.array(slowing) & (spins > STOPPED_ABOVE_HZ)
     if stopped.any():
         said = (
             "{name:s}: {n} of {tops} tops are lost at {hz:.3g} Hz or above and are left out: no top falls so early, "

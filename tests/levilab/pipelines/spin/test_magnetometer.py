@@ -73,6 +73,9 @@ def test_a_top_that_is_stopped_by_hand_shows_no_lower_limit(tmp_path):
     with pytest.raises(DoesNotSuit, match=r"1 of 1 tops are lost at 37 Hz or above and are left out"):
         ANALYSES["limit"].analyze([path])
     assert [analysis.name for analysis, _ in analyze_suiting([path], {})] == ["spindown", "spin"]
+    rising = synthetic_flight(np.random.default_rng(58), duration=60.0, up=(0.0, 40.0), start_hz=36.0, loss=-2e-3)
+    limit = ANALYSES["limit"].analyze([phone(tmp_path / "rising.csv", *rising[:2])]).sources[0].readings.limit
+    assert limit == pytest.approx([39.0], abs=0.1)  # that of a drive
     (file := tmp_path / "mine.csv").write_text("38.1\n37.9\n38\n", encoding="utf-8")
     assert "Hz above it, more than a tilt explains: was the top stopped?" in ANALYSES["limit"].analyze([file]).text
 
