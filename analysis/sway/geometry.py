@@ -31,7 +31,8 @@ SHIFT_U = 0.035
 NEXT_SHIFT_U = 5e10
 #: Where the beat of the slow swings comes near the vertical swing, they exchange energy with it, and the shift's next
 #: orders count: relative standard uncertainty of the split, times A⁴ over the fourth power of the difference [Hz⁴/m⁴],
-#: as full motions of 120 tops over the whole window of masses have it; differences below NEAREST_HZ count as that.
+#: as full motions of 120 tops have it without the shift by the vertical swing, so that u of films is up to 1.4 times
+#: too large: a smaller one makes the choice between lines too sure.  Differences below NEAREST_HZ count as that.
 RESONANCE_U, NEAREST_HZ = 1.8e7, 0.04
 #: Tilt and height change within a window: relative standard uncertainty of Ω_g in a motion of small swings.
 MOTION_U = 6.5e-4

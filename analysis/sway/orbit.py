@@ -100,7 +100,7 @@ def slow_swings(
 def pumps(
     field: AxialField, top: SymmetricTop, height: float, spin_hz: float, amplitudes: tuple[float, float]
 ) -> Array:
-    """Return how strongly the other swing couples each one to the line beside it, of the vertical swing [Hz³].
+    """Return the coupling of each slow swing to the line at the other swing ± the vertical one [Hz³].
 
     Stiffnesses change with height, so that a product of either swing and the vertical one moves the other swing.  To
     lowest order backward and forward swing are shifted by ∓ and ± this over beat² − vertical².

@@ -164,9 +164,9 @@ def _speak(context: typer.Context, language: str) -> str:
 
     Empty where it is left to the browser, while the terminal speaks English.
     """
-    if not language:
-        return language
     source = context.get_parameter_source("language")
+    if not language and source and source.name == "DEFAULT":
+        return language
     check_language(language, "LEVILAB_LANGUAGE" if source and source.name == "ENVIRONMENT" else "language")
     speak(language)
     return language

@@ -259,7 +259,7 @@ def _notes_on_remarks(remarks: Sequence[tuple[TableError, str]], others: int) ->
     if len(remarks) == 1:
         yield left_out(remarks[0][0].line or 0, remarks[0][1], "is no reading")
     elif remarks:
-        said = "{n} of {rows} rows are no readings, as '{first:s}', and are left out: lines {places:s}"
+        said = "{n} of {rows} rows hold no reading (first: '{first:s}') and are left out: lines {places:s}"
         first, places = shorten(" ".join(remarks[0][1].split())), _places([str(error.line) for error, _ in remarks])
         yield Note("words", Said(said, len(remarks), others + len(remarks), first, places))
 

@@ -358,11 +358,11 @@ def _meaning(fit: SweepFit) -> Iterator[str]:
         )
         return
     if fit.locked:
-        yield "Each time the drive turns, the stem cuts the beam once, as that of a top that is locked to its drive."
+        yield "Each time the drive turns, the stem cuts the beam once, as for a top that is locked to its drive."
     else:
         yield (
-            "A top that is not locked, or a counter that misses or doubles pulses, does that; the free precession does "
-            "not follow the drive at all."
+            "The stem does not cut the beam once in each period of the drive: the top is not locked, or the counter "
+            "misses or doubles pulses; the free precession does not follow the drive at all."
         )
     theirs = published("thesis")["measured.slope"]  # printed without an uncertainty
     away = abs(line.slope - theirs.value) / line.u_slope

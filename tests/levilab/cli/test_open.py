@@ -140,7 +140,9 @@ def test_broken_rows_are_counted_in_one_sentence(tmp_path):
     (tmp_path / "my.csv").write_text(f"t,f\n{rows}", "utf-8")
     ended = command("open", "my.csv", cwd=tmp_path)
     (note,) = re.findall(r".* left out.*", ended.out + ended.err)
-    assert note == "note: my.csv: 7 of 20 rows are no readings, as '10,x', and are left out: lines 3, 6, 9, 12, 15, …"
+    assert (
+        note == "note: my.csv: 7 of 20 rows hold no reading (first: '10,x') and are left out: lines 3, 6, 9, 12, 15, …"
+    )
 
 
 def test_turns_a_minute_have_their_usual_unit():

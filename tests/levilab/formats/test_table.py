@@ -174,10 +174,10 @@ def test_times_of_hours_and_minutes_are_doubted(write):
 @pytest.mark.parametrize(("text", "says"), [
     ("t,f\n01/02/2026 23:59:59,61.5\n02/02/2026 0:00:00,61.25\n02/02/2026 0:00:01,61\n", "for day/month/year"),
     ("t,f\n1/2/2026 23:59:59,61.5\n1/3/2026 0:00:00,61.25\n1/3/2026 0:00:01,61\n", "for month/day/year"),
-    ("t,f\n0,61.5\nt,f\n1,61.25\nk.A.,#DIV/0!\n2,61\n", "2 of 5 rows are no readings, as 't,f'"),
+    ("t,f\n0,61.5\nt,f\n1,61.25\nk.A.,#DIV/0!\n2,61\n", "2 of 5 rows hold no reading (first: 't,f')"),
     ("t,f,u\n0,61.5,\n1,61.25,\n2,61,\n", "'u' is empty"),
     ("t,f,u [ppm]\n0,61.5,1\n1,61.25,1\n2,61,1\n", "'ppm' is no unit of frequency"),
-    ("t,f\n0,61.5\n1,61.25\n2,61\nmean,61.25\nEnd of data\n", "of 5 rows are no readings, as 'mean,61.25'"),
+    ("t,f\n0,61.5\n1,61.25\n2,61\nmean,61.25\nEnd of data\n", "of 5 rows hold no reading (first: 'mean,61.25')"),
 ])  # fmt: skip
 def test_what_is_taken_for_what_it_looks_like_has_a_note(write, text, says):
     table = read_table(write(text))
