@@ -98,7 +98,7 @@ class DoubtWarning(UserWarning):
 
 
 class NoneUsable(DataError):
-    """A folder without anything that an analysis can use.
+    """Inputs, or a folder, without anything that an analysis can use.
 
     Attributes:
         reasons: path → why it cannot be used.

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeAlias, g
 from pydantic import BeforeValidator, Field, PlainSerializer, create_model
 
 from analysis.errors import AnalysisError
-from levilab.errors import DataError, UsageError, unquote
+from levilab.errors import DataError, NoneUsable, UsageError, unquote
 from levilab.files import finite
 from levilab.formats.device import Device
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, NOW, A, Origin
@@ -224,19 +224,20 @@ class Analysis(Needs[Any], Generic[A]):
     def _each(
         self, sources: Sequence[Source[Any]], one: Callable[[Source[Any]], Done], *, skips: bool
     ) -> tuple[list[Done], list[str]]:
-        """Return what is found of each input, and warnings about those that are skipped."""
+        """Return what is found of each input, and warnings about those that are skipped.  Raises DataError."""
         if not skips or len(sources) == 1:
             return [one(source) for source in sources], []
         done: list[Done] = []
-        errors: list[tuple[DataError, Path]] = []
+        skipped: list[Skipped] = []
         for source in sources:
             try:
                 done.append(one(source))
             except DataError as error:
-                errors.append((error, source.path))
+                skipped.append(Skipped(text_of(error), path=source.path))
         if not done:
-            raise errors[-1][0]
-        return done, [Skipped(text_of(error), path=path).note for error, path in errors]
+            said = Sentences(*(one.reason for one in skipped), between="; ")
+            raise NoneUsable(said, reasons={one.path: one.note for one in skipped})
+        return done, [one.note for one in skipped]
 
     def about_inputs(self, sources: Sequence[Source[Any]], options: Any) -> Iterable[str]:
         """Return what to know of the inputs before using the numbers."""

@@ -46,8 +46,8 @@ Tell = Callable[[str], None]
 #: An input as each analysis takes it; and such inputs → the analyses that each of them gets.
 Taken = Mapping[str, Source[Any]]
 Choose = Callable[[Sequence[Taken]], list[Collection[str]]]
-#: Paths that are skipped, and why.
-Errors = list[tuple[Path, DataError]]
+#: Notes on inputs that are skipped, and their errors.
+Errors = list[tuple[str, DataError]]
 T = TypeVar("T")
 
 
@@ -124,8 +124,7 @@ def recall_suiting(
     done.sort(key=lambda one: [*catalogue.ANALYSES].index(one[0].name))
     if errors:
         first, found = done[0]
-        notes = (Skipped(text_of(error), path=path).note for path, error in errors)
-        done[0] = first, replace(found, warnings=(*found.warnings, *notes))
+        done[0] = first, replace(found, warnings=(*found.warnings, *(note for note, _ in errors)))
     return done
 
 
@@ -173,21 +172,23 @@ def _recall(
     done = []
     for one in _suiting(places, options, choose, tell, results, skipped=errors):
         chosen, archive = one.analysis.options_from(given), archives[one.analysis.name]
-        with _skipping(errors, one.found.sources[0].path):
+        with _skipping(errors, one.found.sources[0].path, one.found.warnings):
             found = one.analysis.recall_found(one.paths, one.found, archive, chosen, skips=errors is not None)
             done.append((one.analysis, found))
     return done
 
 
 @contextmanager
-def _skipping(errors: Errors | None, path: Path) -> Iterator[None]:
-    """Keep the error of an input at a path that is skipped; with None no input is."""
+def _skipping(errors: Errors | None, path: Path, notes: Sequence[str] = ()) -> Iterator[None]:
+    """Keep notes on the inputs at a path that are skipped, with the error; with None no input is."""
     try:
         yield
     except DataError as error:
         if errors is None:
             raise
-        errors.append((path, error))
+        reasons = error.reasons.values() if isinstance(error, NoneUsable) else ()
+        skipped = [*reasons] or [Skipped(text_of(error), path=path).note]
+        errors += [(note, error) for note in (*notes, *skipped)]
 
 
 def _results_of(places: Sequence[Path]) -> Iterator[Written]:

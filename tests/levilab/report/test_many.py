@@ -5,6 +5,7 @@ import shutil
 
 import pytest
 
+from levilab.errors import NoneUsable
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.limit.figure import limit_figure
 from levilab.pipelines.suits import save
@@ -103,6 +104,24 @@ def test_an_input_that_cannot_be_used_is_named_and_ends_nothing(tmp_path, write,
         assert len(re.findall(f"{said} {root / name}.{{0,99}}{doubt}", page)) == 1
     assert "group-1" in page
     assert "good.csv" in page
+
+
+@pytest.mark.usefixtures("undrawn_figures")
+def test_inputs_of_which_an_analysis_can_use_none_are_each_named_with_its_reason(tmp_path):
+    (root := tmp_path / "runs").mkdir()
+    shutil.copy(SAMPLE_DATA / "spin-down-1" / "readings.csv", root / "good.csv")
+    head, *rows = (SAMPLE_DATA / "field-scan" / "readings.csv").read_text("utf-8").splitlines()
+    radii = "the radii of the base are not known"
+    reasons = {"f1.csv": (radii, rows), "f2.csv": (radii, rows[1:]), "f3.csv": ("line 2", ["0.03,x"])}
+    for name, (_, of_file) in reasons.items():
+        (root / name).write_text("\n".join([head, *of_file, ""]), "utf-8")
+    for paths in ([root], sorted(root.iterdir())):
+        for write, said in ((write_report, "skipped"), (write_class, "repeat not read:")):
+            page = Page(write(paths, tmp_path / "page.html").read_text(encoding="utf-8")).text
+            for name, (why, _) in reasons.items():
+                assert len(re.findall(f"{said} {root / name}[^ ]* {why}", page)) == 1
+    with pytest.raises(NoneUsable, match=r"f1.csv: the radii .*; \S*f2.csv: the radii"):
+        write_report([root / "f1.csv", root / "f2.csv"], tmp_path / "none.html")
 
 
 @pytest.mark.usefixtures("undrawn_figures")
