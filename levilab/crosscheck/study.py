@@ -27,8 +27,6 @@ COVERAGE = math.erf(1 / math.sqrt(2))
 FALSE_ALARM = 0.01
 #: Degrees of freedom up to which a standard deviation of pulls says nothing.
 LONG_TAILS = 8
-#: Scatter in u from which on 1 u holds half of the truths at most: the normal distribution has its quartiles at 0.674.
-MISLEADS = 1.48
 _NUMBER = re.compile(r"(\d+(?:\.\d+)?)")
 
 
@@ -133,8 +131,8 @@ class Spread:
 
     @property
     def misleads(self) -> bool:
-        """Whether a reader is misled: a bias above 1 u, or 1 u that holds half of the truths, not 68 %."""
-        return self.verdict is Verdict.WRONG and (abs(self.mean) > 1 or self.excess > MISLEADS)
+        """Whether a reader is misled: a bias above 1 u, or 1 u that holds less than half of the truths."""
+        return self.verdict is Verdict.WRONG and (abs(self.mean) > 1 or self.coverage < 0.5)
 
     @property
     def room(self) -> float:

@@ -122,17 +122,19 @@ def not_right_as_text(study: Study, symbols: Mapping[str, str]) -> str:
 
 
 def _wrong(spread: Spread, symbol: str) -> str:
-    """Return the largest error of the estimates, or of their u, with its size."""
+    """Return the errors of the estimates and of their u, with their sizes."""
+    said: list[str] = []
     if abs(spread.mean) > spread.room * spread.u_mean:
         too_large = "{symbol} comes out {size:.1f} u too large on average"
-        said = too_large if spread.mean > 0 else "{symbol} comes out {size:.1f} u too small on average"
-        return Text(said, symbol=symbol, size=abs(spread.mean))
+        bias = too_large if spread.mean > 0 else "{symbol} comes out {size:.1f} u too small on average"
+        said.append(Text(bias, symbol=symbol, size=abs(spread.mean)))
     if spread.excess > 1:
-        return Text("{symbol} scatters by {times:.1f} times its u", symbol=symbol, times=spread.excess)
-    return Text(
+        said.append(Text("{symbol} scatters by {times:.1f} times its u", symbol=symbol, times=spread.excess))
+    shares = Text(
         "{symbol} is within 1 u in {share:.0f} % of the trials instead of {wanted:.0f} %",
         symbol=symbol, share=100 * spread.coverage, wanted=100 * spread.wanted_coverage,
     )  # fmt: skip
+    return enumeration(said or [shares])
 
 
 def _about_laws(study: Study) -> Iterator[str]:

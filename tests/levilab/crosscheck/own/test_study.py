@@ -158,6 +158,7 @@ def test_the_table_says_what_is_wanted_of_each_row(runs):
         ((0, 0.5), r"mean scatters by 2\.\d times its u", True),
         ((-0.6, 1), r"mean comes out 0\.\d u too small on average", False),
         ((1.5, 1), r"mean comes out 1\.\d u too large on average", True),
+        ((-0.3, 0.5), r"mean comes out 0\.\d u too small on average and mean scatters by 2\.\d times its u", True),
     ],
 )
 def test_a_wrong_analysis_is_named_with_its_size(monkeypatch, tmp_path, of_trial, said, begins):
