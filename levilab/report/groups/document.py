@@ -9,7 +9,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from levilab.files import check_writable
-from levilab.pipelines.sources import OTHER_COLUMNS, LeftOut, kind_of_unused, number_by_kind, short_paths
+from levilab.pipelines.analyzed import A
+from levilab.pipelines.sources import OTHER_COLUMNS, Found, LeftOut, kind_of_unused, number_by_kind, short_paths
 from levilab.pipelines.suits import recall_suiting, remarks
 from levilab.present.document.blocks import (
     Block,
@@ -129,16 +130,30 @@ def _left_out(results: Results, told: Sequence[str]) -> tuple[dict[Path, str], s
 
 
 def _each_reading_once(results: Results) -> Results:
-    """Return the first result of the same readings, with a note of the others: a mean would count them twice."""
-    first: dict[str, tuple[Analysis[Any], Any]] = {}
-    said = "{names:s}: not counted, as {first:s} is a result of the same readings; levilab report shows all"
+    """Return one result of each analysis, with the same readings once, as a mean would count them twice, and a note."""
+    joined: dict[str, tuple[Analysis[Any], Any]] = {}
     for analysis, found in results:
-        _, counted = first.setdefault(analysis.name, (analysis, found))
-        if found is not counted:
-            names, first_names = (tuple(source.name for source in one.sources) for one in (found, counted))
-            note = of_file("repeated", Text(said, names=names, first=first_names))
-            first[analysis.name] = analysis, replace(counted, warnings=(*counted.warnings, note))
-    return [*first.values()]
+        _, first = joined.get(analysis.name, (analysis, None))
+        joined[analysis.name] = analysis, _with_other_readings(analysis, first, found) if first else found
+    return [*joined.values()]
+
+
+def _with_other_readings(analysis: Analysis[A], first: A, found: A) -> A:
+    """Return a result together with those inputs of another one whose readings it has not, and a note of the rest."""
+    said = "{names:s}: not counted, as {first:s} is a result of the same readings; levilab report shows all"
+    known = {source.sha256: source.name for source in first.sources}
+    again = {source.name: known[source.sha256] for source in found.sources if source.sha256 in known}
+    note = of_file("repeated", Text(said, names=(*again,), first=(*again.values(),)))
+    sources = (*first.sources, *(source for source in found.sources if source.name not in again))
+    done = {
+        source.name: (source, run, origin)
+        for one in (found, first)
+        for source, run, origin in zip(one.sources, one.runs, one.origins, strict=True)
+    }
+    warnings = (*first.warnings, *found.warnings, *([note] if again else []))
+    together = Found(sources, warnings, (*first.remarks, *found.remarks))
+    paths = [source.path for source in sources]
+    return analysis.gather(paths, together, first.options, lambda source: done[source.name])
 
 
 def _subject(of: Class) -> str:

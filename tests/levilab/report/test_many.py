@@ -76,6 +76,28 @@ def test_several_results_of_one_file_are_all_shown_and_count_once_in_a_class(tmp
     assert all(text in page for text in left_out)
 
 
+@pytest.mark.parametrize("laws", [(), ("disc",)])
+@pytest.mark.usefixtures("undrawn_figures")
+def test_of_results_that_share_an_input_a_class_counts_that_once_and_all_others(tmp_path, laws):
+    row = ANALYSES["spindown"]
+    a, b, c = (
+        shutil.copy(SAMPLE_DATA / f"spin-down-{k}" / "readings.csv", tmp_path / f"{name}.csv")
+        for k, name in enumerate("abc", 1)
+    )
+    save(row, row.analyze([a, b]), tmp_path / "x1")
+    save(row, row.analyze([a, c], row.options_from({"laws": laws} if laws else {})), tmp_path / "x2")
+    paths = [tmp_path / "x1", tmp_path / "x2"]
+    page = Page(write_class(paths, tmp_path / "class.html", tell=(told := []).append).read_text(encoding="utf-8")).text
+    assert [text.partition(";")[0] for text in told if "not counted" in text] == [
+        "a.csv (x2): not counted, as a.csv (x1) is a result of the same readings"
+    ]
+    assert "groups or runs side by side: spin-down (3)" in told
+    save(row, row.analyze([a, b, c]), tmp_path / "x3")
+    once = Page(write_class([tmp_path / "x3"], tmp_path / "class.html").read_text(encoding="utf-8")).text
+    mean = r"class mean \S* ?\d\S+"
+    assert re.findall(mean, page) == re.findall(mean, once) != []
+
+
 @pytest.mark.parametrize("named", [True, False])
 @pytest.mark.parametrize("write", [write_report, write_class])
 @pytest.mark.usefixtures("undrawn_figures")
