@@ -27,6 +27,7 @@ from levilab.report.pdf.renderer import as_pdf, check_typst
 from levilab.report.reproduction import Asked, Heading
 from levilab.report.tables.values import Values, folder_of, of_analysis, write_tables
 from levilab.runs.find import find_runs
+from levilab.texts.note import is_skipped
 from levilab.texts.text import Text, spoken
 
 #: Each kind of input with those that were found.
@@ -153,9 +154,11 @@ def _results(
     """Return what was found of the measurements at the paths; none where there are none and none are needed."""
     try:
         return recall_suiting(paths, given, tell, skips=True) if paths or needed else []
-    except (DoesNotSuit, NoneUsable):
+    except (DoesNotSuit, NoneUsable) as error:
         if needed:
             raise
+        for reason in error.reasons.values() if tell and isinstance(error, NoneUsable) else ():
+            tell(reason)  # type: ignore[misc]
         return []
 
 
@@ -182,7 +185,8 @@ def _values(results: Results, others: Found, folder: Path) -> Iterator[Values]:
 
 
 def _remarks(results: Results, others: Found) -> Iterator[str]:
-    """Yield what lies there and is not in the report."""
+    """Yield what lies there and is not in the report: inputs that cannot be used each by itself."""
+    yield from dict.fromkeys(text for _, found in results for text in found.warnings if is_skipped(text))
     reported = {kind.experiment for kind, _ in others}
     said = remarks([found.remarks for _, found in results])
     yield from texts_of([one for one in said if not (isinstance(one, SkippedRuns) and one.experiment in reported)])

@@ -64,6 +64,11 @@ def is_doubt(text: str) -> bool:
     return weight_of(text) == "doubt"
 
 
+def is_skipped(text: str) -> bool:
+    """Return whether a text is a note on an input that is not used."""
+    return isinstance(text, Note) and text.skipped is not None
+
+
 def reword(note: str, text: str, *, names_input: bool = False) -> Note:
     """Return a note of the same kind with another text."""
     named = names_input or (isinstance(note, Note) and note.names_input)

@@ -50,8 +50,7 @@ from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, write_content, writing_report
 from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
-from levilab.texts.note import Note as NoteOnData
-from levilab.texts.note import of_file
+from levilab.texts.note import is_skipped, of_file
 from levilab.texts.text import Sentences, Text, spoken, verbatim
 
 if TYPE_CHECKING:
@@ -79,7 +78,7 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str, o
     """
     sources = list({source.path.resolve(): source for of in classes for source in of.found.sources}.values())
     alone = len(classes) == 1
-    texts = [*(text for of in classes for text in of.found.warnings if not _is_unread(text)), others]
+    texts = [*(text for of in classes for text in of.found.warnings if not is_skipped(text)), others]
     warnings = dict.fromkeys(plain_text(text) for text in texts if text)
     notes = [Section("Notes", (Warnings(tuple((text,) for text in warnings)),), anchor="notes")] if warnings else []
     chapters: list[Block] = []
@@ -100,10 +99,6 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str, o
     )
 
 
-def _is_unread(text: str) -> bool:
-    return isinstance(text, NoteOnData) and text.skipped is not None
-
-
 def _left_out(results: Results, told: Sequence[str]) -> tuple[dict[Path, str], str]:
     """Return why inputs that can hold readings were not used, and a sentence about all other files."""
     said = (
@@ -112,7 +107,7 @@ def _left_out(results: Results, told: Sequence[str]) -> tuple[dict[Path, str], s
     )
     used = {source.path for _, found in results for source in found.sources}
     noted = [*(text for _, found in results for text in found.warnings), *told]
-    unread = {text.skipped.path: text.skipped.reason for text in noted if isinstance(text, NoteOnData) and text.skipped}
+    unread = {text.skipped.path: text.skipped.reason for text in noted if is_skipped(text)}
     left_out = [one for one in remarks([found.remarks for _, found in results]) if isinstance(one, LeftOut)]
     for one in left_out:
         if one.kind == OTHER_COLUMNS:
@@ -338,7 +333,7 @@ def write_class(
     write_content(output, content)
     if tell:
         kept = (
-            text for text in (*told, *(text for of in classes for text in of.found.warnings)) if not _is_unread(text)
+            text for text in (*told, *(text for of in classes for text in of.found.warnings)) if not is_skipped(text)
         )
         unusable = (Text("not read: {problem}", why) for why in unread.values())
         for text in dict.fromkeys([*kept, *unusable, *([others] if others else [])]):

@@ -151,6 +151,17 @@ def test_notes_name_options_on_the_terminal_and_quantities_where_stored(levilab,
 
 
 @pytest.mark.usefixtures("undrawn_figures")
+def test_an_input_that_a_report_skips_is_one_line_on_standard_error(levilab, tmp_path):
+    (tmp_path / "data").mkdir()
+    spin_down_csv(tmp_path / "data" / "good.csv")
+    (tmp_path / "data" / "bad.csv").write_text("t in s,f in Hz\n0,40\n10,abc\n", encoding="utf-8")
+    for paths in (["data/good.csv", "data/bad.csv"], ["data"]):
+        done = levilab("report", *paths, "--no-crosscheck")
+        (skipped,) = [line for line in done.stderr.splitlines() if "bad.csv" in line]
+        assert re.match(r"skipped data/bad.csv, line 1: holds 1 reading", skipped)
+
+
+@pytest.mark.usefixtures("undrawn_figures")
 def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab, tmp_path):
     for k, (name, *options) in enumerate((("a.csv",), ("b.csv", "--tilt", "none"))):
         levilab("analyze", "spindown", spin_down_csv(tmp_path / name, seed=k), *options)

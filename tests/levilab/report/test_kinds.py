@@ -102,6 +102,13 @@ def test_a_motion_is_drawn_anew_only_if_it_ends_in_the_state_that_was_recorded(f
     assert of_kind(motion_section(Run.load(copy)), Picture) == []
 
 
+def test_a_file_beside_a_sweep_that_cannot_be_used_is_told(place, tmp_path):
+    shutil.copytree(place / "map.zarr", tmp_path / "map.zarr")
+    (tmp_path / "bad.csv").write_text("t in s,f in Hz\n0,40\n10,abc\n", encoding="utf-8")
+    write_report([tmp_path], tmp_path / "report.html", tell=(told := []).append)
+    assert [text.partition(": holds 1 reading")[0] for text in told] == [f"skipped {tmp_path / 'bad.csv'}, line 1"]
+
+
 def test_a_scene_of_its_own_is_printed_whole(folder, tmp_path):
     copy = shutil.copytree(folder, tmp_path / folder.name)
     record = json.loads((copy / "run.json").read_text(encoding="utf-8"))
