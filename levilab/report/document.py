@@ -163,8 +163,8 @@ def _trials(analysis: Analysis[Any], found: Any, study: Study | None, *, made: b
     blocks = blocks_of(study, analysis.symbols) if study else advice
     if made and analysis.name not in OWN:
         why = Paragraph(
-            "A cross-check of films takes minutes and cannot use the parameters of this film. This command checks films of "
-            "other tops:"
+            "A cross-check of films takes minutes and cannot use the parameters of this film. This command checks "
+            "films of other tops:"
         )
         yield Section("Cross-check", (why, Code(f"levilab crosscheck {analysis.name}")), anchor="crosscheck")
     if blocks:
