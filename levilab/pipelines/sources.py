@@ -228,7 +228,7 @@ class Skipped:
 
     @property
     def note(self) -> Note:
-        """The note about it, which keeps it."""
+        """A note, whose `skipped` is this."""
         return Note(f"skipped {self.kind}".rstrip(), str(self), names_input=True, skipped=self)
 
 

@@ -27,7 +27,7 @@ from levilab.live.practice.drive import GATE_S, TRIGGER_V, PracticeDrive
 from levilab.live.practice.experiments import PRACTICE, PracticeExperiment, settings_for
 from levilab.live.practice.fall import cause_of_fall
 from levilab.live.practice.seeds import keys_of_seed, seed_of_group
-from levilab.live.practice.tasks import FAST_HZ, TASKS, Look, Tasks
+from levilab.live.practice.tasks import TASKS, Look, Tasks
 from levilab.live.practice.top import PracticeTop
 from levilab.pipelines.spindown.readings import release_of
 from levilab.runs.events import RunEvent
@@ -200,10 +200,6 @@ class PracticeProcess:
         self._look_at_top()
         self._look_at_task()
         self.drive.take_count(spin)
-        if self.drive.took_hold:
-            self.tasks.reach("catch")
-        if self.drive.follows and spin is not None and spin >= FAST_HZ:
-            self.tasks.reach("fast")
         if not self.drive.yields:  # while it does no other instrument keeps it waiting
             self._field = bench.magnetometer.flux_density()
 
@@ -227,6 +223,7 @@ class PracticeProcess:
         """See whether the goal of the task under way is reached."""
         drive, now = self.drive, self.clock.now()
         look = Look(now, self.top.floats(), self._spin, drive.output_hz, drive.follows, answer, fell_after)
+        self.tasks.reach_at_once(look)
         if task := self.tasks.look(look):
             found = task.found(self.top.scene)
             if found:  # its top stays as a person made it float

@@ -107,8 +107,6 @@ def _say_slope(b: float) -> str:
     return Text("b = {value:g} is not it: look at the line of the result once more, and record another", value=b)
 
 
-#: The spin of the task "fast" [Hz].
-FAST_HZ = 57.0
 TASKS: dict[str, Task] = {
     "catch": Task(
         "Catch it", "Let the drive take hold of the top: match the spin, then drive on.",
@@ -129,7 +127,7 @@ TASKS: dict[str, Task] = {
     "fast": Task(
         "Reach 57 Hz", "Take the top up with the drive. At 0.1 Hz/s it is lost near 61 Hz: more slowly it goes on.",
         "the air takes the more the faster the top spins, and a ramp takes its part of the drive's torque, too",
-        "frequency", lambda look: look.is_held and (look.spin_hz or 0.0) >= FAST_HZ,
+        "frequency", lambda look: look.is_held and (look.spin_hz or 0.0) >= 57.0,
     ),
     "guess": Task(
         "Find n", "The drag goes as ω to the n. Record a spin-down in this air of another kind, analyze it, and say n.",
@@ -209,6 +207,12 @@ class Tasks:
             return None
         self.reach(self.name)
         return task
+
+    def reach_at_once(self, look: Look) -> None:
+        """Note the goals that are there and need neither time nor an answer, also those of other tasks."""
+        for name, task in TASKS.items():
+            if not task.for_s and not task.answers and task.holds(look):
+                self.reach(name)
 
     def reach(self, name: str) -> None:
         """Note that a goal is reached, whether its task is under way or not."""
