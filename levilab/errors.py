@@ -1,9 +1,8 @@
 """Failures that a user can mend: each is one line, never a traceback."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Sequence
 from difflib import get_close_matches
-from types import MappingProxyType
 from typing import Any
 
 from levilab.texts.text import Text, languages
@@ -101,11 +100,11 @@ class NoneUsable(DataError):
     """Inputs, or a folder, without anything that an analysis can use.
 
     Attributes:
-        reasons: path → why it cannot be used.
+        unread: its inputs (`levilab.pipelines.inputs.unread.Skipped`).
     """
 
-    def __init__(self, text: str, *in_order: Any, reasons: Mapping[Any, str] = MappingProxyType({})) -> None:
-        self.reasons = reasons
+    def __init__(self, text: str, *in_order: Any, unread: Sequence[Any] = ()) -> None:
+        self.unread = tuple(unread)
         super().__init__(text, *in_order)
 
 

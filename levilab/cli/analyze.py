@@ -18,6 +18,7 @@ from levilab.texts.text import Text, how_many, text_of
 
 if TYPE_CHECKING:
     from levilab.pipelines.document import Analysis
+    from levilab.pipelines.inputs.unread import Skipped
     from levilab.pipelines.many.table import Tally
 
 
@@ -159,7 +160,7 @@ def _analyze(
     from levilab.pipelines.catalogue import ANALYSES
     from levilab.pipelines.suits import analyze_suiting
 
-    left_out: list[str] = []
+    left_out: list[Skipped] = []
     with interruptible("what was fitted so far is lost, nothing is written"):
         _advise_on_many(paths)
         if kind == _EACH:
@@ -292,7 +293,7 @@ def _advice(tried: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, A
 
 def write_and_print(
     results: list[tuple["Analysis[Any]", Any]],
-    left_out: list[str],
+    left_out: Sequence["Skipped"],
     *,
     save: bool,
     out: Path | None,
@@ -304,15 +305,13 @@ def write_and_print(
     left_out: why other analyses have no result; tables: whether tables are printed.
     """
     from levilab.pipelines.catalogue import print_analysis
-    from levilab.pipelines.sources import LeftOut
-    from levilab.pipelines.suits import left_out_of, remarks, texts_of
-    from levilab.texts.note import Note
+    from levilab.pipelines.inputs.unread import LeftOut, left_out_of, remarks, texts_of
 
     failures: list[LevilabError] = []
-    named = {text.skipped.path for text in left_out if isinstance(text, Note) and text.skipped}
+    named = {one.path for one in left_out}
     said = remarks([found.remarks for _, found in results])
     said = [one for one in said if not (isinstance(one, LeftOut) and one.path in named)]
-    messages = [*left_out, *texts_of(said)]
+    messages = [*(one.note for one in left_out), *texts_of(said)]
     for analysis, found in results:
         if save:
             failure, written = _save(analysis, found, out)

@@ -14,8 +14,8 @@ from levilab.crosscheck.table import as_text, crosscheck_table, failures_as_text
 from levilab.errors import UsageError
 from levilab.files import replace_atomically, writing
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.recall import recall_suiting
 from levilab.pipelines.result import Place
-from levilab.pipelines.suits import recall_suiting
 from levilab.present.progress import ShareBar
 from levilab.present.terminal import draw, terminal
 

@@ -15,8 +15,8 @@ from levilab.bench.person import Task
 from levilab.errors import DataError, UsageError
 from levilab.notebook.result import AnalysisResult
 from levilab.notebook.run import RecordedRun
+from levilab.pipelines.recall import recall_suiting
 from levilab.pipelines.result import RESULT, NoResult
-from levilab.pipelines.suits import recall_suiting
 from levilab.present.progress import Display
 from levilab.runs.find import RECORD, find_run, no_such_path
 from levilab.runs.run import Run

@@ -122,7 +122,8 @@ def _of_frames(result: AnalysisResult, folder: Path, called: str, in_words: Call
             own = replace(own, name=f"{called} {source.path.stem.removeprefix(FRAME)}".strip())
         sources.append(own)
     warnings = tuple(reword(text, in_words(text)) for text in result.found.warnings)
-    found = replace(result.found, sources=tuple(sources), warnings=warnings)
+    unread = tuple(replace(one, reason=in_words(one.reason)) for one in result.found.unread)
+    found = replace(result.found, sources=tuple(sources), warnings=warnings, unread=unread)
     return AnalysisResult(result.analysis, found, tuple(copies))
 
 

@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from analysis.budget import Budget
+from levilab.pipelines.inputs.source import Readings, Source
+from levilab.pipelines.inputs.unread import NotTaken, Skipped
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.result import Place
-from levilab.pipelines.sources import NotTaken, Readings, Source
 from levilab.texts.note import Note, is_doubt, kind_of, reword
 from levilab.texts.text import Sentences, Text
 
@@ -50,6 +51,7 @@ class Analyzed(Generic[S, R, T, Opt]):
         place: where the result belongs.
         warnings: about the inputs.
         remarks: what does not belong to the analysis, and is no cause for a warning.
+        unread: inputs that cannot be used.
         origins: one per source.
         budget: what the uncertainties of the numbers of all together are made of; empty where that is not known.
     """
@@ -61,6 +63,7 @@ class Analyzed(Generic[S, R, T, Opt]):
     place: Place
     warnings: tuple[str, ...]
     remarks: tuple[NotTaken, ...]
+    unread: tuple[Skipped, ...]
     origins: tuple[Origin[Opt], ...]
     budget: tuple[Budget, ...] = ()
 
@@ -99,7 +102,7 @@ class Analyzed(Generic[S, R, T, Opt]):
     @property
     def all_warnings(self) -> list[str]:
         """Every warning once, doubts first; an input's with its name, unless it says it or is of every input."""
-        texts = [*self.warnings, *self.about_all()]
+        texts = [*(one.note for one in self.unread), *self.warnings, *self.about_all()]
         of_runs = [
             [*source.warnings, *(() if source.readings.doubtful else self.about_run(run))]
             for source, run in zip(self.sources, self.runs, strict=True)

@@ -12,7 +12,7 @@ from analysis.numbers import digits
 from analysis.uncertainty import Estimate
 from instruments.time_bases import TIME_BASES
 from levilab.pipelines.analyzed import Analyzed
-from levilab.pipelines.sources import Source, mark_of
+from levilab.pipelines.inputs.source import Source, mark_of
 from levilab.present.document.blocks import Block, Bullets, Details, Note, Paragraph, Tabular
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.tables import Row, Table, table

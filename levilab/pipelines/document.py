@@ -16,7 +16,10 @@ from levilab.files import finite
 from levilab.formats.device import Device
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, NOW, A, Origin
 from levilab.pipelines.budget import budgets_of_result
-from levilab.pipelines.correction import read_correction
+from levilab.pipelines.inputs.correction import read_correction
+from levilab.pipelines.inputs.search import Found, collect
+from levilab.pipelines.inputs.source import Needs, Source
+from levilab.pipelines.inputs.unread import Skipped
 from levilab.pipelines.options import OF_FILES, InputOptions, options_of
 from levilab.pipelines.result import (
     AGAIN,
@@ -31,7 +34,6 @@ from levilab.pipelines.result import (
     place_of,
     relative,
 )
-from levilab.pipelines.sources import Found, Needs, Skipped, Source, collect
 from levilab.present.units import name_with_unit, split
 from levilab.runs.find import find_run
 from levilab.software import software_versions
@@ -202,7 +204,7 @@ class Analysis(Needs[Any], Generic[A]):
             recall: from what is found of each to what was found of all together; None where it is not known.
             skips: whether of several inputs one that cannot be used is skipped, also where the analysis skips none.
         """
-        done, warnings = self._each(found.sources, one, skips=skips or self.skips)
+        done, skipped = self._each(found.sources, one, skips=skips or self.skips)
         sources, runs, origins = (list(column) for column in zip(*done, strict=True))
         used = origins[0].options if all(origin.options == origins[0].options for origin in origins) else options
         for k, (source, run, origin) in enumerate(zip(sources, runs, origins, strict=True)):
@@ -214,8 +216,9 @@ class Analysis(Needs[Any], Generic[A]):
             combined=recall(runs) if recall else self.combine(sources, runs, used),
             options=used,
             place=place_of(paths, sources),
-            warnings=(*found.warnings, *warnings, *self.about_inputs(sources, used)),
+            warnings=(*found.warnings, *self.about_inputs(sources, used)),
             remarks=found.remarks,
+            unread=(*found.unread, *skipped),
             origins=tuple(origins),
         )
         of_all = (origins[0].budget or ()) if len(origins) == 1 else self.budget_of_all(found_of_all)
@@ -223,8 +226,8 @@ class Analysis(Needs[Any], Generic[A]):
 
     def _each(
         self, sources: Sequence[Source[Any]], one: Callable[[Source[Any]], Done], *, skips: bool
-    ) -> tuple[list[Done], list[str]]:
-        """Return what is found of each input, and warnings about those that are skipped.  Raises DataError."""
+    ) -> tuple[list[Done], list[Skipped]]:
+        """Return what is found of each input, and those that are skipped.  Raises DataError."""
         if not skips or len(sources) == 1:
             return [one(source) for source in sources], []
         done: list[Done] = []
@@ -236,8 +239,8 @@ class Analysis(Needs[Any], Generic[A]):
                 skipped.append(Skipped(text_of(error), path=source.path))
         if not done:
             said = Sentences(*(one.reason for one in skipped), between="; ")
-            raise NoneUsable(said, reasons={one.path: one.note for one in skipped})
-        return done, [one.note for one in skipped]
+            raise NoneUsable(said, unread=skipped)
+        return done, skipped
 
     def about_inputs(self, sources: Sequence[Source[Any]], options: Any) -> Iterable[str]:
         """Return what to know of the inputs before using the numbers."""

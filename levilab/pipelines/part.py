@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from levilab.pipelines.analyzed import Analyzed
-    from levilab.pipelines.sources import Source
+    from levilab.pipelines.inputs.source import Source
 
 #: How an estimate is written.
 VALUE_U = "value(u): the digits in parentheses are the standard uncertainty of the last digits."

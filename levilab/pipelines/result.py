@@ -20,7 +20,7 @@ from analysis.budget import Budget, Component
 from levilab.errors import DataError
 from levilab.files import as_json, finite, parse_json, replace_atomically, writing
 from levilab.formats.texts import locate
-from levilab.pipelines.sources import Source
+from levilab.pipelines.inputs.source import Source
 from levilab.runs.find import RECORD
 from levilab.settings import in_one_line
 from levilab.software import software_versions

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from levilab.pipelines.document import Analysis
-    from levilab.pipelines.sources import Source
+    from levilab.pipelines.inputs.source import Source
 
 
 #: Distance in u beyond which a value is far off: one in four hundred is by chance.

@@ -13,8 +13,8 @@ from levilab.crosscheck.table import blocks_of, not_right_as_text
 from levilab.errors import unquote
 from levilab.pipelines.analyzed import A, Analyzed
 from levilab.pipelines.document import Analysis
+from levilab.pipelines.inputs.source import Source, mark_of
 from levilab.pipelines.part import ReportPart
-from levilab.pipelines.sources import Source, mark_of
 from levilab.present.document.blocks import (
     Banner,
     Block,

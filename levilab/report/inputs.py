@@ -8,8 +8,8 @@ from datetime import UTC
 from typing import Any, Literal
 
 from levilab.errors import unquote
+from levilab.pipelines.inputs.source import Source, mark_of
 from levilab.pipelines.part import InputPart, ReportPart
-from levilab.pipelines.sources import Source, mark_of
 from levilab.pipelines.tune.owner import washers_text
 from levilab.present.clock import local, moment
 from levilab.present.document.blocks import Block, Details, Fact, Facts, Listing, Note, Section, Tabular, with_marks

@@ -16,8 +16,9 @@ from levilab.errors import DoesNotSuit, NoneUsable, UsageError
 from levilab.files import check_writable, replace_atomically, writing
 from levilab.pipelines.analyzed import A
 from levilab.pipelines.document import Analysis
-from levilab.pipelines.sources import SkippedRuns, data_files
-from levilab.pipelines.suits import recall_suiting, remarks, texts_of
+from levilab.pipelines.inputs.files import data_files
+from levilab.pipelines.inputs.unread import SkippedRuns, remarks, texts_of
+from levilab.pipelines.recall import recall_suiting
 from levilab.present.clock import local
 from levilab.present.document.blocks import Document, in_language_of_reader
 from levilab.report.document import Results, document_of, notebook_blocks
@@ -27,7 +28,6 @@ from levilab.report.pdf.renderer import as_pdf, check_typst
 from levilab.report.reproduction import Asked, Heading
 from levilab.report.tables.values import Values, folder_of, of_analysis, write_tables
 from levilab.runs.find import find_runs
-from levilab.texts.note import is_skipped
 from levilab.texts.text import Text, spoken
 
 #: Each kind of input with those that were found.
@@ -62,7 +62,7 @@ def write_report(
     paths: Sequence[Path],
     output: Path,
     given: Mapping[str, Any] | None = None,
-    tell: Callable[[str], None] | None = None,
+    tell: Callable[[str], None] = lambda _: None,
     *,
     tables: bool = False,
     crosscheck: bool = False,
@@ -103,8 +103,8 @@ def write_report(
     write_content(output, content)
     if tables:
         write_tables(document, _values(results, others, folder_of(output)), folder_of(output))
-    for text in _remarks(results, others) if tell else ():
-        tell(text)  # type: ignore[misc]
+    for text in _remarks(results, others):
+        tell(text)
     return output
 
 
@@ -148,17 +148,15 @@ def _sorted_by_kind(paths: Sequence[Path]) -> tuple[Found, list[Path]]:
     return [(kind, places) for kind, places in found if places], left
 
 
-def _results(
-    paths: Sequence[Path], given: Mapping[str, Any], tell: Callable[[str], None] | None, *, needed: bool
-) -> Results:
+def _results(paths: Sequence[Path], given: Mapping[str, Any], tell: Callable[[str], None], *, needed: bool) -> Results:
     """Return what was found of the measurements at the paths; none where there are none and none are needed."""
     try:
-        return recall_suiting(paths, given, tell, skips=True) if paths or needed else []
+        return recall_suiting(paths, given, lambda one: tell(one.note), skips=True) if paths or needed else []
     except (DoesNotSuit, NoneUsable) as error:
         if needed:
             raise
-        for reason in error.reasons.values() if tell and isinstance(error, NoneUsable) else ():
-            tell(reason)  # type: ignore[misc]
+        for one in error.unread if isinstance(error, NoneUsable) else ():
+            tell(one.note)
         return []
 
 
@@ -186,7 +184,7 @@ def _values(results: Results, others: Found, folder: Path) -> Iterator[Values]:
 
 def _remarks(results: Results, others: Found) -> Iterator[str]:
     """Yield what lies there and is not in the report: inputs that cannot be used each by itself."""
-    yield from dict.fromkeys(text for _, found in results for text in found.warnings if is_skipped(text))
+    yield from dict.fromkeys(one.note for _, found in results for one in found.unread)
     reported = {kind.experiment for kind, _ in others}
     said = remarks([found.remarks for _, found in results])
     yield from texts_of([one for one in said if not (isinstance(one, SkippedRuns) and one.experiment in reported)])

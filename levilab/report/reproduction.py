@@ -9,8 +9,8 @@ from typing import Any
 from levilab.errors import LevilabError
 from levilab.formats.table import parse_columns
 from levilab.pipelines.document import Analysis
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import OF_REPORT, OPTIONS, options_of, typed_name
-from levilab.pipelines.sources import Source
 from levilab.present.document.blocks import (
     Block,
     Code,

@@ -16,30 +16,26 @@ class Note(Text):
         kind: notes of one kind are alike, whatever their values.
         weight: whether advice, a warning or a doubt.
         names_input: whether its text names the input that it is about.
-        skipped: the input that it is about, where that is not used (`levilab.pipelines.sources.Skipped`); else None.
     """
 
-    __slots__ = ("kind", "names_input", "skipped", "weight")
+    __slots__ = ("kind", "names_input", "weight")
     kind: str
     weight: Weight
     names_input: bool
-    skipped: Any
 
-    def __new__(
-        cls, kind: str, text: str, *, weight: Weight = "warning", names_input: bool = False, skipped: Any = None
-    ) -> Self:
+    def __new__(cls, kind: str, text: str, *, weight: Weight = "warning", names_input: bool = False) -> Self:
         """Make it of a text."""
         self = super().__new__(cls, "{text}", text=text)
-        self.kind, self.weight, self.names_input, self.skipped = kind, weight, names_input, skipped
+        self.kind, self.weight, self.names_input = kind, weight, names_input
         return self
 
     def __reduce__(self) -> Any:
         """Return how it is made again in another process."""
-        return _note, (self.kind, self.values["text"], self.weight, self.names_input, self.skipped)
+        return _note, (self.kind, self.values["text"], self.weight, self.names_input)
 
 
-def _note(kind: str, text: str, weight: Weight, names_input: bool, skipped: Any) -> Note:  # noqa: FBT001 - of a pickle
-    return Note(kind, text, weight=weight, names_input=names_input, skipped=skipped)
+def _note(kind: str, text: str, weight: Weight, names_input: bool) -> Note:  # noqa: FBT001 - of a pickle
+    return Note(kind, text, weight=weight, names_input=names_input)
 
 
 def of_file(kind: str, text: str, weight: Weight = "warning") -> Note:
@@ -62,11 +58,6 @@ def weight_of(text: str) -> Weight:
 def is_doubt(text: str) -> bool:
     """Return whether a text is a doubt."""
     return weight_of(text) == "doubt"
-
-
-def is_skipped(text: str) -> bool:
-    """Return whether a text is a note on an input that is not used."""
-    return isinstance(text, Note) and text.skipped is not None
 
 
 def reword(note: str, text: str, *, names_input: bool = False) -> Note:

@@ -11,8 +11,8 @@ from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.field.device import known_of, known_top, usual
 from levilab.pipelines.field.readings import FieldReadings
 from levilab.pipelines.field.words import remark, scan_as_text, scans_as_text
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import FieldOptions
-from levilab.pipelines.sources import Source
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,8 +13,8 @@ from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.formats.device import BaseTable, Device, TopTable
 from levilab.pipelines.field.readings import FieldReadings
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import FieldOptions
-from levilab.pipelines.sources import Source
 from levilab.settings import in_one_line
 
 Table = TypeVar("Table", BaseTable, TopTable)

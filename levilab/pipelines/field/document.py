@@ -15,9 +15,9 @@ from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun, Mean, anal
 from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
 from levilab.pipelines.field.report import field_columns, field_part, field_tables
 from levilab.pipelines.field.words import FIELD_ROW, QUANTITIES, remark
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import FieldOptions
 from levilab.pipelines.row import symbols_of
-from levilab.pipelines.sources import Source
 from levilab.texts.text import Text
 
 EXPERIMENT = "field"

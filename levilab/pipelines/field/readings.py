@@ -12,8 +12,8 @@ from analysis.field.fit import FEWEST_HEIGHTS, SAME_HEIGHT_M
 from analysis.numbers import digits
 from levilab.formats.columns import TableError
 from levilab.formats.table import Table, read_table, refuse
+from levilab.pipelines.inputs.source import Readings
 from levilab.pipelines.options import InputOptions
-from levilab.pipelines.sources import Readings
 from levilab.runs.run import Run
 from levilab.texts.note import of_file
 from levilab.texts.text import Text, text_of

@@ -13,8 +13,8 @@ from analysis.uncertainty import Estimate
 from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun
 from levilab.pipelines.field.readings import FieldReadings
 from levilab.pipelines.field.words import OF_TOPS, QUANTITIES
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, first_of, input_parts, points_of, title_of
-from levilab.pipelines.sources import Source
 from levilab.present.document.blocks import Block, Listing, Note, Paragraph, Section, Tabular
 from levilab.present.numbers import off, plain, short_name, with_decimals, with_sign, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table

@@ -9,8 +9,8 @@ from analysis.field.floating import FERRITE_PER_K, Floating
 from analysis.numbers import digits
 from analysis.remarks import Remark
 from analysis.uncertainty import Estimate
+from levilab.pipelines.note import Weighed, note_of
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, statistic
-from levilab.pipelines.sources import Weighed, note_of
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.texts.text import Sentences, Text
 

@@ -12,9 +12,9 @@ from analysis.spindown.tilt import slowing_by_tilt
 from analysis.uncertainty import Estimate
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.hold.readings import HoldReadings
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import HoldOptions
 from levilab.pipelines.row import Quantity, columns_of
-from levilab.pipelines.sources import Source
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.words import SYMBOLS, law_name

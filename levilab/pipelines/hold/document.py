@@ -20,9 +20,9 @@ from levilab.pipelines.hold.analysis import (
 )
 from levilab.pipelines.hold.readings import HoldReadings, read_hold_file, read_hold_run
 from levilab.pipelines.hold.report import hold_columns, hold_part, hold_tables
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import HoldOptions
 from levilab.pipelines.row import find_all, symbols_of
-from levilab.pipelines.sources import Source
 
 #: Name of a part → its description, where it comes from, what would make it smaller.
 _ROWS = {

@@ -10,8 +10,8 @@ from analysis.arrays import Array
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST
+from levilab.pipelines.inputs.source import Readings
 from levilab.pipelines.options import InputOptions
-from levilab.pipelines.sources import Readings
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run
 from levilab.texts.text import Text, how_many

@@ -7,9 +7,9 @@ import numpy as np
 from analysis.held import Hold
 from levilab.pipelines.hold.analysis import QUANTITIES, HoldAnalysis, text_of
 from levilab.pipelines.hold.readings import HoldReadings
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, points_of, title_of
 from levilab.pipelines.row import cells_of
-from levilab.pipelines.sources import Source
 from levilab.pipelines.spindown.words import SYMBOLS
 from levilab.present.document.blocks import Paragraph, Tabular
 from levilab.present.numbers import plain, short_name, with_uncertainty, without_unit

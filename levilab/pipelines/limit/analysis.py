@@ -15,10 +15,10 @@ from analysis.numbers import digits
 from analysis.spindown.fall import FALLS_BETWEEN_HZ, STOPPED_ABOVE_HZ
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.limit.readings import LimitReadings
 from levilab.pipelines.options import LimitOptions
 from levilab.pipelines.row import Quantity, columns_of, entry
-from levilab.pipelines.sources import Source
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.events import RunEvent
 from levilab.simulator.keys import SceneError

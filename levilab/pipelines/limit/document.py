@@ -12,13 +12,13 @@ from analysis.limits import Statistics
 from analysis.numbers import digits
 from levilab.pipelines.budget import time_base
 from levilab.pipelines.document import Analysis, values_of
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.limit.analysis import LIMIT_ROW, QUANTITIES, LimitAnalysis, Limits, limits_of, together
 from levilab.pipelines.limit.readings import LimitReadings, read_limit_file, read_limit_run
 from levilab.pipelines.limit.report import limit_columns, limit_part, limit_tables
 from levilab.pipelines.options import LimitOptions
 from levilab.pipelines.result import Dump, Result
 from levilab.pipelines.row import find_all, symbols_of
-from levilab.pipelines.sources import Source
 from levilab.texts.text import Text
 
 #: Four times as many tops halve what scatters from one to the next.

@@ -19,8 +19,8 @@ from levilab.formats.table import FEWEST, Table, must_be_positive, read_table
 from levilab.formats.texts import locate, texts_of
 from levilab.formats.titles import read_title, unit_factor
 from levilab.formats.understanding import LEAST_TREND, trend_of
+from levilab.pipelines.inputs.source import Readings
 from levilab.pipelines.options import InputOptions
-from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run

@@ -9,6 +9,7 @@ import numpy as np
 from analysis.locked import Cause
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.limit.analysis import LimitAnalysis, Limits
 from levilab.pipelines.limit.readings import LimitReadings
 from levilab.pipelines.part import (
@@ -21,7 +22,6 @@ from levilab.pipelines.part import (
     size_of_u,
     title_of,
 )
-from levilab.pipelines.sources import Source
 from levilab.present.document.blocks import Listing, Paragraph, Points, Tabular
 from levilab.present.numbers import off, reading, share, short_name, with_uncertainty, without_unit
 from levilab.present.tables import Row, Table, table

@@ -14,11 +14,12 @@ from levilab.formats.texts import locate
 from levilab.formats.waveforms.header import NoRate
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.document import Analysis
+from levilab.pipelines.inputs.files import data_files
+from levilab.pipelines.inputs.search import sha256_of
 from levilab.pipelines.many.file import TableFile, check_name
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.result import relative
 from levilab.pipelines.row import Cell, Column, entry, plain
-from levilab.pipelines.sources import data_files, sha256_of
 from levilab.pipelines.suits import save
 from levilab.runs.find import RECORD, find_run, no_such_path, run_folders
 from levilab.runs.run import Run

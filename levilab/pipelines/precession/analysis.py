@@ -14,10 +14,10 @@ from analysis.remarks import Remark
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.budget import gate_of
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.precession.readings import SweepReadings
 from levilab.pipelines.precession.words import remarks_of, verdict
-from levilab.pipelines.sources import Source
 from levilab.runs.traces import StoredTrace
 
 #: The experiment whose runs it takes, and whose settings count.

@@ -12,6 +12,7 @@ from analysis.precession.line import Line
 from analysis.precession.sweep import SweepFit
 from levilab.pipelines.budget import gate_of, setting_of, time_base
 from levilab.pipelines.document import Analysis, number, values_of
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.precession.analysis import EXPERIMENT, PrecessionAnalysis, PrecessionRun, combine, fit_source
 from levilab.pipelines.precession.readings import SweepReadings, read_sweep_file, read_sweep_run
@@ -24,7 +25,6 @@ from levilab.pipelines.precession.report import (
 )
 from levilab.pipelines.precession.words import PRECESSION_ROW, QUANTITIES, intercept_of, slope_of, verdict
 from levilab.pipelines.row import find_all, symbols_of
-from levilab.pipelines.sources import Source
 from levilab.texts.text import Text
 
 #: Relative uncertainties of the drive's frequency that differ by less than this are those of one clock.

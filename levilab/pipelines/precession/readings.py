@@ -12,8 +12,8 @@ from analysis.precession.gates import Gates, Rate, rates_at_point, shared_scatte
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, Table, read_table, refuse
 from levilab.formats.titles import companion
+from levilab.pipelines.inputs.source import SAME, Readings
 from levilab.pipelines.options import InputOptions
-from levilab.pipelines.sources import SAME, Readings
 from levilab.present.numbers import pulses_too_many
 from levilab.runs.gates import gates_of
 from levilab.runs.run import Run

@@ -9,6 +9,7 @@ import numpy as np
 from analysis.numbers import digits
 from analysis.precession.sweep import Point, SweepFit
 from analysis.uncertainty import Estimate
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import PrecessionOptions
 from levilab.pipelines.part import (
     VALUE_U,
@@ -24,7 +25,6 @@ from levilab.pipelines.part import (
 from levilab.pipelines.precession.analysis import PrecessionAnalysis, PrecessionRun
 from levilab.pipelines.precession.readings import SweepReadings
 from levilab.pipelines.precession.words import at_most, intercept_of, slope_of, verdict
-from levilab.pipelines.sources import Source
 from levilab.present.clock import with_clock
 from levilab.present.document.blocks import Block, Note, Paragraph, Tabular
 from levilab.present.numbers import (

@@ -9,8 +9,8 @@ from analysis.precession.miscounts import Miscount
 from analysis.precession.power import Power
 from analysis.precession.sweep import EXCLUDED_P, Point, SweepFit
 from analysis.uncertainty import Estimate
+from levilab.pipelines.note import Weighed, note_of
 from levilab.pipelines.row import Quantity, columns_of, entry, statistic
-from levilab.pipelines.sources import Weighed, note_of
 from levilab.present.numbers import plain, pulses_too_many, with_uncertainty
 from levilab.texts.text import Sentences, Text
 

@@ -30,9 +30,9 @@ from analysis.uncertainty import Estimate
 from levilab.errors import DataError
 from levilab.formats.waveforms.waveform import Waveform
 from levilab.pipelines.analyzed import Analyzed
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SpinOptions
 from levilab.pipelines.row import Column, Quantity, columns_of, entry
-from levilab.pipelines.sources import Source
 from levilab.pipelines.spin.magnetometer import FieldRecord, findings_of, spin_of_line, track_middle
 from levilab.pipelines.spin.readings import Records, track_of_record
 from levilab.pipelines.spin.words import NEAR_UNUSED, finding_text

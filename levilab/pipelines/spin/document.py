@@ -10,9 +10,9 @@ from analysis.pulses import SpinFrequency
 from analysis.uncertainty import Estimate
 from levilab.pipelines.budget import direct_row, time_base
 from levilab.pipelines.document import Analysis, values_of
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SpinOptions
 from levilab.pipelines.row import find_all, symbols_of
-from levilab.pipelines.sources import Source
 from levilab.pipelines.spin.analysis import (
     OF_A_RUN,
     QUANTITIES,

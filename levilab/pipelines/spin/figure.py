@@ -15,7 +15,7 @@ from analysis.numbers import digits, with_minus
 from analysis.pulses import SpinFrequency
 from analysis.rotation import FieldSpin, LineSamples, samples_of_line
 from levilab.formats.waveforms.waveform import Waveform
-from levilab.pipelines.sources import Source
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.spin.analysis import MOST_DRAWN, SpinAnalysis, SpinRun
 from levilab.pipelines.spin.readings import Records
 from levilab.present.drawing import SMALL, band, headline, panel, synthetic_mark, write

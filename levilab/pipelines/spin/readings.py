@@ -14,8 +14,8 @@ from analysis.rotation.record import FEWEST
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
+from levilab.pipelines.inputs.source import Readings
 from levilab.pipelines.options import InputOptions
-from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
 from levilab.runs.run import Run
 from levilab.runs.traces import INDEX, undescribed_codes

@@ -7,9 +7,9 @@ import numpy as np
 
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, title_of
 from levilab.pipelines.row import cells_of
-from levilab.pipelines.sources import Source
 from levilab.pipelines.spin.analysis import MOST_DRAWN, OF_A_RUN, SpinAnalysis, SpinRun, in_a_sentence, shown_time
 from levilab.pipelines.spin.readings import Records
 from levilab.present.clock import with_clock

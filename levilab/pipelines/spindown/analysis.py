@@ -14,8 +14,8 @@ from levilab.formats.device import Device
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.budget import gate_of
 from levilab.pipelines.field.device import THESIS, inertias
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SpinDownOptions
-from levilab.pipelines.sources import Source
 from levilab.pipelines.spindown.readings import SpinReadings
 from levilab.pipelines.spindown.words import TILT_ALLOWED, is_seen, remark, verdict_in_doubt, verdict_of_all
 from levilab.present.numbers import enumeration

@@ -18,9 +18,9 @@ from analysis.spindown.verdict import Verdict
 from analysis.uncertainty import Estimate
 from levilab.pipelines.budget import bench_clock, direct_row, gate_of, setting_of, time_base
 from levilab.pipelines.document import Analysis, number, statistics_of, value_of, values_of
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.row import find_all
-from levilab.pipelines.sources import Source
 from levilab.pipelines.spindown.analysis import EXPERIMENT, SpinDownAnalysis, combine_sound, fit_source
 from levilab.pipelines.spindown.readings import SpinReadings, read_run_readings, read_spin_file
 from levilab.pipelines.spindown.report import (

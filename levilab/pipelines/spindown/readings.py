@@ -33,8 +33,8 @@ from levilab.formats.understanding import (
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
+from levilab.pipelines.inputs.source import Readings
 from levilab.pipelines.options import InputOptions
-from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.magnetometer import FieldRecord, findings_of, read_field_record
 from levilab.pipelines.spin.readings import track_of_record
 from levilab.pipelines.spin.words import NEAR_UNUSED, finding_text

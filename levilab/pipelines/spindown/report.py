@@ -19,6 +19,7 @@ from analysis.spindown.selection import Statistics
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.tilt import count_of
 from analysis.uncertainty import Estimate
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.part import (
     VALUE_U,
@@ -32,7 +33,6 @@ from levilab.pipelines.part import (
     title_of,
 )
 from levilab.pipelines.row import cells_of
-from levilab.pipelines.sources import Source
 from levilab.pipelines.spindown.analysis import SpinDownAnalysis
 from levilab.pipelines.spindown.readings import SpinReadings
 from levilab.pipelines.spindown.words import (

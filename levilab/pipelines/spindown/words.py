@@ -21,8 +21,8 @@ from analysis.spindown.lawfit import LawFit
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.verdict import Verdict, is_simple
 from analysis.uncertainty import Estimate
+from levilab.pipelines.note import Weighed, note_of
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, estimate, statistic
-from levilab.pipelines.sources import Weighed, note_of
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.units import name_with_unit
 from levilab.texts.note import reword

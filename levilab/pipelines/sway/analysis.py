@@ -10,9 +10,9 @@ from analysis.numbers import digits
 from analysis.sway import Geometry, Swings, choose_lines, geometric_magnetism, mirrored, swings_of
 from levilab.errors import DataError
 from levilab.pipelines.analyzed import EachAlone
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SwayOptions
 from levilab.pipelines.row import Quantity, columns_of, entry, statistic
-from levilab.pipelines.sources import Source
 from levilab.pipelines.sway.device import known_of
 from levilab.pipelines.sway.readings import SwayReadings
 from levilab.present.numbers import with_uncertainty

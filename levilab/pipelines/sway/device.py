@@ -16,8 +16,8 @@ from levilab.errors import DataError
 from levilab.formats.device import Device
 from levilab.pipelines.field.device import inertias, parts_of
 from levilab.pipelines.field.document import FIELD
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import FieldOptions, SwayOptions
-from levilab.pipelines.sources import Source
 from levilab.pipelines.sway.readings import SwayReadings
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import scene_of

@@ -5,9 +5,9 @@ from typing import Any
 from analysis.budget import Budget
 from levilab.pipelines.budget import direct_row
 from levilab.pipelines.document import Analysis, values_of
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SwayOptions
 from levilab.pipelines.row import find_all, symbols_of
-from levilab.pipelines.sources import Source
 from levilab.pipelines.sway.analysis import QUANTITIES, SWAY_ROW, SwayAnalysis, SwayRun, analyze_source
 from levilab.pipelines.sway.readings import SwayReadings, read_motion_run, read_track_file
 from levilab.pipelines.sway.report import sway_columns, sway_part, sway_tables

@@ -15,8 +15,8 @@ from levilab.formats.device import Device
 from levilab.formats.table import Table, read_run_readings, read_table, refuse
 from levilab.formats.understanding import Request, plan_of
 from levilab.pipelines.field.device import THESIS
+from levilab.pipelines.inputs.source import Readings
 from levilab.pipelines.options import InputOptions, SwayOptions
-from levilab.pipelines.sources import Readings
 from levilab.pipelines.spin.analysis import DISTANCE_U_M
 from levilab.pipelines.spin.magnetometer import FieldRecord
 from levilab.pipelines.spindown.readings import field_readings

@@ -8,9 +8,9 @@ import numpy as np
 
 from analysis.numbers import digits
 from analysis.uncertainty import Estimate
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, points_of, title_of
 from levilab.pipelines.row import cells_of
-from levilab.pipelines.sources import Source
 from levilab.pipelines.sway.analysis import QUANTITIES, SwayAnalysis, SwayRun
 from levilab.pipelines.sway.readings import SwayReadings
 from levilab.present.document.blocks import Listing, Paragraph, Tabular

@@ -18,7 +18,7 @@ from levilab.errors import DataError, UsageError
 from levilab.files import parse_toml, replace_atomically, toml_value, writing
 from levilab.formats.typed import read_mass, read_masses, read_temperature
 from levilab.pipelines.options import read_options
-from levilab.pipelines.suits import recall_suiting
+from levilab.pipelines.recall import recall_suiting
 from levilab.runs.find import find_run
 from levilab.settings import Settings, in_one_line
 from levilab.texts.text import ENGLISH, Text, in_language, spoken

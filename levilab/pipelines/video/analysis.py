@@ -22,9 +22,9 @@ from levilab.formats.film import Film, open_film
 from levilab.formats.kinds import AUDIO, kind_of_bytes
 from levilab.formats.table import file_errors
 from levilab.pipelines.analyzed import EachAlone
+from levilab.pipelines.inputs.source import Readings, Source
 from levilab.pipelines.options import InputOptions, VideoOptions
 from levilab.pipelines.row import Quantity, columns_of
-from levilab.pipelines.sources import Readings, Source
 from levilab.pipelines.video.leaning import Leaning, Rising, leaning_of, rising_of
 from levilab.pipelines.video.tracking import Followed, follow
 from levilab.present.numbers import enumeration, with_uncertainty

@@ -5,9 +5,9 @@ from typing import Any, Literal
 from analysis.budget import Budget
 from levilab.pipelines.budget import direct_row
 from levilab.pipelines.document import Analysis, values_of
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import VideoOptions
 from levilab.pipelines.row import find_all, symbols_of
-from levilab.pipelines.sources import Source
 from levilab.pipelines.video.analysis import (
     QUANTITIES,
     VIDEO_ROW,

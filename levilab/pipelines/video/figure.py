@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle as Ring
 
 from levilab.formats.film import pictures
-from levilab.pipelines.sources import Source
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.video.analysis import FilmReadings, Video, VideoAnalysis
 from levilab.present.drawing import headline, panel
 from levilab.present.looks import GREEN, SKY, VERMILION, YELLOW

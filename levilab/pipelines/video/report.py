@@ -5,9 +5,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, title_of
 from levilab.pipelines.row import cells_of
-from levilab.pipelines.sources import Source
 from levilab.pipelines.video.analysis import QUANTITIES, FilmReadings, Video, VideoAnalysis
 from levilab.present.document.blocks import Block, Listing, Paragraph, Tabular
 from levilab.present.numbers import short_name, with_decimals

@@ -17,9 +17,10 @@ from levilab.errors import DataError, unquote
 from levilab.files import as_json
 from levilab.formats.waveforms.waveform import Waveform
 from levilab.pipelines.document import Analysis
+from levilab.pipelines.inputs.unread import remarks, texts_of
+from levilab.pipelines.recall import recall_suiting
 from levilab.pipelines.result import Place, Result
 from levilab.pipelines.row import plain
-from levilab.pipelines.suits import recall_suiting, remarks, texts_of
 from levilab.present.units import UNITS, split
 from levilab.runs.find import RECORD, find_run
 from levilab.runs.run import EVENTS, READINGS, STATES, Run
@@ -27,7 +28,6 @@ from levilab.runs.waveforms import run_waveforms
 from levilab.sweeps.plan import unit_of
 from levilab.sweeps.quantities import columns_of, quantity_of
 from levilab.sweeps.store import Store
-from levilab.texts.note import kind_of
 from levilab.texts.text import ENGLISH, Text, in_language
 
 Results = Sequence[tuple[Analysis[Any], Any]]
@@ -143,7 +143,7 @@ def contents_of(
         return _of_sweep(Store.open(path))
     run = Run.load(path) if (path / RECORD).exists() else None
     try:
-        results = recall_suiting([path], given or {}, tell)
+        results = recall_suiting([path], given or {}, lambda one: tell(one.note))
         for text in _left_out(results):
             tell(text)
         if not run and any(
@@ -160,7 +160,7 @@ def contents_of(
 
 def _left_out(results: Results) -> list[str]:
     """Return what lies there and is not exported: broken runs, and what no analysis takes."""
-    skipped = (text for _, found in results for text in found.all_warnings if kind_of(text).startswith("skipped "))
+    skipped = (one.note for _, found in results for one in found.unread)
     return [*dict.fromkeys(skipped), *texts_of(remarks([found.remarks for _, found in results]))]
 
 

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from levilab.files import check_writable
 from levilab.pipelines.analyzed import A
-from levilab.pipelines.sources import OTHER_COLUMNS, Found, LeftOut, kind_of_unused, number_by_kind, short_paths
-from levilab.pipelines.suits import recall_suiting, remarks
+from levilab.pipelines.inputs.names import short_paths
+from levilab.pipelines.inputs.search import Found
+from levilab.pipelines.inputs.unread import OTHER_COLUMNS, LeftOut, Skipped, kind_of_unused, number_by_kind, remarks
+from levilab.pipelines.recall import recall_suiting
 from levilab.present.document.blocks import (
     Block,
     Details,
@@ -50,7 +52,7 @@ from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, write_content, writing_report
 from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
-from levilab.texts.note import is_skipped, of_file
+from levilab.texts.note import of_file
 from levilab.texts.text import Sentences, Text, spoken, verbatim
 
 if TYPE_CHECKING:
@@ -78,7 +80,7 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str, o
     """
     sources = list({source.path.resolve(): source for of in classes for source in of.found.sources}.values())
     alone = len(classes) == 1
-    texts = [*(text for of in classes for text in of.found.warnings if not is_skipped(text)), others]
+    texts = [*(text for of in classes for text in of.found.warnings), others]
     warnings = dict.fromkeys(plain_text(text) for text in texts if text)
     notes = [Section("Notes", (Warnings(tuple((text,) for text in warnings)),), anchor="notes")] if warnings else []
     chapters: list[Block] = []
@@ -99,15 +101,14 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str, o
     )
 
 
-def _left_out(results: Results, told: Sequence[str]) -> tuple[dict[Path, str], str]:
+def _left_out(results: Results, told: Sequence[Skipped]) -> tuple[dict[Path, str], str]:
     """Return why inputs that can hold readings were not used, and a sentence about all other files."""
     said = (
         "{file}: a table whose columns are not certain, which no search reads: name the file itself, or keep its "
         "columns with `levilab open`"
     )
     used = {source.path for _, found in results for source in found.sources}
-    noted = [*(text for _, found in results for text in found.warnings), *told]
-    unread = {text.skipped.path: text.skipped.reason for text in noted if is_skipped(text)}
+    unread = {one.path: one.reason for one in (*(one for _, found in results for one in found.unread), *told)}
     left_out = [one for one in remarks([found.remarks for _, found in results]) if isinstance(one, LeftOut)]
     for one in left_out:
         if one.kind == OTHER_COLUMNS:
@@ -146,7 +147,7 @@ def _with_other_readings(analysis: Analysis[A], first: A, found: A) -> A:
         for source, run, origin in zip(one.sources, one.runs, one.origins, strict=True)
     }
     warnings = (*first.warnings, *found.warnings, *([note] if again else []))
-    together = Found(sources, warnings, (*first.remarks, *found.remarks))
+    together = Found(sources, warnings, (*first.remarks, *found.remarks), (*first.unread, *found.unread))
     paths = [source.path for source in sources]
     return analysis.gather(paths, together, first.options, lambda source: done[source.name])
 
@@ -317,7 +318,7 @@ def write_class(
         form.check()
     with writing_report(output):
         check_writable(output)
-    told: list[str] = []
+    told: list[Skipped] = []
     results = _each_reading_once(recall_suiting(paths, given or {}, told.append, skips=True))
     classes = [class_of(analysis, found) for analysis, found in results]
     classes.sort(key=lambda of: -len(of.groups))  # what one group alone measured comes last
@@ -332,9 +333,7 @@ def write_class(
         content = class_workbook(classes, date)
     write_content(output, content)
     if tell:
-        kept = (
-            text for text in (*told, *(text for of in classes for text in of.found.warnings)) if not is_skipped(text)
-        )
+        kept = (text for of in classes for text in of.found.warnings)
         unusable = (Text("not read: {problem}", why) for why in unread.values())
         for text in dict.fromkeys([*kept, *unusable, *([others] if others else [])]):
             tell(text)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from levilab.pipelines.document import Analysis
-    from levilab.pipelines.sources import Source
+    from levilab.pipelines.inputs.source import Source
 
 
 #: A spreadsheet takes a text that begins with one of these for a formula.

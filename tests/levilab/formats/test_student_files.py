@@ -19,7 +19,7 @@ from levilab.formats.understanding import SPIN, SeveralRuns, understand
 from levilab.formats.waveforms.header import NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.sources import data_files
+from levilab.pipelines.inputs.files import data_files
 from levilab.pipelines.suits import save
 from levilab.texts.text import in_language
 from support.paths import ROOT

@@ -7,7 +7,7 @@ from functools import cache, partial
 
 import pytest
 
-from levilab.pipelines.suits import recall_suiting
+from levilab.pipelines.recall import recall_suiting
 from levilab.present.document.blocks import (
     Banner,
     Code,

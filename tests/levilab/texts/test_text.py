@@ -26,9 +26,9 @@ from levilab.motion import effects
 from levilab.motion.summary import ENDINGS, FALLS
 from levilab.pipelines.analyzed import EachAlone
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.look import QUANTITIES
+from levilab.pipelines.inputs.look import QUANTITIES
+from levilab.pipelines.inputs.unread import OTHER_COLUMNS
 from levilab.pipelines.precession.words import miscount_as_text
-from levilab.pipelines.sources import OTHER_COLUMNS
 from levilab.pipelines.tune.advice import MET
 from levilab.present.document.blocks import in_language_of_reader
 from levilab.present.numbers import short_name, with_uncertainty
@@ -250,7 +250,7 @@ def test_a_note_and_a_finding_of_several_inputs_keep_their_language():
     for source, name in zip(sources, ("run0.5.csv", "b.csv"), strict=True):
         source.name = name
     runs = [Mock(text=spin, warnings=()) for _ in sources]
-    found = EachAlone(tuple(sources), tuple(runs), None, Mock(), Mock(), (), (), ())
+    found = EachAlone(tuple(sources), tuple(runs), None, Mock(), Mock(), (), (), (), ())
     said = "Die Drehfrequenz ist 30.5 Hz, ihre Änderung 0,1 Hz/s."
     assert in_language(found.text, "de") == f"run0.5.csv: {said}  b.csv: {said}"
     assert [in_language(text, "de") for text in found.all_warnings] == [f"run0.5.csv: {said}"]

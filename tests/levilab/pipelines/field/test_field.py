@@ -15,9 +15,9 @@ from levilab.pipelines.field.device import known_of
 from levilab.pipelines.field.document import FIELD
 from levilab.pipelines.field.figure import field_figure
 from levilab.pipelines.field.report import field_part, scans_table
+from levilab.pipelines.inputs.search import collect
 from levilab.pipelines.options import FieldOptions
 from levilab.pipelines.result import save
-from levilab.pipelines.sources import collect
 from levilab.pipelines.top import calculate_top
 from levilab.report.page import render
 from levilab.world.base import Base

@@ -11,6 +11,8 @@ import pytest
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.inputs.source import mark_of
+from levilab.pipelines.inputs.unread import SkippedRuns
 from levilab.pipelines.limit.analysis import (
     ISLANDS,
     LOWER_EDGE,
@@ -23,7 +25,6 @@ from levilab.pipelines.limit.analysis import (
 )
 from levilab.pipelines.limit.document import LIMIT
 from levilab.pipelines.limit.report import limit_part, limit_tables
-from levilab.pipelines.sources import SkippedRuns, mark_of
 from levilab.pipelines.suits import analyze_suiting, save
 from levilab.present.document.blocks import Listing
 from levilab.report.page import write_report

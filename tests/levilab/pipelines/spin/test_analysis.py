@@ -240,7 +240,7 @@ def test_a_record_without_pulses_among_others_is_passed_over(find, tmp_path):
     write_wav(tmp_path / "spins.wav", pulses(30.0 * np.arange(4000) / 1000), 1000)
     found = find([tmp_path], SpinOptions())
     assert [source.name for source in found.sources] == ["spins.wav"]
-    assert [text for text in found.warnings if "skipped " in text and "dark.wav: 0 pulses" in text]
+    assert [text for text in found.all_warnings if "skipped " in text and "dark.wav: 0 pulses" in text]
 
 
 def test_each_analysis_takes_its_own_out_of_a_folder(sample_data, tmp_path):
@@ -269,7 +269,7 @@ def test_what_is_damaged_is_a_note_of_the_analysis_that_it_belongs_to(sample_dat
     ((row, found),) = analyze_suiting([tmp_path], {})
     assert row.name == "spin"
     assert len(found.runs) == 1
-    assert [text for text in found.warnings if "cut.csv, line 213: " in text]
+    assert [text for text in found.all_warnings if "cut.csv, line 213: " in text]
 
 
 @pytest.mark.parametrize("what", ["trace", "times", "long", "many"])

@@ -254,7 +254,7 @@ def test_in_a_searched_folder_what_is_broken_is_passed_over_and_told(sample_data
     (tmp_path / "spin-down-2" / "run.json").write_text("{", encoding="utf-8")
     analysis = SPINDOWN.analyze([tmp_path])
     assert [source.name for source in analysis.sources] == ["spin-down-1"]
-    assert any("spin-down-2" in warning for warning in analysis.warnings)
+    assert any("spin-down-2" in warning for warning in analysis.all_warnings)
 
 
 def test_a_run_of_another_experiment_is_refused_by_name(sample_data):

@@ -19,8 +19,8 @@ from levilab.formats.understanding import UnderstoodColumn, UnderstoodRun, under
 from levilab.formats.waveforms.header import NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
-from levilab.pipelines.correction import corrected_parts, read_correction
 from levilab.pipelines.field import readings as scan
+from levilab.pipelines.inputs.correction import corrected_parts, read_correction
 from levilab.pipelines.limit import readings as limit
 from levilab.pipelines.precession import readings as precession
 from levilab.pipelines.spin import magnetometer

@@ -12,10 +12,12 @@ import pytest
 from levilab.cli.analyze import write_and_print
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.inputs.search import collect, sha256_of
+from levilab.pipelines.inputs.source import Readings
+from levilab.pipelines.inputs.unread import NothingSuits, Skipped, SkippedRuns, left_out_of, remarks, texts_of
 from levilab.pipelines.options import LimitOptions, SpinDownOptions
-from levilab.pipelines.sources import NothingSuits, Readings, Skipped, SkippedRuns, collect, sha256_of
 from levilab.pipelines.spindown.document import SPINDOWN
-from levilab.pipelines.suits import analyze_suiting, left_out_of, remarks, save, texts_of
+from levilab.pipelines.suits import analyze_suiting, save
 from levilab.report.page import write_report
 from support.spin_downs import spin_down_csv
 

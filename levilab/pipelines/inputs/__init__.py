@@ -1,0 +1,1 @@
+"""Inputs of the analyses: how they are found, named, read, corrected, and why some are not taken."""

@@ -1,0 +1,67 @@
+"""Files of a folder that may hold data, and those that levilab wrote itself."""
+
+import json
+import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from levilab.formats.waveforms.record import SEARCHED
+from levilab.runs.find import RECORD
+
+#: A file of this name keeps its folder out of searches of the folders above.
+SKIP = ".levilab-skip"
+
+
+def data_files(root: Path) -> list[Path]:
+    """Find the files at or below a folder that may hold data, by name; those of runs belong to their runs.
+
+    A folder below with a file `SKIP` is left out, with all in it.
+    """
+    return sorted(path for path in _files(root) if path.suffix.casefold() in SEARCHED)
+
+
+def other_files(root: Path) -> list[Path]:
+    """Find the other files at or below a folder, but for those that levilab or a computer's desktop keeps there."""
+    others = [path for path in _files(root) if path.suffix.casefold() not in SEARCHED]
+    return sorted(set(others) - files_of_levilab(others))
+
+
+def files_of_levilab(paths: Sequence[Path]) -> set[Path]:
+    """Return those of files that levilab has written: results, their figures, corrections of columns."""
+    results = [path for path in paths if _RESULT.search(path.name)]
+    figures = {result.with_name(f"{_RESULT.sub('', result.name)}{_analysis_of(result)}.png") for result in results}
+    return {*results, *(path for path in paths if path in figures or path.name.endswith(_CORRECTION))}
+
+
+def _analysis_of(result: Path) -> str:
+    """Return the name of the analysis that wrote a result; empty where it cannot be read."""
+    try:
+        return str(json.loads(result.read_bytes())["analysis"])
+    except (OSError, ValueError, LookupError, TypeError):
+        return ""
+
+
+#: How names of files begin that are not a person's.
+_OF_DESKTOPS = (".", "~$", "desktop.ini", "Thumbs.db", SKIP)
+
+#: Tables that are saved with the result of a film, and this: results, and no further inputs of a folder.
+_OF_FILM, _RESULT_OF_FILM = re.compile(r"(.+)\.(tracks|spin|limit)\.csv"), re.compile(r"(.+)\.\w+\.result\.video\.json")
+
+#: How names of files end that levilab writes beside what it reads.
+_RESULT, _CORRECTION = re.compile(r"result(\.\w+)?\.json$"), ".levilab.toml"
+
+
+def _files(root: Path) -> list[Path]:
+    """Return the files at or below a folder that belong to no run."""
+    found, seen = [], set()
+    for folder, below, files in os.walk(root, followlinks=True):
+        real = os.path.realpath(folder)
+        if real in seen or RECORD in files or (SKIP in files and Path(folder) != root):
+            below.clear()
+            continue
+        seen.add(real)
+        films = {film[1] for name in files if (film := _RESULT_OF_FILM.fullmatch(name))}
+        own = {name for name in files if (table := _OF_FILM.fullmatch(name)) and table[1] in films}
+        found += [Path(folder) / name for name in files if name not in own and not name.startswith(_OF_DESKTOPS)]
+    return found

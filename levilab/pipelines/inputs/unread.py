@@ -1,0 +1,167 @@
+"""Runs and files that are not taken, each with the reason, for people and for programs."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from levilab.errors import DoesNotSuit
+from levilab.formats.kinds import AUDIO, OTHER, Kind, kind_of
+from levilab.formats.waveforms.audio import advice_on_sound
+from levilab.formats.waveforms.record import SEARCHED
+from levilab.texts.note import Note
+from levilab.texts.text import Sentences, Text, how_many
+
+
+@dataclass(frozen=True)
+class SkippedRuns:
+    """Runs of an experiment that the analysis is not for."""
+
+    experiment: str
+    count: int
+
+    def __str__(self) -> str:
+        return how_many(self.count, f"{self.experiment} run")
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A run or a file that is not taken.
+
+    Attributes:
+        reason: why, with its path.
+        kind: skipped ones of one kind are alike.
+        path: of what cannot be used.
+    """
+
+    reason: str
+    kind: str = ""
+    path: Path | None = None
+
+    def __str__(self) -> str:
+        return Text("skipped {things}", things=self.reason)
+
+    @property
+    def note(self) -> Note:
+        """A note on it."""
+        return Note(f"skipped {self.kind}".rstrip(), str(self), names_input=True)
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A file of a folder that no analysis which was asked for reads.
+
+    Attributes:
+        kind: of file, with what to do.
+        why: the reason of the one analysis that was asked for, of a table with columns that it reads; else empty.
+    """
+
+    path: Path
+    kind: Kind = field(compare=False)
+    why: str = field(default="", compare=False)
+
+    def __str__(self) -> str:
+        return in_words([self])
+
+
+class NothingSuits(DoesNotSuit):
+    """A folder without anything for an analysis.
+
+    Attributes:
+        left_out: the files in it.
+    """
+
+    def __init__(self, text: str, left_out: tuple[LeftOut, ...]) -> None:
+        self.left_out = left_out
+        super().__init__(text)
+
+
+#: Of texts and spreadsheets.
+OTHER_COLUMNS = Kind("a table with other columns", "name one to see why", plural="tables with other columns")
+
+#: Of the right columns, as of a top that does not fall.
+UNSUITABLE = Kind("a table that does not suit", "name one to see why", plural="tables that do not suit")
+
+#: Files of a kind that are named beside their number, and files of a folder with names at all, and what to do.
+_NAMED, FEW = 2, 8
+
+
+def in_words(left_out: Sequence[LeftOut]) -> str:
+    """Return the files that hold nothing to analyze, as one line."""
+    return Text("nothing to analyze in {files}", files=files_by_kind(left_out))
+
+
+def _by_kind(left_out: Sequence[LeftOut]) -> dict[Kind, list[str]]:
+    kinds: dict[Kind, list[str]] = {}
+    for one in left_out:
+        kinds.setdefault(one.kind, []).append(one.path.name)
+    return kinds
+
+
+def number_by_kind(left_out: Sequence[LeftOut]) -> tuple[str, ...]:
+    """Return the number of files of each kind."""
+    return tuple(
+        Text("{n} {things}", n=len(names), things=kind.several) if len(names) > 1 else kind.name
+        for kind, names in _by_kind(left_out).items()
+    )
+
+
+def files_by_kind(left_out: Sequence[LeftOut]) -> str:
+    """Return the files by kind and number, with what to do."""
+    kinds = _by_kind(left_out)
+    texts = []
+    for (kind, names), count in zip(kinds.items(), number_by_kind(left_out), strict=True):
+        named = ", ".join([*names[:_NAMED], *["…"] * (len(names) > _NAMED)])
+        with_advice = "{count} ({names:s}: {advice})" if kind.advice else "{count} ({names:s})"
+        texts.append(Text(with_advice, count=count, names=named, advice=kind.advice))
+    if max(map(len, kinds.values()), default=0) > _NAMED:
+        texts.append(Text("levilab analyze --json names all"))
+    return Sentences(*texts, between="; ")
+
+
+#: What lies in a folder and is no input, without a cause for a warning.
+NotTaken = SkippedRuns | Skipped | LeftOut
+
+
+def kind_of_unused(file: Path) -> Kind:
+    """Return the kind of a file that no analysis reads."""
+    try:
+        kind = kind_of(file)
+    except OSError as error:
+        return Kind(
+            f"a file that cannot be read ({error.strerror})", plural=f"files that cannot be read ({error.strerror})"
+        )
+    if kind is AUDIO:
+        return replace(kind, advice=advice_on_sound())
+    return OTHER_COLUMNS if kind is OTHER and file.suffix.casefold() in SEARCHED else kind
+
+
+def remarks(of_each: Sequence[Sequence[NotTaken]]) -> list[NotTaken]:
+    """Join the remarks of several analyses; runs and files that were left out count only if all of them did."""
+    said = list(dict.fromkeys(remark for those in of_each for remark in those))
+    joined = [one for one in said if isinstance(one, Skipped) or all(one in those for those in of_each)]
+    if len(of_each) == 1:
+        return joined
+    return [LeftOut(one.path, OTHER_COLUMNS) if isinstance(one, LeftOut) and one.why else one for one in joined]
+
+
+def left_out_of(remarks: Sequence[NotTaken]) -> list[dict[str, str]]:
+    """Return the files that are left out, for programs."""
+    return [
+        {"path": one.path.as_posix(), "kind": one.kind.name.partition(" ")[2], "advice": one.why or one.kind.advice}
+        for one in remarks
+        if isinstance(one, LeftOut)
+    ]
+
+
+def texts_of(remarks: Sequence[NotTaken]) -> list[str]:
+    """Return remarks as lines of text: runs and files that are left out in one, a few files by name in their own."""
+    left_out = [one for one in remarks if isinstance(one, LeftOut)]
+    few, unexplained = len(left_out) <= FEW, [one for one in left_out if not one.why]
+    things = (*(str(one) for one in remarks if isinstance(one, SkippedRuns)), *number_by_kind([] if few else left_out))
+    skipped = "skipped {things}" if few else "skipped {things} (levilab analyze --json names the files)"
+    return [
+        *(str(one) for one in remarks if isinstance(one, Skipped)),
+        *([Text(skipped, things=things)] if things else []),
+        *(str(Skipped(one.why)) for one in left_out if few and one.why),
+        *([in_words(unexplained)] if few and unexplained else []),
+    ]
