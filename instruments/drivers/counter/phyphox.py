@@ -29,6 +29,8 @@ _COMPONENTS = ("t", "x", "y", "z")
 _STEADY = ("experiment", "session", "measuring", "gate_s")
 #: Time between two looks at samples that still have to come [s], and how much longer than the gate they may take.
 _LOOK_EVERY_S, _PATIENCE_S = 0.1, 3.0
+#: How much longer than other answers those at the start may take: a phone that saves power answers late at first [s].
+_ASLEEP_S = 6.0
 #: Shortest window of samples [s]: 20 cm beside the base the line's 0.2 to 0.4 µT stand out of 0.5 µT of noise then, and
 #: its frequency is known to 15 mHz; the window where its folds at the sampling rate cannot be told from each other.
 _WINDOW_S, _LONGER_S = 3.0, 10.0
@@ -153,7 +155,7 @@ class Phyphox:
 
     def identity(self) -> str:
         """Return maker, app, phone and version of the app.  Raises WrongInstrument where another server answers."""
-        meta = self._object("/meta")
+        meta = self._object("/meta", patience=_ASLEEP_S)
         version = meta.get("version")
         if not (isinstance(version, str) and "deviceModel" in meta and "fileFormat" in meta):
             raise WrongInstrument(self.transport.address, str(meta)[:60], "phyphox 1.1.8 or newer on a phone")
@@ -341,7 +343,7 @@ class Phyphox:
 
     def _find_buffers(self) -> None:
         """Find the buffers of the magnetometer in the open experiment.  Raises BadAnswer."""
-        config = self._object("/config")
+        config = self._object("/config", patience=_ASLEEP_S)
         self._title = str(config.get("localTitle") or config.get("title") or "")
         inputs = config.get("inputs")
         for one in inputs if isinstance(inputs, list) else []:
@@ -357,7 +359,7 @@ class Phyphox:
     def _control(self, command: str) -> None:
         """Send a command.  Raises CommandRefused."""
         question = f"/control?cmd={command}"
-        if self._object(question).get("result") is not True:
+        if self._object(question, patience=_ASLEEP_S).get("result") is not True:
             raise CommandRefused(self.transport.address, question, ("the app does not do it: look at its screen",))
 
     def _ask(self, question: str, *names: str) -> dict[str, Array]:
@@ -381,9 +383,9 @@ class Phyphox:
             raise BadAnswer(self.transport.address, question, str(answer), f"numbers in the buffer {bad[0]}")
         return {name: numbers for name, numbers in found.items() if numbers is not None}
 
-    def _object(self, question: str) -> dict[str, Any]:
+    def _object(self, question: str, patience: float = 0.0) -> dict[str, Any]:
         """Return the JSON object of a document.  Raises BadAnswer."""
-        text = self.transport.query(question)
+        text = self.transport.query(question, patience=patience)
         try:
             found = json.loads(text)
         except (ValueError, RecursionError):

@@ -17,6 +17,7 @@ from instruments.errors import (
     SettingsLost,
     WrongInstrument,
 )
+from instruments.virtual.bench import faults
 from instruments.virtual.bench.faults import Fault
 from instruments.virtual.counter.phyphox import Sensor
 from support.phones import Phone, turning
@@ -261,6 +262,16 @@ def test_a_fault_of_the_link_costs_one_reading(fault, error):
     with pytest.raises(error):
         phone.driver.frequency()
     phone.clock.sleep(5.0)
+    assert phone.driver.frequency() == pytest.approx(30.0, abs=0.02)
+
+
+@pytest.mark.parametrize("question", ["/meta", "/config", "/control"])
+def test_a_phone_that_saves_power_answers_the_first_questions_late(question, monkeypatch):
+    monkeypatch.setattr(faults, "LATE", 5.0)
+    phone = Phone()
+    phone.bench.faults.append(Fault("late answer", question=f".*{question}.*"))
+    assert "phyphox" in phone.driver.identity()
+    phone.driver.prepare(gate_s=1.0, trigger_level_v=0.6)
     assert phone.driver.frequency() == pytest.approx(30.0, abs=0.02)
 
 
