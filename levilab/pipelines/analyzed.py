@@ -141,11 +141,11 @@ class EachAlone(Analyzed[S, D, None, Opt]):
 
     @property
     def text(self) -> str:
-        """Findings in a few sentences for each input."""
+        """Findings in a few sentences, for each input in a line of its own."""
         if len(self.runs) == 1:
             return self.runs[0].text
         named = (_named(source, run.text) for source, run in zip(self.sources, self.runs, strict=True))
-        return Sentences(*named, between="  ")
+        return Sentences(*named, between="\n")
 
     def about_run(self, run: D) -> Iterable[str]:
         """Return what to know of one input."""

@@ -218,8 +218,8 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
 
     @property
     def text(self) -> str:
-        """What the data say, in a few sentences."""
-        return Sentences(*(one for group in self.groups for one in _sentences(group)))
+        """What the data say, in a few sentences, for each of the conditions in a line of its own."""
+        return Sentences(*(group.text for group in self.groups), between="\n")
 
     @property
     def averaged(self) -> Sequence[Sequence[Source[LimitReadings]]]:

@@ -221,7 +221,7 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
         of_each = zip(self.sources[:MOST_SENTENCES], texts, strict=False)
         named = (Text("{name:s}: {text}", name=source.name, text=text) for source, text in of_each)
         more = len(texts) - MOST_SENTENCES
-        return Sentences(*named, Text("And {more} more, in the table.", more=more) if more > 0 else "")
+        return Sentences(*named, Text("And {more} more, in the table.", more=more) if more > 0 else "", between="\n")
 
     @property
     def averaged(self) -> tuple[()]:

@@ -259,7 +259,7 @@ def spin_part(analysis: SpinAnalysis) -> ReportPart:
         heading="Spin frequency of a top",
         lead=_count_pulses(analysis),
         result=(
-            Paragraph(Sentences(*meaning(analysis)), "What it means."),
+            Paragraph(Sentences(*meaning(analysis), between="\n"), "What it means."),
             Tabular("spin-frequencies", frequency_table(analysis), _FREQUENCIES, first_column_wraps=True),
         ),
         figure=FigureText(

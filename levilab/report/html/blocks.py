@@ -143,7 +143,7 @@ class Writer:
 
 def _paragraph(_: Writer, block: Paragraph, __: int) -> Html:
     lead = join([element("strong", words(block.lead)), " "]) if block.lead else ""
-    return element("p", lead, words(block.text))
+    return element("p", lead, lines(block.text))
 
 
 def _note(_: Writer, block: Note, __: int) -> Html:
@@ -151,7 +151,7 @@ def _note(_: Writer, block: Note, __: int) -> Html:
 
 
 def _verdict(_: Writer, block: Verdict, __: int) -> Html:
-    return element("p", words(block.text), class_="verdict")
+    return element("p", lines(block.text), class_="verdict")
 
 
 def _banner(_: Writer, block: Banner, __: int) -> Html:

@@ -242,20 +242,33 @@ def _plain(text: str) -> str:
 
 
 def _text(text: str) -> Text:
-    """Return a text as its parts, with superscripts, subscripts and places where long words may be divided.
+    r"""Return a text as its parts, with superscripts, subscripts and places where long words may be divided.
 
     >>> _text("3.2(1)×10⁻³ s⁻¹")
     ['3.2(1)×10', ['high', '−3'], ' s', ['high', '−1']]
     >>> _text("plain")
     'plain'
+    >>> _text("one\ntwo")
+    ['one', ['line', ''], 'two']
     """
     parts: list[Any] = []
-    for run in typeset(_plain(text)):
+    for k, line in enumerate(text.split("\n")):
+        parts += [_BREAK] * bool(k) + _parts(line)
+    return parts[0] if len(parts) == 1 and isinstance(parts[0], str) else parts or ""
+
+
+#: The part of a text at which a line begins.
+_BREAK = ["line", ""]
+
+
+def _parts(line: str) -> list[Any]:
+    parts: list[Any] = []
+    for run in typeset(_plain(line)):
         if run.level:
             parts.append([run.level, run.text])
         else:
             parts += _divisible(run.text)
-    return parts[0] if len(parts) == 1 and isinstance(parts[0], str) else parts or ""
+    return parts
 
 
 #: Behind these a path, an address or a list without blanks may be divided.

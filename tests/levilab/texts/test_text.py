@@ -252,7 +252,7 @@ def test_a_note_and_a_finding_of_several_inputs_keep_their_language():
     runs = [Mock(text=spin, warnings=()) for _ in sources]
     found = EachAlone(tuple(sources), tuple(runs), None, Mock(), Mock(), (), (), (), ())
     said = "Die Drehfrequenz ist 30.5 Hz, ihre Änderung 0,1 Hz/s."
-    assert in_language(found.text, "de") == f"run0.5.csv: {said}  b.csv: {said}"
+    assert in_language(found.text, "de") == f"run0.5.csv: {said}\nb.csv: {said}"
     assert [in_language(text, "de") for text in found.all_warnings] == [f"run0.5.csv: {said}"]
 
 

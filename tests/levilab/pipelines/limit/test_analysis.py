@@ -343,5 +343,6 @@ def test_how_often_chance_makes_such_a_difference_is_a_number_of_runs(tmp_path, 
 
 
 def test_of_limits_under_several_conditions_no_sentence_is_said_twice(sample_data):
-    part = limit_part(LIMIT.analyze([sample_data / "upper-limits", sample_data / "loose-washers"]))
-    assert part.result[0].text.count("From 59.5 to 81 Hz a simulated top") == 1
+    limits = LIMIT.analyze([sample_data / "upper-limits", sample_data / "loose-washers"])
+    assert limit_part(limits).result[0].text.count("From 59.5 to 81 Hz a simulated top") == 1
+    assert [line.count("The drive lost the top") for line in limits.text.split("\n")] == [1, 1]

@@ -16,6 +16,7 @@ from levilab.present.document.blocks import (
     Points,
     Section,
     Tabular,
+    Verdict,
 )
 from levilab.present.tables import table
 from levilab.report.html.page import fragment_of, page_of
@@ -29,6 +30,10 @@ EVIL = "</script></style></svg><b onclick=x>{{7*7}}${x}\"'&"
 
 def document(text):
     return of_all_blocks(text, sections=2, contents=True, subject=text)
+
+
+def test_a_verdict_of_several_inputs_has_a_line_for_each():
+    assert '<p class="verdict">a: up<br>b: down</p>' in fragment_of((Verdict("a: up\nb: down"),))
 
 
 def test_cells_of_a_table_that_stacks_have_their_heads():
