@@ -41,7 +41,10 @@ let fellAt = NaN;  // a fall whose poses are not kept yet
 let isReady = false;  // whether the bench for practice has measured something yet
 let paused = false, drawn = null, pointed = -1, space = null, topOf = "", wanted = "", practice = null, reachable = true;
 let news = [], spoken = 0, spokenState = "", close = null, dirty = {plot: true, trace: true};
-addEventListener("pagehide", () => sessionStorage.setItem(`minutes ${token}`, history.kept));  // another language loads the page again
+addEventListener("pagehide", () => {  // another language loads the page again
+  sessionStorage.setItem(`minutes ${token}`, history.kept);
+  sessionStorage.setItem(`fall ${token}`, space?.fall ?? "null");
+});
 window.levilab = {frames: 0, drawn: 0, seen, data, history};  // what tests and benchmarks read
 
 // --- frames ---
@@ -218,6 +221,8 @@ async function openTop() {
     const parts = await partsNow();
     const {openSpace} = await import("./motion.js");
     space = await openSpace(by("space"), parts);
+    space.setFall(sessionStorage.getItem(`fall ${token}`));
+    put(by("replay"), {hidden: data.up || space.fall === "null"});
     for (const pieces of early) space.add(...pieces);
     window.levilab.space = space;
     space.setRate(Number(by("motion").value));

@@ -158,6 +158,9 @@ export async function openSpace(canvas, description) {
     endReplay: () => {
       if (film !== live) [film, playhead] = [live, live.times.at(-1)];
     },
+    /** The poses about a fall, as text: what a page had that was loaded before this one. */
+    get fall() { return JSON.stringify(fall, (_, value) => ArrayBuffer.isView(value) ? [...value] : value); },
+    setFall: (kept) => { fall = JSON.parse(kept); },
     get replays() { return film === fall && fall !== null; },
     get parts() { return parts; },
     setParts: (described) => {

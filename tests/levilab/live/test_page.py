@@ -423,6 +423,10 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(served, watched, tmp_path
     until(page, "levilab.data.count === 3 && levilab.data.shown.head")
     save_what_is_drawn(page, run, tmp_path)
     assert page.evaluate("levilab.space.replays")
+    page.reload()  # as for another language
+    until(page, "levilab.space?.state && document.getElementById('replay').offsetParent")
+    page.click("#replay")
+    assert page.evaluate("levilab.space.replays")
     later = GrowingRun(tmp_path, "20261122T110000Z-spin-0000")
     watch.turn_to(later.folder)
     until(page, f"levilab.seen.run === '{later.folder.name}'")
