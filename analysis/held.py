@@ -19,6 +19,7 @@ from math import hypot, sqrt
 import numpy as np
 
 from analysis.arrays import Array
+from analysis.drag import EXPONENT, EXPONENT_U
 from analysis.least_squares import solve
 from analysis.pulses.regression import student
 from analysis.spindown.drag import LAWS, DragLaw
@@ -28,8 +29,6 @@ from analysis.uncertainty import Estimate, curvature, propagate
 
 #: Readings that follow each other by more than this multiple of the usual time have a loss of the top between them.
 _GAP = 1.5
-#: The exponent of any drag is between 1 and 2: it brings the gain from the spins at which it was seen to the held one.
-_EXPONENT, _EXPONENT_U = 1.5, 0.3
 #: No top is held below this spin [Hz].
 _LOWEST_HZ = 24.0
 
@@ -86,12 +85,12 @@ def hold_of(time: Array, spin: Array, u: Array, share: Array, gains: Sequence[tu
     nu = max(mean, _LOWEST_HZ)
     # half of the change of ln pull: the top leans, or is upright
     lean = beside / (nu * ((nu / THESIS_TOP.resonance_hz) ** 2 - 1))
-    left = whole - driven * (1 + _EXPONENT * beside / mean + lean)
+    left = whole - driven * (1 + EXPONENT * beside / mean + lean)
     drag = (driven * gain.value * (1 + lean) - moved) / left
     parts = {
         "gain": driven / left * gain.u,
         "drift": float(np.linalg.norm(ends * u)) / left,
-        "exponent": driven / left * _EXPONENT_U * abs(drag * beside) / mean,
+        "exponent": driven / left * EXPONENT_U * abs(drag * beside) / mean,
         "lean": driven / left * abs((gain.value + drag) * lean) / sqrt(3),  # even between the two
     }
     return Hold(*held, mean_share, gain, Estimate(drag, hypot(*parts.values()), "Hz/s"), parts)

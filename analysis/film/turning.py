@@ -10,6 +10,7 @@ from numpy.polynomial.chebyshev import chebder, chebval, chebvander
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
+from analysis.drag import EXPONENT, EXPONENT_U
 from analysis.errors import TooFewReadings
 from analysis.film.errors import NoMark
 
@@ -40,9 +41,6 @@ _BLOCKS = 24
 _MOST_BENDS = 12
 #: Length of a reading of the spin [s], and the fewest pictures in it.
 WINDOW_S, _FEWEST_IN_WINDOW = 1.0, 12
-#: A drag in proportion to the n-th power of the spin changes its slope by n slope²/spin a second: in 1.4 s that moves
-#: the spin of a parabola by 0.04 mHz.  n is evenly distributed from 1 to 2: its standard deviation is 1/√12.
-_UNDER_DRAG, _UNDER_DRAG_U = 1.5, 0.29
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,10 +155,10 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, aside: Array, 
     chirp = float(bend @ _fit(basis, turns, u, nuisance)[0][: order + 1])
     slower = chirp * min(chirp / start, 0.0)  # of the slope, a second; that of an even drive stays
     drag = slower * (half * late) ** 3 / 6
-    more = np.column_stack([nuisance, _UNDER_DRAG_U * drag])
-    value, covariance, rest = _fit(basis, turns - _UNDER_DRAG * drag, u, more)
+    more = np.column_stack([nuisance, EXPONENT_U * drag])
+    value, covariance, rest = _fit(basis, turns - EXPONENT * drag, u, more)
     smooth, error = value[: order + 1], covariance[: order + 1, : order + 1]
-    power = _UNDER_DRAG + _UNDER_DRAG_U * float(value[-1])
+    power = EXPONENT + EXPONENT_U * float(value[-1])
     speed = chebval(late, chebder(smooth)) / half + power * slower * (half * late) ** 2 / 2
     readings = np.array([
         _reading(times[part], rest[part], u[part], nuisance[part], covariance[order + 1 : -1, order + 1 : -1])

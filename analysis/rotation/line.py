@@ -9,11 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.arrays import Array
+from analysis.drag import EXPONENT, EXPONENT_U
 from analysis.rotation.record import PRIOR, Record
 
-#: A drag in proportion to the n-th power of the spin changes its slope by n slope²/frequency a second.  n is evenly
-#: distributed from 1 to 2: its standard deviation is 1/√12.
-UNDER_DRAG, UNDER_DRAG_U = 1.5, 0.29
 #: Steps of Gauss and Newton at most, and the part of u that the last one is: one more would be 1 % of that.
 _STEPS, _NEAR = 12, 0.1
 
@@ -55,7 +53,7 @@ def fit_line(record: Record, frequency: float, chirp: float) -> LineFit:
     freedom = max(n - record.parameters - 2.0, 1.0)
     for _ in range(_STEPS):
         bend_unit = chirp * abs(chirp) / frequency if chirp < 0 else 0.0  # of an even drive there is none
-        bend = UNDER_DRAG * abs(bend_unit)
+        bend = EXPONENT * abs(bend_unit)
         turns = half * x * (frequency + half * x * (chirp / 2 + half * x * bend / 6))
         angle = 2 * np.pi * turns
         wave = (np.cos(angle) + 1j * np.sin(angle))[:, None]
@@ -77,7 +75,7 @@ def fit_line(record: Record, frequency: float, chirp: float) -> LineFit:
         information = np.einsum("ipjq,pq->ij", beside, (ahead / variance) @ ahead.T) * np.outer(scale, scale)
         gradient = scale * np.einsum("ipk,pk->i", left, ahead / variance)
         # the bend's prior: known but for the law of the drag
-        information[2, 2] += 1 / max((UNDER_DRAG_U * abs(bend_unit)) ** 2, 1e-24)
+        information[2, 2] += 1 / max((EXPONENT_U * abs(bend_unit)) ** 2, 1e-24)
         information[[0, 1], [0, 1]] += 1e-12  # no line at all leaves nothing to divide by
         covariance = np.linalg.inv(information)
         step = covariance @ gradient

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.arrays import Array
+from analysis.drag import EXPONENT
 from analysis.errors import AnalysisError
 from analysis.rotation.errors import NoLine
 from analysis.rotation.folds import Evidence, evidence_of, images_between, weigh
-from analysis.rotation.line import UNDER_DRAG, LineFit, fit_line
+from analysis.rotation.line import LineFit, fit_line
 from analysis.rotation.record import FEWEST, Line, Record, deviation, read_samples
 from analysis.rotation.result import FieldSpin, Kind
 from analysis.rotation.search import other_lines, refine
@@ -162,7 +163,7 @@ def _follow(t: Array, b: Array, cut: slice, before: _Window) -> _Window | None:
     later = float(t[cut].mean()) - before.record.middle
     others = other_lines(before.record, rest, line, _BY_HZ + abs(line.chirp) * later)
     record = Record(t[cut], b[cut], [one.at(later) for one in others])
-    bend = UNDER_DRAG * line.chirp**2 / line.frequency if line.chirp < 0 else 0.0
+    bend = EXPONENT * line.chirp**2 / line.frequency if line.chirp < 0 else 0.0
     expected = Line(line.frequency + later * (line.chirp + later * bend / 2), line.chirp + later * bend)
     left = record.rest()
     start = refine(record, left / np.maximum(deviation(left), 1e-12), expected, _BY_HZ, _BY_SLOPE)

@@ -12,6 +12,7 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.budget import rest
+from analysis.drag import EXPONENT
 from analysis.errors import AnalysisError
 from analysis.pulses import (
     Finding,
@@ -131,6 +132,10 @@ class Series:
         return len(self.time)
 
 
+#: Of the exponent n of a drag through several records: an even ramp of a drive, n = 0, is two u away.
+_BEND_U = 0.75
+
+
 @dataclass(frozen=True)
 class UParts:
     """What u of a frequency, or of its slope, is made of; the squares add up.
@@ -182,31 +187,39 @@ class SpinRun:
 
     @property
     def trend(self) -> Estimate | None:
-        """The slope of a straight line through several records [Hz/s]; None of a single one, and where phases differ.
+        """The slope through several records in their middle [Hz/s]; None of a single one, and where phases differ.
 
         Records far apart show a slope that is far too small for one of them.  A record in which a drive was switched
-        has several slopes.  Where they scatter about the line by more than their u, u grows by the same factor.
+        has several slopes.  Where they scatter about the curve by more than their u, u grows by the same factor.
         """
         return self._line[0] if self._line else None
 
     @property
     def swing(self) -> tuple[float, float] | None:
-        """How far several records scatter about that line [Hz], and in units of their u; None where there is none."""
+        """How far several records scatter about that curve [Hz], and in units of their u; None where there is none."""
         return self._line[1:] if self._line and len(self.series) > 2 else None
 
     @cached_property
     def _line(self) -> tuple[Estimate, float, float] | None:
+        """Fit a line in ν^(1 − n), n of a drag; another n bends it, and has a prior."""
         series = self.series
         if len(series) < 2 or len(series.phases) > 1 or not np.all(series.u > 0):
             return None
-        weight = series.u**-2
-        late = series.time - np.average(series.time, weights=weight)
-        u = float(np.sum(weight * late**2)) ** -0.5
-        slope = float(np.sum(weight * late * series.frequency)) * u**2
-        left = series.frequency - np.average(series.frequency, weights=weight) - slope * late
+        hz = series.frequency**EXPONENT  # of the line's ordinate: d(ν^(1 − n)/(1 − n)) = dν/νⁿ
+        line, u = series.frequency ** (1 - EXPONENT) / (1 - EXPONENT), series.u / hz
+        late = series.time - np.average(series.time, weights=series.u**-2)
+        straight = np.polynomial.Polynomial.fit(late, line, 1, w=1 / u).convert()
+        bend = 0.5 * straight.coef[1] ** 2 * series.frequency.mean() ** (EXPONENT - 1) * late**2
+        design = np.column_stack([np.ones_like(late), late, _BEND_U * bend]) / u[:, None]
+        design = np.vstack([design, [0.0, 0.0, 1.0]])  # the prior
+        middle, slope, other = np.linalg.lstsq(design, np.append(line / u, 0.0))[0]
+        u_slope = float(np.linalg.inv(design.T @ design)[1, 1]) ** 0.5
+        left = hz * (line - middle - slope * late - other * _BEND_U * bend)
         freedom = max(len(series) - 2, 1)
-        units = math.sqrt(float(np.sum(weight * left**2)) / freedom)
-        return Estimate(slope, u * max(1.0, units), "Hz/s"), math.sqrt(float(np.sum(left**2)) / freedom), units
+        units = math.sqrt((float(np.sum((left / series.u) ** 2)) + float(other) ** 2) / freedom)
+        there = ((1 - EXPONENT) * middle) ** (EXPONENT / (1 - EXPONENT))  # νⁿ in the middle
+        trend = Estimate(float(slope * there), float(u_slope * there) * max(1.0, units), "Hz/s")
+        return trend, math.sqrt(float(np.sum(left**2)) / freedom), units
 
 
 class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):

@@ -74,7 +74,7 @@ def _sentences(run: SpinRun) -> Iterator[str]:
     if run.swing and run.swing[1] > _SEEN:
         far, units = run.swing
         yield Text(
-            "That is one {of} of {n}: they scatter about a line by {hz:n} Hz, {times:n} times their "
+            "That is one {of} of {n}: they scatter about the curve of a drag by {hz:n} Hz, {times:n} times their "
             "uncertainties, so the spin itself swings, as that of a driven top does.",
             of=run.series.of,
             n=len(run.series),
