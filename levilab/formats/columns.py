@@ -12,6 +12,7 @@ from levilab.formats.kinds import Kind
 from levilab.formats.titles import (
     CANONICAL,
     COMPANIONS,
+    FOREIGN,
     LISTED,
     NAMES,
     QUANTITIES,
@@ -27,6 +28,7 @@ from levilab.formats.titles import (
     is_unit,
     nearly_a_frequency,
     plain_name,
+    plain_unit,
     read_title,
     unit_factor,
     without_runs_of_blanks,
@@ -212,11 +214,12 @@ def choose_columns(
     for name, index in chosen.items():
         quantity = COMPANIONS.get(name, name)
         period = titles[chosen.get(quantity, index)]
-        if period.inverse and name not in stated and not written[name]:
+        if period.inverse and quantity not in stated and not written[name]:
             # an uncertainty without a unit has that of its period
-            of_turn = (titles[index] if _is_of_a_period(titles[index], titles) else period).unit or "s"
-            factor = (unit_factor(of_turn, "time") or 1) / period.turns
-            columns.append(Column(name, index, header[index], factor, inverse=True, unit=of_turn, written=True))
+            of_turn = (titles[index] if _is_of_a_period(titles[index], titles) else period).unit
+            factor = (unit_factor(of_turn or "s", "time") or 1) / period.turns
+            sure = of_turn is not None
+            columns.append(Column(name, index, header[index], factor, inverse=True, unit=of_turn or "s", written=sure))
             continue
         # An uncertainty without a unit has that of its quantity: "rpm,u" gives both in 1/min.
         unit = written[name] or written.get(quantity)
@@ -225,7 +228,7 @@ def choose_columns(
             continue
         unit = None if unit == TOTAL else unit
         if unit == "%" or (unit and dimension(name) == "frequency" and unit_factor(unit, "frequency") is None):
-            factor = 0.01 if unit == "%" else unit_factor(unit, "time") or 1
+            factor = 0.01 if unit == "%" else (unit_factor(unit, "time") or 1) / period.turns
             columns.append(Column(name, index, header[index], factor, inverse=unit != "%", unit=unit, written=True))
             continue
         if titles[index].counts_radians(unit) or period.counts_radians(unit):
@@ -338,6 +341,8 @@ def _offered_columns(
         if _counts_turns(title):
             known = COMPANIONS.get(title.column, title.column) in totals or title.column not in {*offered, *COMPANIONS}
             totals |= {title.column} if known else set()
+        if not known and plain_unit(title.unit or "") in FOREIGN:
+            continue  # T/°C is a temperature
         if not known and not _is_of_a_period(title, titles):
             warnings.append(_unknown_unit(path, header[index], title))
         else:

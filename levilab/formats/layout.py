@@ -10,6 +10,7 @@ from pathlib import Path
 
 from levilab.formats.columns import NoTable, TableError, shorten
 from levilab.formats.dialect import (
+    DIALECTS,
     SEPARATORS,
     Dialect,
     Line,
@@ -42,8 +43,8 @@ EXPORT = "a table of text is expected: export it as CSV"
 class Layout:
     """How one file's table is written.
 
-    `header`, in line `header_line`, is empty if the file has none; `header_line` is then that of a text above the
-    rows which could not be it, or 0. Rows may begin in line `first_line`, which lies `start` bytes into the file;
+    `header`, in line `header_line`, is empty if the file has none; `header_line` is then that of titles above the rows
+    with another separator, or 0. Rows may begin in line `first_line`, which lies `start` bytes into the file;
     lines count from 1. `width` is the number of fields a row must have. `above` are the fields of the line above the
     header; `aligned` is that of the text; `sample` are the fields of the first rows. Where no title has a unit, `units`
     are those behind the first numbers, and s for clocks.
@@ -231,7 +232,7 @@ def lay_out(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> L
     named = runs = units
     if place is None:
         header, header_line = _header_in_comment(lines[: first_line - 1], dialect, width)
-        header_line = header_line or (above[-1].number if above else 0)
+        header_line = header_line or _other_titles(lines[: first_line - 1], width)
     else:
         header, header_line = above[place].fields, above[place].number
         below = [*above[place + 1 :], *content_lines(lines[first_line - 1 : first_line], dialect, first_line)]
@@ -295,6 +296,12 @@ def _spread(header: tuple[str, ...], below: Sequence[Line]) -> tuple[tuple[str, 
     for k in within:
         wide[k] = wide[k - 1]
     return tuple(wide), names
+
+
+def _other_titles(above: list[str], width: int) -> int:
+    """Return the line of known titles with another separator than the rows below have, 0 where there is none."""
+    fields = [(n, dialect.split(line)) for n, line in enumerate(above, 1) for dialect in DIALECTS]
+    return next((n for n, titles in fields if len(titles) == width and known_titles(titles) > 1), 0)
 
 
 def _units_above(above: Sequence[Line]) -> tuple[str, ...]:

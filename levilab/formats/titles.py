@@ -50,15 +50,16 @@ NEED_UNITS = (
 TOTAL = "turns"
 _TOTALS = (TOTAL, "counts", "pulses", "revolutions", "rotations", "umdrehungen", "impulse")
 #: Units of other quantities, which no column of ours has.
-_FOREIGN = ("°C", "C", "°F", "F", "K", "lx", "hPa", "Pa", "dB", "kg", "g", "A", "mA", "W", "%")
+FOREIGN = ("°C", "C", "°F", "F", "K", "lx", "hPa", "Pa", "dB", "kg", "g", "A", "mA", "W", "%")
 #: Units in which the title says whether turns or radians are counted.
 _PER_SECOND = ("1/s", "/s")
 
 #: Names of a component of the magnetic field.
 _COMPONENTS = (
-    "flux_density_{}", "magnetic_field_{}", "magnetfeld_{}", "magnetfalt_{}", "champ_magnetique_{}",
-    "campo_magnetico_{}", "magnetometer_{}", "mag_{}", "mag{}", "b_{}", "b{}",
+    "flux_density_{}", "magnetic_field_{}", "magnetometer_{}", "mag_{}", "mag{}", "b_{}", "b{}",
 )  # fmt: skip
+#: The same in any language: magnetisches Feld x, champ magnétique y, densidad de flujo magnético z.
+_ALONG_AXIS = re.compile(r"(?=\w*magn)\w*(?:fi?eld|falt|ch?amp|flu|flo|indu)\w*_([xyz])")
 
 # Canonical column: its dimension, and the names it goes by, in lower case, without accents, blanks and hyphens as "_".
 QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
@@ -275,6 +276,8 @@ def plain_name(text: str) -> str:
     """Return a name as the tables spell it; of a name and its symbol, "Zeit t", the one that says more."""
     letters = filterfalse(unicodedata.combining, unicodedata.normalize("NFKD", text.strip().casefold()))
     name = re.sub(r"[\s\-]+", "_", "".join(letters))
+    if along := _ALONG_AXIS.fullmatch(name):
+        return f"magnetic_field_{along[1]}"
     word, _, symbol = name.rpartition("_")
     if name in NAMES or symbol not in SYMBOLS:
         return name
@@ -334,8 +337,8 @@ def read_title(text: str) -> Title:
     if len(text) > LONGEST_TITLE:
         return Title(None, None)
     name = plain_name(text)
-    if name in NAMES and name not in NEED_UNITS:
-        return Title(NAMES[name], IMPLIED_UNITS.get(name), angular=name in _ANGULAR_NAMES)
+    if bare := _title_without_unit(name):
+        return bare
     found = _name_and_unit(text)
     for label, unit in found:
         if title := _title_of_name(label, unit):
@@ -344,9 +347,9 @@ def read_title(text: str) -> Title:
         title = _title_of_name(text[:place], text[place + 1 :])
         if title and (title.inverse or unit_factor(text[place + 1 :], dimension(title.column or "")) is not None):
             return title
-    bare = _BARE_UNIT.fullmatch(text)
-    if bare and not found:  # Laufzeit s, Frequenz Hz
-        return _title_of_name(bare["name"], bare["unit"]) or Title(None, bare["unit"])
+    behind = _BARE_UNIT.fullmatch(text)
+    if behind and not found:  # Laufzeit s, Frequenz Hz
+        return _title_of_name(behind["name"], behind["unit"]) or Title(None, behind["unit"])
     # a title may be a unit alone, as sec or 1/min; m, h, T and G are symbols of quantities, too
     units = [*[text] * (len(text) > 1 or text == "s"), *(unit for _, unit in found)]
     return Title(None, next((unit for unit in units if is_unit(unit)), found[0][1] if found else None))
@@ -356,17 +359,29 @@ def read_title(text: str) -> Title:
 _BARE_UNIT = re.compile(r"(?P<name>.+)\s(?P<unit>s|sec|sek|ms|min|[kmμ]?Hz|rpm|(?:1|U|tr|r|rev|°|rad)/(?:s|min))")
 
 
+def _title_without_unit(name: str) -> Title | None:
+    """Return the title that a name alone is; None for an unknown one, and for one that needs a unit."""
+    if turns := _turns_timed(name):
+        return Title("spin_frequency_hz", None, inverse=True, turns=turns)
+    if name in NAMES and name not in NEED_UNITS:
+        return Title(NAMES[name], IMPLIED_UNITS.get(name), angular=name in _ANGULAR_NAMES)
+    return None
+
+
+def _turns_timed(name: str) -> int:
+    """Return how many turns a column of this name holds the time of, 0 if none."""
+    found = _TIME_OF_TURNS.fullmatch(name)
+    return int(found["number"]) if found else int(name in PERIODS)
+
+
 def _title_of_name(label: str, unit: str) -> Title | None:
     """Return the title that a name gives together with a possible unit; None for an unknown name."""
     name = plain_name(label)
     name = name if name in NAMES else plain_name(label.partition(",")[0])  # angular velocity, channel A
-    of_turns = _TIME_OF_TURNS.fullmatch(name)
-    if of_turns and unit_factor(unit, "time"):
-        return Title("spin_frequency_hz", unit, inverse=True, turns=int(of_turns["number"]))
+    if (turns := _turns_timed(name)) and unit_factor(unit, "time"):
+        return Title("spin_frequency_hz", unit, inverse=True, turns=turns)
     if (name in TURNS or label == "U") and (factor := unit_factor(f"/{unit}", "frequency")):
         return Title("spin_frequency_hz", {1.0: "1/s", PER_MINUTE: "1/min"}.get(factor, f"/{unit}"))
-    if name in PERIODS and unit_factor(unit, "time"):
-        return Title("spin_frequency_hz", unit, inverse=True)
     return Title(NAMES[name], unit, angular=name in _ANGULAR_NAMES) if name in NAMES else None
 
 
@@ -418,7 +433,7 @@ def foreign_unit(text: str, kind: str) -> str | None:
     form = re.fullmatch(r".*?[\[(]([^\[\]()]*)[\])]", text)
     unit = form[1] if form else text.rpartition("_")[2] if "_" in text else ""
     foreign = is_unit(unit) and unit_factor(unit, kind) is None
-    return unit if unit and (foreign or plain_unit(unit) in _FOREIGN) else None
+    return unit if unit and (foreign or plain_unit(unit) in FOREIGN) else None
 
 
 def is_total(unit: str) -> bool:

@@ -355,9 +355,27 @@ def _ask(
     title = "".join(layout.header[index : index + 1])
     *some, end = answers.values()
     ends = (digits(numbers[0], 4), digits(numbers[-1], 4))
-    asked = "column {n}{title:s} has the values {first:n} to {last:n} and {what}: {units} or {end}?"
-    text = Said(asked, index + 1, f" '{shorten(title)}'" if title else "", *ends, what, (*some,), end)
+    units = Said("{units} or {end}", (*some,), end) if some else end
+    asked = "column {n}{title:s} has the values {first:n} to {last:n} and {what}: {units}?"
+    text = Said(asked, index + 1, f" '{shorten(title)}'" if title else "", *ends, what, units)
     return Doubt("unit", text, index, choices, open=len(likely) > 1)
+
+
+def _question_of_period(plan: "Plan", column: Column) -> Doubt | None:
+    """Return the question in which unit the times of turns are: of ms and s that in which a top can have them."""
+    numbers = [number for number in _numbers(plan.layout, column.index) if number > 0]
+    answers = dict[str, str]()
+    if not numbers:
+        return None
+    for unit in ("ms", "s"):
+        turn = column.factor * (unit_factor(unit, "time") or 1.0)
+        if is_possible_spin(1 / (turn * median(numbers))):
+            ends = 1 / (turn * numbers[0]), 1 / (turn * numbers[-1])
+            answers[unit] = Said("{unit:s} ({first:.3g} to {last:.3g} Hz)", unit, *ends)
+    time = plan.column("time_s")
+    given = {**({"t": str(time.index + 1)} if time else {}), **plan.request.columns}
+    said = "no unit", answers, () if answers else ("ms", "s")
+    return _ask(plan.layout, column.index, "f", given, numbers=numbers, said=said)
 
 
 def _spins_of_total(layout: Layout, numbers: Sequence[float], time: Column | None) -> list[float]:
@@ -411,8 +429,10 @@ def _unit_doubt(plan: "Plan", column: Column) -> Doubt | None:
     what = Said("the unit {unit:s}" if column.written else "no unit, and would be in {unit:s}", unit=column.unit)
     if column.name == "time_s":
         return _doubt_about_times(plan, column, what)
-    if column.name != _SPIN or column.inverse or column.is_total:
+    if column.name != _SPIN or column.is_total:
         return None
+    if column.inverse:
+        return None if column.written else _question_of_period(plan, column)
     numbers = _numbers(plan.layout, column.index)
     if not numbers or is_possible_spin(median(numbers) * column.factor):
         return None

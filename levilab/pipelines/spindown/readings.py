@@ -344,11 +344,16 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
         what = "is repeated" if error.before == error.after else "comes"
         text = "the time {now:.16g} s {what} after {then:.16g} s in line {line}, times must increase: {advice}"
         frequency = table.column("spin_frequency_hz")
-        turned = np.all(np.diff(table.column("time_s")) < 0) and np.all(np.diff(frequency) > 0)
+        times = table.column("time_s")
+        turned = np.all(np.diff(times) < 0) and np.all(np.diff(frequency) > 0)
+        again = times[error.index :]
+        restarts = np.sum(again <= error.before) >= FEWEST and again.max() > times[0] and not turned
         advice = (
             "sort the rows by time, the latest comes first; or, if the columns are exchanged, name them the other way "
             "round with `columns`"
             if turned
+            else "a second run seems to begin here; save each as a file or sheet of its own"
+            if restarts
             else "sort the readings, or correct one"
         )
         return TableError(table.path, text, error.after, what, error.before, before, advice, line=after)

@@ -311,6 +311,19 @@ def test_a_table_that_holds_no_samples_says_what_to_do():
             read_record(FILES / name)
 
 
+def test_text_above_numbers_without_titles_is_skipped(write):
+    file = write("counter v1\nready\n1000,38\n61000,31\n121000,26\n181000,22\n", "log.txt")
+    (run,) = understand(file).runs
+    choice = run.doubts[0].choices[0]  # the first answer suffices
+    assert (choice.text, choice.columns) == ("ms (3 min)", {"t": "1 [ms]", "f": "2"})
+    assert read_table(file, quantities=SPIN, columns=choice.columns).column("spin_frequency_hz")[0] == 38
+
+
+def test_a_temperature_beside_a_spin_down_is_no_time(write):
+    table = read_table(write("t/s,f/Hz,T/°C\n0,38,21\n60,31,21\n120,26,21\n", "t.csv"), quantities=SPIN)
+    assert (list(table.columns), table.warnings) == ([*SPIN[:2]], ())
+
+
 def test_a_column_without_name_and_unit_is_asked_about(write):
     file = write("Zeit;Wert\n0;239\n60;195\n120;162\n180;136\n", "wert.csv")
     with pytest.raises(

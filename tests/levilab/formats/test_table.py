@@ -304,7 +304,7 @@ ERRORS = {
     "speed without a unit": ("a,speed\n0,1\n1,2\n2,3\n", None, ["'speed'", "`columns`"]),
     "mHz or MHz": ("a,f_mhz\n0,1\n1,2\n2,3\n", None, ["'f_mhz'"]),
     "no header, many columns": ("0,1,2,3\n1,1,2,3\n2,1,2,3\n", None, ["line 1", "4 columns and no header"]),
-    "text but no header": ("Scope 7\n0,61\n1,61\n2,60\n", None, ["line 1", "no header", "t=1,f=2"]),
+    "titles with blanks": ("t  f\n0,61\n1,61\n2,60\n", None, ["line 1", "no header", "t=1,f=2"]),
     "text in the middle": ("t,f\n0,61.5\nca. 1,61\n2,61\n3,60\n", None, ["line 3", "'ca. 1' stands in column 't'"]),
     "no times": ("RPM: 2403\nRPM: 2400\nRPM: 2397\nRPM: 2394\n", None, ["its times are needed"]),
     "prose in one line": ("one, two\n", None, ["begins no table of at least two columns"]),
@@ -365,7 +365,13 @@ def test_an_unreadable_file_is_reported(error, words, write, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "columns", "says"),
     [
-        ("t,period\n0,25\n1,26\n2,27\n", {}, "'period' could become one: say its unit in the title"),
+        (
+            "t,period\n0,25\n1,26\n2,27\n",
+            {},
+            "column 2 'period' has the values 25 to 27 and no unit: ms (40 to 37 Hz)?",
+        ),
+        ("t;10 Umdrehungen\n0;0,25\n1;0,26\n2;0,27\n", {"f": "2"}, "no unit: s (40 to 37 Hz)?"),
+        ("t,Periode\n0,25e3\n1,26e3\n2,27e3\n", {}, "and no unit: ms or s?"),
         ("t,T\n0,25\n1,26\n2,27\n", {}, "if T is the time of a turn say its unit, as T [ms]"),
         ("t,turns\n0,400\n1,390\n2,380\n", {}, "say in which time in the title, as in turns in 10 s"),
         ("t,Umdrehungen gezählt\n10,399\n20,785\n30,1156\n", {}, "turns since the start (38.6 to 37.1 Hz)"),
@@ -437,6 +443,14 @@ def test_periods_and_turns_in_a_time_are_read_as_frequencies(title, values, writ
 
 
 HZ = (1.0, 2.0, math.nan, 4.0)
+
+
+@pytest.mark.parametrize(("title", "unit", "turn"), [("Periode", "ms", 25.0), ("10 Umdrehungen", "s", 0.25)])
+def test_the_unit_of_a_period_may_be_said_with_its_column(title, unit, turn, write):
+    rows = f"t,{title},u\n0,{turn},{turn / 100}\n1,{turn},{turn / 100}\n2,{turn},{turn / 100}\n"
+    table = read_table(write(rows), columns={"f": f"2 [{unit}]"}, needed=[F])
+    assert table.column(F)[0] == pytest.approx(40)
+    assert table.column(U)[0] == pytest.approx(0.4)
 
 
 @pytest.mark.parametrize("period", ["T [ms]", "period (ms)"])
@@ -732,8 +746,12 @@ def test_passes_over_many_files_work_out_each_dialect_once(tmp_path, monkeypatch
 
 
 @pytest.mark.parametrize(
-    "title", ["Magnetic Field {} (µT)", "Magnetfeld {} in µT", "B{} [µT]", "b_{}/µT", "mag{} (uT)"]
-)
+    "title", [
+        "Magnetic Field {} (µT)", "Magnetfeld {} in µT", "Magnetisches Feld {} (µT)", "Magnetische Flussdichte {} / µT",
+        "Champ magnétique {} (µT)", "Campo magnético {} (µT)", "Magnetfält {} (µT)", "B{} [µT]", "b_{}/µT",
+        "mag{} (uT)",
+    ]
+)  # fmt: skip
 def test_components_of_a_field_and_its_magnitude_are_read(title, write):
     names = [title.format(axis) for axis in "xyz"]
     text = "\n".join(",".join(row) for row in [("Time (s)", *names, "Absolute field (µT)")]) + "\n"
