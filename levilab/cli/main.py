@@ -274,8 +274,8 @@ COMMANDS = {
             "groups.of_class",
             """Put the groups of a class beside each other: values with u, residuals, warnings, distance from the class.
 
-            A run has its group by levilab acquire --group.  On a virtual bench each group's seed made a top of its own:
-            its distance from that truth is shown, too.""",
+            A run has its group by levilab acquire --group, a file by its folder, as Anna/spin.csv.  On a virtual bench
+            each group's seed made a top of its own: its distance from that truth is shown, too.""",
             "levilab class runs/ -o class.html, or -o class.pdf, or -o class.xlsx",
         ),
     },

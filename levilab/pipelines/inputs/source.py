@@ -100,6 +100,7 @@ class Source(Generic[R]):
         name: for people, as short as distinguishes it from the others.
         warnings: about the input.
         kept: options out of the correction beside a data file with which it was read.
+        folder: of its group in a class; empty where its place says nothing about a group.
     """
 
     path: Path
@@ -110,11 +111,12 @@ class Source(Generic[R]):
     name: str
     warnings: tuple[str, ...] = ()
     kept: Mapping[str, Any] = field(default_factory=dict)
+    folder: str = ""
 
     @property
     def group(self) -> str:
         """Who measured it; empty where that is not known."""
-        return in_one_line(self.run.record.group) if self.run else ""
+        return in_one_line((self.run and self.run.record.group) or self.folder)
 
     @property
     def note(self) -> str:

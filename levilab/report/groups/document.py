@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shlex
+from collections import Counter
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from levilab.files import check_writable
+from levilab.formats.texts import locate
 from levilab.pipelines.analyzed import A
-from levilab.pipelines.inputs.names import short_paths
+from levilab.pipelines.inputs.names import short_paths, with_short_names
 from levilab.pipelines.inputs.search import Found
 from levilab.pipelines.inputs.unread import OTHER_COLUMNS, LeftOut, Skipped, kind_of_unused, number_by_kind, remarks
 from levilab.pipelines.recall import recall_suiting
@@ -57,7 +61,6 @@ from levilab.texts.text import Sentences, Text, spoken, verbatim
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Mapping, Sequence
-    from pathlib import Path
 
     from analysis.uncertainty import Estimate
     from levilab.pipelines.document import Analysis
@@ -123,6 +126,34 @@ def _left_out(results: Results, told: Sequence[Skipped]) -> tuple[dict[Path, str
     about = Text("without readings: {kinds} ({names:s})", number_by_kind(others), names) if others else ""
     left_out_paths = {one.path for one in others}
     return {path: unread[path] for path in sorted(unread) if path not in used | left_out_paths}, about
+
+
+def _in_folders_of_groups(results: Results, root: Path) -> Results:
+    """Return results whose inputs that say no group have that of their folder, as Anna/readings.csv."""
+    done = []
+    for analysis, found in results:
+        sources = [one if one.group else replace(one, folder=_folder(one.path, root)) for one in found.sources]
+        named = with_short_names(sources) if any(one.folder for one in sources) else found.sources
+        done.append((analysis, replace(found, sources=named)))
+    return done
+
+
+def _folder(path: Path, root: Path) -> str:
+    """Return the folder below the root in which an input lies; empty where it lies in the root, or elsewhere."""
+    file, root = locate(path)[0].resolve(), root.resolve()
+    parts = file.relative_to(root).parts if file.is_relative_to(root) else ()
+    return parts[0] if len(parts) > 1 else ""
+
+
+def _names_of_unread(paths: Sequence[Path], results: Results, root: Path) -> list[str]:
+    """Return names of inputs that could not be used: the folder of a group that has no other one, or a short path."""
+    folders = [_folder(path, root) for path in paths]
+    known = Counter([*folders, *(source.group for _, found in results for source in found.sources)])
+    names = [
+        folder if folder and known[folder] == 1 else ", ".join(filter(None, [folder, path.name]))
+        for path, folder in zip(paths, folders, strict=True)
+    ]
+    return names if len({*names}) == len(names) else short_paths(paths)
 
 
 def _each_reading_once(results: Results) -> Results:
@@ -319,12 +350,14 @@ def write_class(
     with writing_report(output):
         check_writable(output)
     told: list[Skipped] = []
-    results = _each_reading_once(recall_suiting(paths, given or {}, told.append, skips=True))
+    root = paths[0] if len(paths) == 1 else Path(os.path.commonpath([path.resolve() for path in paths]))
+    recalled = recall_suiting(paths, given or {}, told.append, skips=True)
+    results = _in_folders_of_groups(_each_reading_once(recalled), root)
     classes = [class_of(analysis, found) for analysis, found in results]
     classes.sort(key=lambda of: -len(of.groups))  # what one group alone measured comes last
     unread, others = _left_out(results, told)
-    of_files = dict(zip(short_paths([*unread]), map(plain_text, unread.values()), strict=True))
-    classes[0] = replace(classes[0], unread=of_files)
+    of_inputs = dict(zip(_names_of_unread([*unread], results, root), map(plain_text, unread.values()), strict=True))
+    classes[0] = replace(classes[0], unread=of_inputs)
     date = newest_of(results)
     if form:
         document = (heading or Heading()).above(class_document(classes, paths, output.name, others))

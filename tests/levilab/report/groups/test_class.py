@@ -24,6 +24,7 @@ from levilab.world.spin_world import SpinScene, random_scene
 from support.acquisitions import RAISED_QUICKLY, acquired
 from support.pages import Page
 from support.paths import SAMPLE_DATA
+from support.spin_downs import spin_down_csv
 
 #: What a spreadsheet, a page or a terminal could take for something else.
 HOSTILE = "=1+1 <b>&$x_1$"
@@ -93,6 +94,21 @@ def test_the_page_names_groups_whose_seed_has_another_law(of_three, tmp_path, gr
 def test_two_runs_of_a_group_are_no_two_groups(of_three, tmp_path):
     assert "mean of 3 groups" in finding(compared(of_three))
     assert "3 runs of 2 groups" in finding(compared(with_changes(of_three, tmp_path, "Group 10", {"group": "Group 2"})))
+
+
+def test_a_folder_is_the_group_of_its_files(tmp_path):
+    """Also of a file with several runs, and of one that cannot be read, where all files have the same name."""
+    folders = [tmp_path / "class" / name for name in ("Anna", "Ben", "Carl", "Dora")]
+    for seed, folder in enumerate(folders):
+        folder.mkdir(parents=True)
+        spin_down_csv(folder / "readings.csv", seed=seed)
+    shutil.copy(SAMPLE_DATA / "student-files" / "runs-under-one-time.csv", folders[1] / "readings.csv")
+    (folders[2] / "readings.csv").write_text("t [s],f [Hz]\n0,38\n10,37.2\n20,3x.5\n30,35\n", encoding="utf-8")
+    for paths in ([tmp_path / "class"], folders):
+        page = Page(write_class(paths, tmp_path / "class.html").read_text(encoding="utf-8")).text
+        assert re.search(r"Class of 3 groups.*To repeat: Carl", page, re.DOTALL)
+        assert all(name in page for name in ("Anna", "Ben, ", "Dora"))
+        assert "readings.csv," not in page.split("Made by")[0].replace("readings.csv, line", "")
 
 
 def test_a_run_given_twice_is_named(of_three, tmp_path):
