@@ -94,11 +94,11 @@ class DriveSettings(CounterSettings):
         if self.drive_waveform == "NONE":
             if not self.by_hand:
                 raise ConfigError(
-                    "{table}.drive_waveform = NONE: this experiment needs a drive, SIN, SQU or TRI", table=table
+                    "{table:s}.drive_waveform = NONE: this experiment needs a drive, SIN, SQU or TRI", table=table
                 )
             if self.drive == "triggered":
                 raise ConfigError(
-                    "{table}.drive_waveform = NONE: a triggered drive has cycles of SIN, SQU or TRI", table=table
+                    "{table:s}.drive_waveform = NONE: a triggered drive has cycles of SIN, SQU or TRI", table=table
                 )
             return
         if self.drive == "triggered":
@@ -107,7 +107,7 @@ class DriveSettings(CounterSettings):
         lowest, highest = _USUAL_WINDOW_HZ
         if not lowest / 2 <= self.drive_frequency_hz <= 2 * highest:  # a slip of the unit would cost the top
             raise ConfigError(
-                "{table}.drive_frequency_hz = {drive_frequency_hz:g} Hz: no top floats there; a Levitron of the"
+                "{table:s}.drive_frequency_hz = {drive_frequency_hz:g} Hz: no top floats there; a Levitron of the"
                 " usual kind does between {lowest:.2f} and {highest:.2f} Hz",
                 table=table,
                 drive_frequency_hz=self.drive_frequency_hz,
@@ -117,8 +117,8 @@ class DriveSettings(CounterSettings):
         slowest = self.drive_frequency_hz / _LONGEST_RAMP_S
         if self.ramp_hz_per_s < slowest:
             raise ConfigError(
-                "{table}.ramp_hz_per_s = {ramp_hz_per_s:g} would raise the top for hours to "
-                "{table}.drive_frequency_hz = {drive_frequency_hz:g}: at least {slowest:.2g} is expected",
+                "{table:s}.ramp_hz_per_s = {ramp_hz_per_s:g} would raise the top for hours to "
+                "{table:s}.drive_frequency_hz = {drive_frequency_hz:g}: at least {slowest:.2g} is expected",
                 table=table,
                 ramp_hz_per_s=self.ramp_hz_per_s,
                 drive_frequency_hz=self.drive_frequency_hz,
@@ -128,13 +128,13 @@ class DriveSettings(CounterSettings):
     def _check_triggered(self, table: str, limits: Limits) -> None:
         if not self.by_trigger:
             raise ConfigError(
-                "{table}.drive = triggered: the drive sets the frequency here, so ramp is expected", table=table
+                "{table:s}.drive = triggered: the drive sets the frequency here, so ramp is expected", table=table
             )
         fastest = limits.of_the_drive().beyond(frequency_hz=CYCLE * self.drive_frequency_hz)
         if fastest and fastest.is_highest:
             raise ConfigError(
-                "{table}.drive_frequency_hz = {drive_frequency_hz:g}: the cycles of a triggered drive are"
-                " {cycle:g} times as fast, more than this bench allows, limits.{name} = {limit:g}",
+                "{table:s}.drive_frequency_hz = {drive_frequency_hz:g}: the cycles of a triggered drive are"
+                " {cycle:g} times as fast, more than this bench allows, limits.{name:s} = {limit:g}",
                 table=table,
                 drive_frequency_hz=self.drive_frequency_hz,
                 cycle=CYCLE,
@@ -163,7 +163,7 @@ def check_drive(table: str, limits: Limits, amplitude_vpp: float, frequencies: I
     for name, wanted, found in asked:
         if found:
             raise ConfigError(
-                "{table}.{name} = {wanted:g} is {more} than this bench allows, limits.{limit_name} = {limit:g}",
+                "{table:s}.{name:s} = {wanted:g} is {more} than this bench allows, limits.{limit_name:s} = {limit:g}",
                 table=table,
                 name=name,
                 wanted=wanted,

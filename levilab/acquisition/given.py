@@ -5,6 +5,7 @@ Nothing heavy is imported here, and of the experiments that one alone: a wrong s
 
 from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
+from functools import partial
 from typing import Any
 
 from pydantic import ValidationError
@@ -27,7 +28,8 @@ _LISTS = {"integer": "[1, 3]", "number": "[44.0, 38.0]", "string": '["tape", "la
 def read_conditions(temperature: str | None, washers: str | None) -> tuple[float | None, tuple[float, ...] | None]:
     """Return temperature [°C] and masses of washers [kg] that were typed; None: not given.  Raises UsageError."""
     found: list[Any] = []
-    for name, text, read in (("temperature", temperature, read_temperature), ("washers", washers, read_masses)):
+    of_washers = partial(read_masses, key="washer_mass_kg")
+    for name, text, read in (("temperature", temperature, read_temperature), ("washers", washers, of_washers)):
         try:
             found.append(None if text is None else read(text))
         except ValueError as error:

@@ -111,7 +111,7 @@ def request_for(experiment: str, options: AcquisitionOptions) -> AcquisitionRequ
         without = without.model_copy(update={"visa_library": "@levilab", **virtual_instruments(named)})
     without = with_settings(without, experiment, _suited(without, experiment))
     config = _with_given(without, experiment, options.settings)
-    _check_given(config, without, experiment)
+    _check_given(config, without, experiment, options.settings)
     config = with_settings(config, experiment, _suited(config, experiment))
     _refuse_unused(options, config, experiment)
     temperature_c, washers_kg = read_conditions(options.temperature, options.washers)
@@ -241,7 +241,7 @@ def _refuse_unused(options: AcquisitionOptions, config: BenchConfig, experiment:
             why = ": the counter counts; leave out one of the two" if options.counter and options.scope else ""
             raise UsageError(
                 option,
-                Text("is not used by these settings of levilab acquire {experiment}{why}", experiment, why),
+                Text("is not used by these settings of levilab acquire {experiment:s}{why}", experiment, why),
                 value=text,
             )
 
@@ -263,13 +263,14 @@ def _suited(config: BenchConfig, experiment: str) -> ExperimentSettings:
     return settings
 
 
-def _check_given(config: BenchConfig, without: BenchConfig, experiment: str) -> None:
+def _check_given(config: BenchConfig, without: BenchConfig, experiment: str, given: Sequence[str]) -> None:
     """Check what the bench allows of an experiment.
 
     Args:
         config: the configuration.
         without: the same without the settings that were given.
         experiment: its name.
+        given: these settings.
 
     Raises:
         UsageError: the bench allows the configuration without the given settings, and not with them.
@@ -279,7 +280,11 @@ def _check_given(config: BenchConfig, without: BenchConfig, experiment: str) -> 
         _check_settings(config, experiment)
     except ConfigError as refused:
         _check_settings(without, experiment)
-        raise UsageError("settings", text_of(refused)) from refused
+        said = text_of(refused)
+        about = said.values if isinstance(said, Text) else {}
+        keys = {*about, about.get("name")}
+        own = (one for one in reversed(given) if one.removeprefix(f"{experiment}.").partition("=")[0].strip() in keys)
+        raise UsageError("settings", said, value=next(own, None)) from refused
 
 
 def _check_settings(config: BenchConfig, experiment: str) -> None:
@@ -302,7 +307,7 @@ def _resumable(folder: Path, experiment: str) -> Run:
     run = Run.load(folder)
     if run.record.experiment != experiment:
         raise CannotResume(
-            "{folder}: holds a {its} run, levilab acquire {experiment} resumes {experiment} runs",
+            "{folder}: holds a {its} run, levilab acquire {experiment:s} resumes {experiment:s} runs",
             folder=folder,
             its=run.record.experiment,
             experiment=experiment,
@@ -378,7 +383,7 @@ def _on_the_virtual_bench(
         return _with_a_spinning_top(request, random_scene(seed), clock)
     if run is None:
         config, without = (_for_scene(one, request.experiment, scene) for one in (config, without))
-        _check_given(config, without, request.experiment)
+        _check_given(config, without, request.experiment, options.settings)
     return replace(
         request,
         config=config,

@@ -282,7 +282,7 @@ class Motor:
                 raise DidNotFollow(
                     "the top spins at {spin:.2f} Hz and gets no {other}: pull and drag are equal there, "
                     "{target:g} Hz were asked for",
-                    "drive harder ({experiment}.drive_amplitude_vpp), or ask for less",
+                    "drive harder ({experiment:s}.drive_amplitude_vpp), or ask for less",
                     spin=self.spin,
                     other="slower" if brakes else "faster",
                     target=target,

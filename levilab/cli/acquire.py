@@ -1,7 +1,8 @@
 """Acquire: experiments on the bench.  Heavy imports happen inside the commands that need them."""
 
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from functools import wraps
 from inspect import signature
 from pathlib import Path
@@ -14,6 +15,7 @@ from levilab.cli.importing import importing
 from levilab.cli.later import Later, NamedLast
 from levilab.cli.options import Json, Language, flag, option, place, quantity
 from levilab.cli.output import message, print_json, result
+from levilab.errors import UsageError
 from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
@@ -53,6 +55,8 @@ EXPERIMENT_HELP = {
 }
 #: Option → the setting that it stands for, as --set takes it; only this experiment has the option.
 SHORT = {"upper": "limit.which=upper"}
+#: Option → the key of any experiment to which it gives a value.
+KEYS = {"drive": "drive", "spin": "drive_frequency_hz"}
 _ENDING = "Ctrl-C ends the run after the reading under way; outputs go off and the run is kept."
 
 
@@ -112,9 +116,9 @@ def acquire_experiment(
     """Carry out an experiment."""
     if not list_settings:
         look_at_files(bench, resume, out, scene, virtual=mock, named=bool(counter or scope))
-    shorthands = {"drive": drive, "drive_frequency_hz": spin}
+    typed = {KEYS["drive"]: drive, KEYS["spin"]: spin}
     given = (
-        *(f"{key}={value}" for key, value in shorthands.items() if value is not None),
+        *(f"{key}={value}" for key, value in typed.items() if value is not None),
         *(settings or ()),
         *[SHORT["upper"]] * upper,
     )
@@ -215,7 +219,8 @@ def _command_of(experiment: str) -> Callable[[], Callable[..., None]]:
     def make() -> Callable[..., None]:
         @wraps(acquire_experiment)
         def command(**given: Any) -> None:
-            acquire_experiment(experiment, **given)
+            with _named_as_typed(experiment, given):
+                acquire_experiment(experiment, **given)
 
         shared = signature(acquire_experiment)
         _, *options = shared.parameters.values()
@@ -233,6 +238,19 @@ for _name, _help in EXPERIMENT_HELP.items():
         help=f"{_help}\n\n{_ENDING}",
         epilog=f"Example: levilab acquire {_name} --mock --note 'first try'",
     )(_command_of(_name))
+
+
+@contextmanager
+def _named_as_typed(experiment: str, given: Mapping[str, Any]) -> Iterator[None]:
+    """Name the option that was typed in the error about the setting that it stands for."""
+    try:
+        yield
+    except UsageError as error:
+        refused = (error.value or "").removeprefix(f"{experiment}.")
+        for option_name, key in KEYS.items():
+            if error.name == "settings" and refused in {key, f"{key}={given[option_name]}"}:
+                raise UsageError(option_name, error.text, value=given[option_name]) from error
+        raise
 
 
 def _ask(task: "Task") -> str:

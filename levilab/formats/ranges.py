@@ -47,6 +47,7 @@ _PART = (Unit("", "parts of one", 1.0), Unit("ppm", "millionths", 1e-6))
 #: The end of a key, or the name of an option → its units, the own one first, and its least and greatest value in it.
 RANGES: Mapping[str, tuple[tuple[Unit, ...], float, float]] = MappingProxyType({
     "mass_kg": (_MASS, 1e-6, 1.0),
+    "washer_mass_kg": (_MASS, 1e-6, 0.02),  # a top that floats weighs 20 to 30 g, washers a few
     "temperature_c": (_TEMPERATURE, -30.0, 60.0),
     "inner_radius_m": (_LENGTH, 0.0, 0.5),
     "outer_radius_m": (_LENGTH, 1e-4, 0.5),

@@ -120,8 +120,8 @@ def unit_of_key(key: str) -> str:
     return next((OF_KEYS[one] for one in endings if one in OF_KEYS), "")
 
 
-def read_mass(text: str) -> float:
-    """Return a mass [kg] that is typed in g, or with its unit.  Raises ValueError, whose text says what is expected.
+def read_mass(text: str, key: str = "mass_kg") -> float:
+    """Return a mass [kg] that is typed in g, or with its unit; `key` has its range.  Raises ValueError, which says it.
 
     >>> read_mass("24.98 g"), read_mass("60mg"), round(read_mass("0.06"), 9)
     (0.02498, 6e-05, 6e-05)
@@ -131,7 +131,7 @@ def read_mass(text: str) -> float:
     except ValueError:
         hint = hint_about(text) if "," in text else ""
         raise ValueError(Text("a mass such as 24.98 g is expected{hint}", hint=hint)) from None
-    return round(_in_range("mass_kg", grams * 1e-3, 1e-3, asks=text.strip()[-1:].isdecimal()), 9)
+    return round(_in_range(key, grams * 1e-3, 1e-3, asks=text.strip()[-1:].isdecimal()), 9)
 
 
 def read_temperature(text: str) -> float:
@@ -148,10 +148,10 @@ def read_temperature(text: str) -> float:
     return round(_in_range("temperature_c", float(found[1]) * scale[0] + scale[1], asks=not found[2]), 2)
 
 
-def read_masses(text: str) -> tuple[float, ...]:
+def read_masses(text: str, key: str = "mass_kg") -> tuple[float, ...]:
     """Return masses [kg] with commas or + between them; a unit at the end alone is that of all.
 
-    Raises ValueError.
+    `key` has the range of each.  Raises ValueError.
 
     >>> read_masses("0.06, 0.1 g"), read_masses("60 + 100 mg"), read_masses("none")
     ((6e-05, 0.0001), (6e-05, 0.0001), ())
@@ -170,7 +170,7 @@ def read_masses(text: str) -> tuple[float, ...]:
     if any(bare) and not all(bare[:-1] if unit else bare):  # 60 mg + 0.1 may be 0.1 mg or 0.1 g
         raise ValueError("a unit behind each mass is expected, as 60 mg + 0.1 g, or one at the end for all")
     return tuple(
-        read_mass(f"{piece} {unit}" if is_bare else piece) for piece, is_bare in zip(pieces, bare, strict=True)
+        read_mass(f"{piece} {unit}" if is_bare else piece, key) for piece, is_bare in zip(pieces, bare, strict=True)
     )
 
 

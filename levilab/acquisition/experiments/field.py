@@ -92,8 +92,8 @@ class FieldSettings(ExperimentSettings):
         """Raise ConfigError for radii that no ring has."""
         if self.base_inner_radius_m >= self.base_outer_radius_m:
             raise ConfigError(
-                "{table}.base_inner_radius_m = {base_inner_radius_m:g} must be less than "
-                "{table}.base_outer_radius_m = {base_outer_radius_m:g}",
+                "{table:s}.base_inner_radius_m = {base_inner_radius_m:g} must be less than "
+                "{table:s}.base_outer_radius_m = {base_outer_radius_m:g}",
                 table=table,
                 base_inner_radius_m=self.base_inner_radius_m,
                 base_outer_radius_m=self.base_outer_radius_m,

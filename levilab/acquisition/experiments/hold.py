@@ -42,7 +42,7 @@ class HoldSettings(DriveSettings):
         """Raise ConfigError for a drive that the bench does not allow."""
         if self.drive != "triggered":
             raise ConfigError(
-                "{table}.drive = {drive}: triggered is expected, no other drive has a loop",
+                "{table:s}.drive = {drive}: triggered is expected, no other drive has a loop",
                 table=table,
                 drive=self.drive,
             )

@@ -69,13 +69,13 @@ class LimitSettings(DriveSettings):
         super().check(table, limits)
         if self.which == "upper" and self.drive_waveform == "NONE":
             raise ConfigError(
-                "{table}.drive_waveform = NONE: the upper limit needs a drive, SIN, SQU or TRI", table=table
+                "{table:s}.drive_waveform = NONE: the upper limit needs a drive, SIN, SQU or TRI", table=table
             )
         if self.which == "upper":
             check_drive(table, limits, self.drive_amplitude_vpp, [("highest_hz", self.highest_hz)])
         if self.which == "upper" and self.highest_hz <= self.drive_frequency_hz:
             raise ConfigError(
-                "{table}.highest_hz = {highest_hz:g}: more than {table}.drive_frequency_hz = "
+                "{table:s}.highest_hz = {highest_hz:g}: more than {table:s}.drive_frequency_hz = "
                 "{drive_frequency_hz:g} is expected, from where the drive creeps up",
                 table=table,
                 highest_hz=self.highest_hz,
@@ -193,7 +193,7 @@ def _limit_of_fall(session: Session[LimitSettings], seen: list[Row], missed_by: 
     if len(seen) < _FEWEST:
         raise ExperimentFailed(
             "the top fell {count} readings after the drive went off, {fewest} are needed: drive it "
-            "higher first ({experiment}.drive_frequency_hz)",
+            "higher first ({experiment:s}.drive_frequency_hz)",
             count=len(seen),
             fewest=_FEWEST,
             experiment=session.writer.record.experiment,

@@ -91,8 +91,8 @@ class TraceSettings(ExperimentSettings):
         low, high = (self.offset_v + k * self.volts_per_division for k in (-_HALF_SCREEN, _HALF_SCREEN))
         if self.trigger_source in self.channels and not low <= self.trigger_level_v <= high:
             raise ConfigError(
-                "{table}.trigger_level_v = {trigger_level_v:g} is beyond what the oscilloscope records, "
-                "{low:g} to {high:g} V: change it, {table}.offset_v or {table}.volts_per_division",
+                "{table:s}.trigger_level_v = {trigger_level_v:g} is beyond what the oscilloscope records, "
+                "{low:g} to {high:g} V: change it, {table:s}.offset_v or {table:s}.volts_per_division",
                 table=table,
                 trigger_level_v=self.trigger_level_v,
                 low=low,

@@ -90,11 +90,23 @@ def test_a_run_keeps_temperature_and_washers_and_its_report_shows_them(tmp_path)
 @pytest.mark.parametrize(("words", "says"), [
     (("--temperature", "294"), ("levilab: --temperature 294: a number from -30 to 60 °C is expected. "
      "Were kelvins meant? 294 K are 20.85")),
+    (("--washers", "0.06kg"), "levilab: --washers 0.06kg: a number from 0.001 to 20 g is expected"),
     (("--washers", "0,06"), "levilab: --washers 0,06: a decimal point is expected, and a comma between two masses"),
 ])  # fmt: skip
 def test_a_wrong_condition_is_refused_before_a_run_is_made(tmp_path, words, says):
     ended = command("acquire", "spin", "--mock", *words, cwd=tmp_path)
     assert (ended.status, ended.err, list(tmp_path.iterdir())) == (2, f"{says}\n", [])
+
+
+@pytest.mark.parametrize(("words", "says"), [
+    (("--spin", "500"), "--spin 500: spin.drive_frequency_hz = 500 is more than this bench allows, limits."),
+    (("--spin", "-5"), "--spin -5: a number above 0 up to 100 [Hz] is expected"),
+    (("--drive", "no"), "--drive no: ramp or triggered is expected"),
+    (("--spin", "40", "--set", "drive_frequency_hz=500"), "--set drive_frequency_hz=500: spin.drive_frequency_hz = "),
+    (("--spin", "500", "--language", "de"), "--spin 500: spin.drive_frequency_hz = 500 ist mehr, als dieser"),
+])  # fmt: skip
+def test_a_refused_setting_is_called_as_it_was_typed(tmp_path, words, says):
+    assert command("acquire", "spin", "--mock", *words, cwd=tmp_path).err.startswith(f"levilab: {says}")
 
 
 def said_at_the_bench(tmp_path, name, *words):
