@@ -47,7 +47,7 @@ def parse_json(text: str) -> Any:
     try:
         return _parse_strict_json(text)
     except json.JSONDecodeError as error:
-        raise ValueError(f"from line {error.lineno}, column {error.colno} on") from error
+        raise ValueError(Text("from line {line}, column {column} on", error.lineno, error.colno)) from error
 
 
 def _parse_strict_json(text: str) -> Any:

@@ -19,7 +19,7 @@ from levilab.present.numbers import short_name
 from levilab.present.terminal import print_rows, terminal
 from levilab.runs.find import RECORD, find_runs, must_be_searchable
 from levilab.runs.run import READINGS, Run, RunRecord
-from levilab.texts.text import Text, how_many, in_language
+from levilab.texts.text import Text, how_many, in_language, text_of
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def _list_run(folder: Path) -> Listed:
         run = _load(folder) or Run.load(folder)
         rows = _glance(run) or _read(run)
     except DataError as error:
-        return Listed(str(folder), None, "?", "unreadable", 0, None, synthetic=False, note="", problem=str(error))
+        return Listed(str(folder), None, "?", "unreadable", 0, None, synthetic=False, note="", problem=text_of(error))
     simulation = _table(run.record.model_extra, "simulation")
     return Listed(
         path=str(folder),
@@ -212,10 +212,11 @@ def print_runs(runs: Sequence[Listed], root: Path) -> None:
     numbers = [in_language("readings"), in_language("length")]
     print_rows(console, [*map(in_language, heads)], rows, numbers=numbers)
     problems = [run.problem for run in runs if run.problem]
-    for problem in problems[:MOST_PROBLEMS]:
-        console.print(f"[yellow]note:[/yellow] {escape(problem)}")
+    shown = problems[:MOST_PROBLEMS]
     if (more := len(problems) - MOST_PROBLEMS) > 0:
-        console.print(f"[yellow]note:[/yellow] and {more} more that cannot be read; JSON has the reason for each")
+        shown.append(Text("and {more} more that cannot be read; JSON has the reason for each", more=more))
+    for problem in shown:
+        console.print(f"[yellow]{in_language('note:')}[/yellow] {escape(in_language(problem))}")
 
 
 def _that_fit(heads: list[str], rows: list[list[str]], width: int) -> tuple[list[str], list[list[str]]]:

@@ -258,21 +258,24 @@ def _is_alive(folder: Path) -> bool:
 def read_record(folder: Path) -> RunRecord:
     """Return the content of ``run.json``.  Raises DataError if it is missing, cut off, or of another schema."""
     path = folder / RECORD
-    rescue = f"its readings can still be analyzed: levilab analyze {as_typed(path.parent / READINGS)}"
+    readings = as_typed(path.parent / READINGS)
+    rescue = Text("its readings can still be analyzed: levilab analyze {path:s}", path=readings)
     try:
         if path.exists() and not path.is_file():
-            raise DataError(f"{path}: is a folder, a pipe or a device; a file is expected; {rescue}")
+            raise DataError("{path:s}: is a folder, a pipe or a device; a file is expected; {do}", path, rescue)
         data = parse_json(path.read_text(encoding="utf-8"))
     except PermissionError as error:
-        raise DataError(f"{path}: may not be read by you; change its permissions or copy it") from error
+        raise DataError("{path:s}: may not be read by you; change its permissions or copy it", path=path) from error
     except OSError as error:
-        raise DataError(f"{path}: cannot be read ({error.strerror}): is {path.parent} a run folder?") from error
+        said = "{path:s}: cannot be read ({why:s}): is {folder:s} a run folder?"
+        raise DataError(said, path, error.strerror, path.parent) from error
     except ValueError as error:
-        raise DataError(f"{path}: is cut off or not JSON ({error}); {rescue}") from error
+        raise DataError("{path:s}: is cut off or not JSON ({why}); {do}", path, error, rescue) from error
     if not isinstance(data, dict) or data.get("schema") != SCHEMA:
         seen = data.get("schema") if isinstance(data, dict) else type(data).__name__
-        raise DataError(f"{path}: schema is {str(seen)[:60]!r}, expected {SCHEMA!r} of this version; {rescue}")
+        said = "{path:s}: schema is {seen:s}, expected {schema:s} of this version; {do}"
+        raise DataError(said, path, repr(str(seen)[:60]), repr(SCHEMA), rescue)
     try:
         return RunRecord.model_validate(data)
     except ValidationError as error:
-        raise DataError(f"{path}: {in_one_line(error)}; {rescue}") from error
+        raise DataError("{path:s}: {problem}; {do}", path, in_one_line(error), rescue) from error

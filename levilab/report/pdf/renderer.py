@@ -40,7 +40,7 @@ from levilab.present.document.typesetting import typeset
 from levilab.present.tables import Table
 from levilab.software import how_to_install
 from levilab.texts.text import Text as Said
-from levilab.texts.text import how_many, in_language
+from levilab.texts.text import in_language
 
 TEMPLATE = "report.typ"
 #: Letters of a word that is never divided; a longer one is divided behind what stands between its parts, as in a path.
@@ -218,7 +218,7 @@ def _in_short(blocks: Iterable[Block]) -> Iterator[Drawn]:
     several = sum(map(bool, verdicts)) > 1
     for (chapter, inner), verdict in zip(chapters, verdicts, strict=True) if several else ():
         count = sum(len(group) for one in inner if isinstance(one, Warnings) for group in one.groups)
-        notes = how_many(count, "note") if count else ""
+        notes = in_language(Said("{n} notes", n=count) if count > 1 else "1 note" if count else "")
         yield {"title": _text(chapter.title), "verdict": _text(verdict), "notes": notes}
 
 

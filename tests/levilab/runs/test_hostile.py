@@ -71,6 +71,17 @@ def test_an_odd_record_costs_one_line_and_no_other_run(tmp_path, name):
     assert len(refused.err.splitlines()) == 1
 
 
+@pytest.mark.parametrize(("record", "said"), [
+    ("{", "ist abgeschnitten oder kein JSON (von Zeile 1, Spalte 2 an); die Messwerte lassen sich noch auswerten"),
+    ('{"schema": 3}', "das Schema ist '3', erwartet wird 'levilab-run/1' dieser Version; die Messwerte lassen sich"),
+])  # fmt: skip
+def test_a_broken_record_is_named_in_the_language_of_the_person(tmp_path, record, said):
+    shutil.copytree(SAMPLE, tmp_path / "run")
+    (tmp_path / "run" / "run.json").write_text(record, encoding="utf-8")
+    listed = command("runs", ".", "--language", "de", cwd=tmp_path).out
+    assert f"Hinweis: run/run.json: {said}" in " ".join(listed.split())
+
+
 @pytest.mark.parametrize("name", ODD_JSON)
 def test_an_odd_event_is_left_out(tmp_path, name):
     folder = run_with(tmp_path / "run")

@@ -60,6 +60,12 @@ def test_text_figure_and_tables_have_one_verdict(tmp_path):
     assert any("Run by run" in one.title and "fit of the disc law" in one.title for one in spindown_tables(analysis))
 
 
+def test_a_law_that_is_no_better_is_not_as_good_in_german(sample_data):
+    text = ANALYSES["spindown"].analyze([sample_data / "spin-down-1"]).text
+    assert "No better than disc, with more constants: " in text
+    assert "Nicht besser als das Scheibengesetz, aber mit mehr Konstanten: " in in_language(text, "de")
+
+
 def test_the_report_begins_with_the_constant_and_its_u(tmp_path):
     analysis = undecided(tmp_path)
     c32 = analysis.combined.fit("disc").constants["c32"]
