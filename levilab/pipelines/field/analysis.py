@@ -10,7 +10,7 @@ from analysis.uncertainty import Estimate
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.field.device import known_of, known_top, usual
 from levilab.pipelines.field.readings import FieldReadings
-from levilab.pipelines.field.words import remark, scan_as_text, scans_as_text
+from levilab.pipelines.field.words import about_top, remark, scan_as_text, scans_as_text
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import FieldOptions
 
@@ -24,17 +24,19 @@ class FieldRun:
         top: of which top what follows is.
         floating: what follows, None where no top floats, or the scan shows no ring.
         warnings: what else to know before using the numbers.
+        taken: which quantities of the thesis's top stand for those of this one, see `known_top`.
     """
 
     scan: FieldScan
     top: KnownTop
     floating: Floating | None
     warnings: tuple[str, ...]
+    taken: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
         """What the scan says, in a few sentences."""
-        return scan_as_text(self.scan, self.floating)
+        return scan_as_text(self.scan, self.floating, self.taken)
 
     @property
     def values(self) -> dict[str, Estimate]:
@@ -69,19 +71,21 @@ class FieldAnalysis(Analyzed[FieldReadings, FieldRun, None, FieldOptions]):
         if len(self.runs) == 1:
             return self.runs[0].text
         found = means([run.values for run in self.runs])
-        return scans_as_text(found, len(self.runs), found["strength"].scatter)
+        taken = {name for run in self.runs for name in run.taken}
+        return scans_as_text(found, len(self.runs), found["strength"].scatter, taken)
 
     def about_run(self, run: FieldRun) -> Iterable[str]:
         """Return what to know of one scan."""
         of_top = run.floating.remarks if run.floating else ()
-        return (*map(remark, run.scan.remarks), *run.warnings, *map(remark, of_top))
+        taken = about_top(run.taken) if run.floating else ()
+        return (*map(remark, run.scan.remarks), *taken, *run.warnings, *map(remark, of_top))
 
 
 def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> FieldRun:
     """Fit one input, and compute what follows.  Raises AnalysisError."""
     readings = source.readings
     known = known_of(source, options.device)
-    top, warnings = known_top(source, options, usual(readings.height_u))
+    top, taken = known_top(source, options, usual(readings.height_u))
     scan = fit_scan(
         readings.height,
         readings.flux_density,
@@ -91,13 +95,14 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
         free_radii=options.free_radii,
     )
     floating = follow(scan, top) if scan.is_of_a_ring else None
+    warnings = list[str]()
     if floating is None and scan.is_of_a_ring:
         warnings = ["no top of this kind floats above this base at any mass and spin: are radii and inertias right?"]
     if readings.u is None:
         warnings.append("no uncertainty of the readings is given: their scatter about the fit stands for it")
     if readings.height_u is None:
         warnings.append("no uncertainty of the heights is given: they are taken as exact")
-    return FieldRun(scan, top, floating, tuple(warnings))
+    return FieldRun(scan, top, floating, tuple(warnings), taken)
 
 
 def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:

@@ -94,8 +94,10 @@ def parts_of(top: TopTable) -> list[Cylinder]:
 
 def known_top(
     source: Source[FieldReadings], options: FieldOptions, height_u: float | None
-) -> tuple[KnownTop, list[str]]:
-    """Return what is known of the top, the thesis's where nothing is, and what to know of that.
+) -> tuple[KnownTop, tuple[str, ...]]:
+    """Return what is known of the top, and which quantities of the thesis's top stand for others.
+
+    On a virtual bench the thesis's top floats.
 
     Args:
         source: a scan, whose run may say something of the top.
@@ -107,7 +109,6 @@ def known_top(
     """
     device = options.device or Device()
     table = _merged(source, TopTable, _OF_TOP, source.settings("field"), options.device.top if options.device else None)
-    warnings: list[str] = []
     made = top_of(parts_of(table)) if table.parts else None
     moment = _estimate(table.moment_a_m2, table.moment_u_a_m2, "A m^2")
     mass = made.mass if made else _estimate(table.mass_kg, table.mass_u_kg, "kg")
@@ -124,24 +125,11 @@ def known_top(
     if moment is None and height is None:
         moment = Estimate(THESIS["moment"][0], 0.0, "A m^2")
         missing = [*missing, "moment"]
-    warnings += [_TAKEN[name] for name in missing]
     magnet = Disc(table.magnet_radius_m, table.magnet_height_m or 0.0) if table.magnet_radius_m else None
-    if magnet is None:
-        warnings.append(
-            "the top's magnet is taken for a point: one of 14 mm radius feels about 4 % more force at 73 mm, and its "
-            "lowest height lies 3 mm lower; give magnet_radius_m and magnet_height_m in the file of the option `device`"
-        )
+    missing = [*missing, *([] if magnet else ["magnet"])]
     covariance = made.covariance if made else None
-    return KnownTop(transverse, axial, moment, mass, height, device.gravity_m_s2, covariance, magnet), warnings
-
-
-#: What is missing in the file of a top → what is taken instead.
-_TAKEN = {
-    "inertias": "the inertias of the top are not known, those of the thesis's top are taken: spins are of that top; "
-    "describe yours in a file, for the option `device`",
-    "moment": "the moment of the top is not known, that of the thesis's top is taken: masses and heights are of that "
-    "top; describe yours in a file, for the option `device`",
-}
+    top = KnownTop(transverse, axial, moment, mass, height, device.gravity_m_s2, covariance, magnet)
+    return top, () if source.synthetic else tuple(missing)
 
 
 def inertias(table: TopTable) -> tuple[Estimate, Estimate, list[str]]:

@@ -1,7 +1,7 @@
 """Quantities of a scan, the sentences that it says, and remarks on its numbers."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from types import MappingProxyType
 
 from analysis.field.fit import LEARNS_NOTHING, UNITS, FieldScan
@@ -64,13 +64,14 @@ def _format(name: str, estimate: Estimate) -> str:
     return with_uncertainty(QUANTITIES[name].show(estimate))
 
 
-def scans_as_text(means: Mapping[str, Estimate], runs: int, scatter: float) -> str:
+def scans_as_text(means: Mapping[str, Estimate], runs: int, scatter: float, taken: Collection[str]) -> str:
     """Return what several scans say together, in a few sentences.
 
     Args:
         means: over the scans.
         runs: number of scans.
         scatter: of their strengths [T m].
+        taken: see `about_top`.
     """
     strength = means["strength"]
     share = 100 * scatter / abs(strength.value or 1.0)
@@ -78,18 +79,18 @@ def scans_as_text(means: Mapping[str, Estimate], runs: int, scatter: float) -> s
         "{runs} scans: {strength:n} in the mean; one differs from another by {percent:n} %.",
         runs=runs, strength=_format("strength", strength), percent=digits(share),
     )  # fmt: skip
-    return Sentences(said, *_advice(means))
+    return Sentences(said, *_advice(means, taken))
 
 
-def scan_as_text(scan: FieldScan, floating: Floating | None) -> str:
-    """Return what a scan says, in a few sentences."""
+def scan_as_text(scan: FieldScan, floating: Floating | None, taken: Collection[str]) -> str:
+    """Return what a scan says, in a few sentences; taken: see `about_top`."""
     if not scan.is_of_a_ring:
         return "This scan does not show the field of a ring magnet: no masses and no spins follow from it."
     base = Text(
         "The base has the strength ρ = {strength:n}, its middle at {origin:n}; its field points {pole} above it.",
         _format("strength", scan.parameters["strength"]), _format("origin", scan.parameters["origin"]), _pole(scan),
     )  # fmt: skip
-    tops = _advice(floating.values) if floating else ("No top floats above this base.",)
+    tops = _advice(floating.values, taken) if floating else ("No top floats above this base.",)
     return Sentences(*tops, base, *_learned(scan))
 
 
@@ -119,7 +120,7 @@ def _learned(scan: FieldScan) -> Iterator[str]:
         )  # fmt: skip
 
 
-def _advice(values: Mapping[str, Estimate]) -> Iterator[str]:
+def _advice(values: Mapping[str, Estimate], taken: Collection[str]) -> Iterator[str]:
     """Yield the mass to set, and what to mind."""
     if "mass_to_set" not in values:
         return
@@ -128,7 +129,9 @@ def _advice(values: Mapping[str, Estimate]) -> Iterator[str]:
     mass = values["mass_to_set"].value or 0.0
     per_kelvin = 2 * FERRITE_PER_K * mass * 1e3
     yield Text(
-        "Tops float from {lowest_height:n} to {highest_height:n} if they weigh {lightest_mass:n} to {heaviest_mass:n}.",
+        "{tops} float from {lowest_height:n} to {highest_height:n} if they weigh {lightest_mass:n} to "
+        "{heaviest_mass:n}.",
+        tops="Tops with the moment of the thesis's" if "moment" in taken else "Tops",
         **shown,
     )
     yield Text(
@@ -151,6 +154,25 @@ def _advice(values: Mapping[str, Estimate]) -> Iterator[str]:
 
 
 # --- remarks -------------------------------------------------------------------------------------------
+
+#: What is not known of a top → what stands for it.
+_TAKEN: Mapping[tuple[str, ...], str] = {
+    ("inertias",): "the inertias of the top are not known, those of the thesis's top are taken: spins are of that top; "
+    "describe yours in a file, for the option `device`",
+    ("moment",): "the moment of the top is not known, that of the thesis's top is taken: masses and heights are of "
+    "that top; describe yours in a file, for the option `device`",
+    ("magnet",): "the top's magnet is taken for a point: one of 14 mm radius feels about 4 % more force at 73 mm, and "
+    "its lowest height lies 3 mm lower; give magnet_radius_m and magnet_height_m in the file of the option `device`",
+    ("inertias", "moment", "magnet"): "the top is not described: masses, heights and spins are of the thesis's, whose "
+    "magnet is taken for a point; one of 14 mm radius feels about 4 % more force at 73 mm, and its lowest height lies "
+    "3 mm lower; describe yours in a file, for the option `device`",
+}
+
+
+def about_top(taken: tuple[str, ...]) -> Iterator[str]:
+    """Yield what to know of numbers for which quantities of the thesis's top were taken."""
+    yield from [_TAKEN[taken]] if taken in _TAKEN else (_TAKEN[name,] for name in taken)
+
 
 #: SI unit → unit in messages, and their ratio.
 _SHOWN = {"m": ("mm", 1e3), "T": ("µT", 1e6)}

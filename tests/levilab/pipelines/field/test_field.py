@@ -20,6 +20,7 @@ from levilab.pipelines.options import FieldOptions
 from levilab.pipelines.result import save
 from levilab.pipelines.top import calculate_top
 from levilab.report.page import render
+from levilab.runs.find import RECORD
 from levilab.world.base import Base
 from support.figures import faults
 
@@ -112,6 +113,23 @@ def test_the_windows_of_spin_are_drawn_from_the_lightest_top_to_the_heaviest(sam
         masses, spins = (np.asarray(values, dtype=float) for values in (line.get_xdata(), line.get_ydata()))
         drawn = masses[np.isfinite(spins)]
         assert [drawn[0], drawn[-1]] == pytest.approx(ends, abs=1e-3)
+
+
+def test_of_a_top_that_is_not_described_the_result_says_whose_it_is(scan, sample_data, tmp_path):
+    """On a virtual bench the thesis's top floats: nothing is taken for another."""
+    virtual = FIELD.analyze([scan])
+    assert virtual.text.startswith("Tops float from")
+    assert not any("describe yours" in text for text in virtual.all_warnings)
+    record = json.loads((scan / RECORD).read_text(encoding="utf-8")) | {"synthetic": False}
+    (scan / RECORD).write_text(json.dumps(record), encoding="utf-8")
+    real = FIELD.analyze([scan])
+    assert real.text.startswith("Tops with the moment of the thesis's float from")
+    (said,) = [text for text in real.all_warnings if "describe yours" in text]
+    assert said.startswith("the top is not described: masses, heights and spins are of the thesis's")
+    save(FIELD.result_of(real, real.place), real.place, b"")
+    assert FIELD.recall([scan]).text == real.text
+    known = FIELD.analyze([scan], FieldOptions(device=read_device(sample_data / "device.toml")))
+    assert known.text.startswith("Tops float from")
 
 
 def test_no_masses_follow_from_a_field_that_no_ring_has(tmp_path):

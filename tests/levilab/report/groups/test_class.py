@@ -143,6 +143,8 @@ def test_other_experiments_have_their_truths_too(experiment, names, tmp_path):
     truth = {"strength": scene.base.strength_t_m, "mean": SpinScene().fall_hz}[names[0]]
     assert of.quantities[0].truths[0] == truth
     assert all(abs(one) < 3.5 for quantity in of.quantities for one in quantity.from_truth)
+    if experiment == "field":
+        assert [mark.word for mark in of.marks] == [GOOD, GOOD]
 
 
 def test_page_and_pdf_begin_with_the_result(of_three, tmp_path):
