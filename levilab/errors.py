@@ -93,7 +93,7 @@ class DoesNotSuit(DataError):
 
 
 class DoubtWarning(UserWarning):
-    """Numbers that are worthless where a doubt about them is right; see `doubts` of a result."""
+    """A doubt that makes numbers worthless where it is right, as `doubts` of a result; or a setting without effect."""
 
 
 class NoneUsable(DataError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import sys
 import tempfile
+import warnings
 from dataclasses import dataclass, fields
 from functools import partial
 from html import escape
@@ -14,7 +15,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from levilab.animation.request import AnimationRequest, animate, check_request
-from levilab.errors import UsageError
+from levilab.errors import DoubtWarning, UsageError
 from levilab.motion.simulation import COLUMNS, SimulationRequest, kept_rows, run_simulation, write_motion
 from levilab.motion.summary import Summary, as_document
 from levilab.motion.table import headline, print_motion
@@ -24,6 +25,7 @@ from levilab.notebook.quantity import Named
 from levilab.present.html import facts_as_html
 from levilab.present.terminal import as_text
 from levilab.report.export.contents import Contents, table_of
+from levilab.simulator.scene import remarks
 from levilab.simulator.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -263,7 +265,12 @@ def simulate_motion(
     out: str | PathLike[str] | None,
     animate: str | PathLike[str] | None,
 ) -> SimulatedMotion:
-    """Simulate a scene.  Raises UsageError, SimulationError, CannotWrite."""
+    """Simulate a scene; settings without effect are warnings of Python, too.
+
+    Raises UsageError, SimulationError, CannotWrite.
+    """
+    for text in remarks(scene):
+        warnings.warn(text, DoubtWarning, stacklevel=4)  # this, `simulate` and `bare` stand before the person's line
     if animate is not None:
         check_request(AnimationRequest(Path(animate)), scene, duration)
     request = SimulationRequest(scene, duration, tolerance, rate, None if out is None else Path(out))

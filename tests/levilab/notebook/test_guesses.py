@@ -394,6 +394,12 @@ def test_a_doubt_is_a_warning_at_the_line_that_asked_so_that_a_loop_notices_it(n
     assert [Path(one.filename).name for one in seen] == [Path(__file__).name]
 
 
+def test_a_setting_without_effect_is_a_warning_at_the_line_that_gave_it():
+    with pytest.warns(DoubtWarning, match=r"drive.frequency_hz = 29.0 does nothing: drive.waveform = off; ") as seen:
+        levilab.simulate("undriven", 0.1, settings={"drive.frequency_hz": 29})
+    assert [Path(one.filename).name for one in seen] == [Path(__file__).name]
+
+
 def test_a_curve_goes_on_beyond_the_readings_as_its_law_says(names):
     """The count's tilt bends its curve into a resonance that no top reaches, and lifts it before the first reading."""
     found = levilab.analyze((T, 30 * np.exp(-3e-3 * T) + np.random.default_rng(2).normal(0.0, 0.005, T.size)))
