@@ -11,6 +11,7 @@ from pydantic import Field, PositiveFloat
 
 from levilab.acquisition.counting import free_top, prepare_counter
 from levilab.acquisition.experiment import CounterSettings, Experiment, ModelOf
+from levilab.acquisition.experiments.spin import time_left
 from levilab.acquisition.session import Session
 from levilab.bench.config import BenchConfig, ConfigError
 from levilab.bench.person import FloatTop
@@ -59,7 +60,8 @@ def run(session: Session[SwaySettings]) -> None:
     for _ in session.readings_every(settings.interval_s, settings.longest_s):
         reading = top.read()
         if reading:
-            session.keep(reading, max(0.0, settings.longest_s - session.now()))
+            rows = session.rows or [reading]
+            session.keep(reading, time_left(rows[0], rows[len(rows) // 2], reading, settings.longest_s))
             frame = _film(session, frame, reading["time_s"])
         elif end := top.fall():
             session.event(RunEvent.FELL, end)

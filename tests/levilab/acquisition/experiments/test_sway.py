@@ -10,7 +10,7 @@ from levilab.bench.config import ConfigError
 from levilab.formats.table import read_run_readings
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.simulator.scene import preset
-from support.acquisitions import Impatient, acquired
+from support.acquisitions import Impatient, Silent, acquired
 
 
 def filmed(out, *settings, **more):
@@ -49,12 +49,18 @@ def test_an_interrupted_film_goes_on_without_a_gap(tmp_path):
     assert np.diff(track_of(whole)["time_s"]).max() < 1.5 / 120
 
 
-def test_a_film_ends_with_the_fall(tmp_path):
+def test_a_film_ends_with_the_fall_within_the_time_left_that_is_shown(tmp_path):
+    class Watching(Silent):
+        def reading(self, text, elapsed, remaining):
+            shown.append((elapsed + remaining[0], elapsed + remaining[1]))
+
+    shown = []
     scene = tmp_path / "slow.toml"
     start = {"start.spin_hz": 26.0}  # falls after 22 s
     scene.write_text(preset("spindown").changed(start).as_toml(), encoding="utf-8")
-    run = filmed(tmp_path, "sway.longest_s=60", seed=5, scene=str(scene))
-    assert any(event["kind"] == "fell" for event in run.events())
+    run = filmed(tmp_path, "sway.longest_s=60", seed=5, scene=str(scene), show=Watching())
+    (fell,) = [event["time_s"] for event in run.events() if event["kind"] == "fell"]
+    assert all(earliest < fell < latest for earliest, latest in shown)
     track = track_of(run)
     assert track["time_s"][-1] < run.readings().column("time_s")[-1] + 1 / 120
 
