@@ -12,6 +12,7 @@ from levilab.formats.kinds import Kind
 from levilab.formats.titles import (
     CANONICAL,
     COMPANIONS,
+    COMPONENTS,
     FOREIGN,
     LISTED,
     NAMES,
@@ -290,7 +291,10 @@ _SAY_THE_QUANTITY = ("time", "frequency", "length", "flux density")
 def _by_units(
     titles: Sequence[Title], known: Collection[str], taken: Collection[int], quantities: Collection[str]
 ) -> dict[str, list[int]]:
-    """Return the column that is a quantity by its unit: no other column has such a unit, and no other quantity."""
+    """Return the column that is a quantity by its unit: no other column has such a unit, and no other quantity.
+
+    A component alone is that of a Hall probe.
+    """
     kinds = Counter(dimension(name) for name in quantities if name in QUANTITIES)
     offered: dict[str, list[int]] = {}
     for name in (name for name in quantities if name in QUANTITIES and name not in known):
@@ -298,7 +302,9 @@ def _by_units(
         found = [
             k
             for k, title in enumerate(titles)
-            if title.column is None and k not in taken and unit_factor(title.unit or "", kind) is not None
+            if title.column in {None, *COMPONENTS}
+            and k not in taken
+            and unit_factor(title.unit or "", kind) is not None
         ]
         if len(found) == 1 and kinds[kind] == 1 and kind in _SAY_THE_QUANTITY:
             offered[name] = found

@@ -55,11 +55,9 @@ FOREIGN = ("°C", "C", "°F", "F", "K", "lx", "hPa", "Pa", "dB", "kg", "g", "A",
 _PER_SECOND = ("1/s", "/s")
 
 #: Names of a component of the magnetic field.
-_COMPONENTS = (
-    "flux_density_{}", "magnetic_field_{}", "magnetometer_{}", "mag_{}", "mag{}", "b_{}", "b{}",
-)  # fmt: skip
+_COMPONENTS = ("flux_density_{}", "magnetic_field_{}", "mag_{}", "mag{}", "b_{}", "b{}")
 #: The same in any language: magnetisches Feld x, champ magnétique y, densidad de flujo magnético z.
-_ALONG_AXIS = re.compile(r"(?=\w*magn)\w*(?:fi?eld|falt|ch?amp|flu|flo|indu)\w*_([xyz])")
+_ALONG_AXIS = re.compile(r"(?=\w*magn)\w*(?:fi?eld|falt|ch?amp|flu|flo|indu|met[er])\w*_([xyz])")
 
 # Canonical column: its dimension, and the names it goes by, in lower case, without accents, blanks and hyphens as "_".
 QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {

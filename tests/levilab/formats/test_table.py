@@ -745,11 +745,17 @@ def test_passes_over_many_files_work_out_each_dialect_once(tmp_path, monkeypatch
     assert len(dialect._DIALECTS_OF_ROWS) == min(most, 100)
 
 
+@pytest.mark.parametrize("title", ["Magnetfeld z", "magnetische Flussdichte z"])
+def test_a_component_alone_is_that_of_a_hall_probe(title, write):
+    table = read_table(write(f"z [mm],{title} [mT]\n1,2\n2,3\n3,4\n"), quantities=("height_m", "flux_density_t"))
+    assert table.column("flux_density_t").tolist() == pytest.approx([2e-3, 3e-3, 4e-3])
+
+
 @pytest.mark.parametrize(
     "title", [
         "Magnetic Field {} (µT)", "Magnetfeld {} in µT", "Magnetisches Feld {} (µT)", "Magnetische Flussdichte {} / µT",
         "Champ magnétique {} (µT)", "Campo magnético {} (µT)", "Magnetfält {} (µT)", "B{} [µT]", "b_{}/µT",
-        "mag{} (uT)",
+        "mag{} (uT)", "Magnetometer {} [µT]", "Magnétomètre {} (µT)",
     ]
 )  # fmt: skip
 def test_components_of_a_field_and_its_magnitude_are_read(title, write):
