@@ -177,29 +177,31 @@ class CountedLaw:
         gap_u = 2 * resonance_u / resonance * x / gap
         return value, np.array([tilt2_u * value[0], gap_u, CALM_U, top.kappa_u, top.beta_u, SHARE_U])
 
-    def shape(self, q: Array) -> tuple[float, float, float, float, float]:
-        """Return δ², ν_r/ν_ref, K/ν_ref, κ and β, from A, a, K/ν_ref beyond that of a release, κ, β and the share."""
-        top, a = self.top, min(max(float(q[1]), -5.0), 40.0)
-        s = float(q[0]) * float(np.exp(min(2 * a, 8.0)))
-        s = _bound(s, _LARGEST_DELTA2 if s > 0 else _LARGEST_DELTA2 / 10)
-        kappa, beta = (
-            value + _bound(float(moved) - value, _FARTHEST * u)
-            for moved, value, u in zip(q[3:5], (top.kappa, top.beta), (top.kappa_u, top.beta_u), strict=True)
-        )
-        resonance = self.last / float(np.sqrt(1 + np.exp(a)))
-        return s, resonance, float(q[2]) + float(q[5]) * s * self._nutation(resonance, kappa), kappa, beta
+    def shape(self, q: Array) -> Array:
+        """Return δ², ν_r/ν_ref, K/ν_ref, κ and β, shape (…, 5).
 
-    def _nutation(self, resonance: float, kappa: float) -> float:
+        q: A, a, K/ν_ref beyond that of a release, κ, β and the share, shape (…, 6).
+        """
+        top, (strength, a, more, kappa, beta, share) = self.top, np.moveaxis(q, -1, 0)
+        a = np.minimum(np.maximum(a, -5.0), 40.0)
+        s = strength * np.exp(np.minimum(2 * a, 8.0))
+        s = _bound(s, np.where(s > 0, _LARGEST_DELTA2, _LARGEST_DELTA2 / 10))
+        kappa = top.kappa + _bound(kappa - top.kappa, _FARTHEST * top.kappa_u)
+        beta = top.beta + _bound(beta - top.beta, _FARTHEST * top.beta_u)
+        resonance = self.last / np.sqrt(1 + np.exp(a))
+        return np.stack([s, resonance, more + share * s * self._nutation(resonance, kappa), kappa, beta], axis=-1)
+
+    def _nutation(self, resonance: Array, kappa: Array) -> Array:
         """Return K/ν_ref over δ² after the release; the top of the file derives it."""
-        sleeping, slowest = 2 * float(np.sqrt(kappa * (1 - kappa))) * resonance, _SLOWEST_START * resonance
-        first = max(self.first, slowest)
-        released = max(self.released or first, slowest)
-        w = float(np.sqrt(1 - (sleeping / released) ** 2))
+        sleeping, slowest = 2 * np.sqrt(kappa * (1 - kappa)) * resonance, _SLOWEST_START * resonance
+        first = np.maximum(self.first, slowest)
+        released = np.maximum(self.released or first, slowest)
+        w = np.sqrt(1 - (sleeping / released) ** 2)
         frequency = released * (1 + w) / (2 * (1 - kappa))
         alpha = (1 - 2 * kappa + w) / (2 * w) / ((released / resonance) ** 2 - 1)
-        phi = np.arccosh(np.array([released, first]) / sleeping)
-        grown = float(phi[1] - phi[0]) + self.lost / float(np.tanh(phi.mean()))
-        return frequency * alpha**2 / 2 * float(np.sqrt((released / sleeping) ** 2 - 1)) * float(np.exp(grown))
+        before, after = np.arccosh(released / sleeping), np.arccosh(first / sleeping)
+        grown = after - before + self.lost / np.tanh((before + after) / 2)
+        return np.asarray(frequency * alpha**2 / 2 * np.sqrt((released / sleeping) ** 2 - 1) * np.exp(grown))
 
     def spin(self, tau: Array, q: Array) -> Array:
         """Return the counted frequency, shape (n,)."""
@@ -216,7 +218,7 @@ class CountedLaw:
     def spins(self, tau: Array, rows: Array) -> Array:
         """Return the same for several q, shape (r, p) → (r, n)."""
         p = len(self.law.parameters)
-        shapes = np.array([self.shape(q[p:]) for q in rows])
+        shapes = self.shape(rows[:, p:])
         with np.errstate(all="ignore"):
             if len(tau) <= _MOST_POINTS:
                 return counts(self.law, tau, rows[:, :p], shapes)
@@ -233,7 +235,7 @@ class CountedLaw:
         """
         n = len(self.law.parameters)
         values, slopes = self.law.natural(q[:n], reference_hz, duration)
-        s, resonance, wobble, *_ = self.shape(q[n:])
+        s, resonance, wobble, *_ = self.shape(q[n:]).tolist()
         delta = float(np.sqrt(max(s, 0.0)))
         growth = float(np.exp(min(2 * float(q[n + 1]), 8.0)))
         share = float(1 / (1 + np.exp(-min(float(q[n + 1]), 40.0)))) / 2
@@ -244,10 +246,8 @@ class CountedLaw:
         full[n, n + 1] = delta
         full[n + 1, n + 1] = -share * resonance * reference_hz
         steps = np.diag(_STEPS)
-        full[n + 2, n:] = [
-            reference_hz * (self.shape(q[n:] + step)[2] - self.shape(q[n:] - step)[2]) / (2 * size)
-            for step, size in zip(steps, _STEPS, strict=True)
-        ]
+        moved = self.shape(q[n:] + steps) - self.shape(q[n:] - steps)
+        full[n + 2, n:] = reference_hz * moved[:, 2] / (2 * np.asarray(_STEPS))
         return np.array([*values, delta, resonance * reference_hz, wobble * reference_hz]), full
 
     def solution(self, q: Array) -> Array:
@@ -257,12 +257,12 @@ class CountedLaw:
 
     def moved_top(self, q: Array) -> Top:
         """Return the top with κ and β as the readings move them."""
-        kappa, beta = self.shape(q[len(self.law.parameters) :])[MORE:]
+        kappa, beta = self.shape(q[len(self.law.parameters) :])[MORE:].tolist()
         return replace(self.top, kappa=kappa, beta=beta)
 
 
-def _bound(value: float, most: float) -> float:
-    return most * float(np.tanh(value / most))
+def _bound(value: Array, most: Array | float) -> Array:
+    return np.asarray(most * np.tanh(value / most))
 
 
 def count_of(law: DragLaw, tau: Array, solution: Array, top: Top = THESIS_TOP) -> Array:
