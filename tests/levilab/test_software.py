@@ -34,7 +34,8 @@ import sys
 absent = "numba", "llvmlite", "zarr", "numcodecs", "xarray", "nicegui", "typst", "pyarrow", "h5py"
 sys.modules |= dict.fromkeys(absent)
 from levilab.cli.main import main
-for words in ("acquire spin --mock", "report runs --no-crosscheck", "simulate undriven", "acquire precession --mock"):
+quick = "acquire spin --mock --set hold_s=0 --set drive_frequency_hz=31"
+for words in (quick, "report runs --no-crosscheck", "simulate undriven", "acquire precession --mock"):
     sys.argv = ["levilab", *words.split()]
     try:
         main()

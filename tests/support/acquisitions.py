@@ -1,5 +1,6 @@
 """Acquisitions on the virtual bench, as tests make them."""
 
+import shutil
 import signal
 from dataclasses import replace
 
@@ -82,6 +83,16 @@ def asked(experiment, **options):
 def acquired(experiment, show=None, **options):
     """The run of an experiment on the virtual bench."""
     return acquire(asked(experiment, **options), show or Silent())
+
+
+def cut(run, into, readings):
+    """The folder of a copy of this run, interrupted after a number of readings."""
+    shutil.copytree(run.folder, into)
+    record = run.record.model_copy(update={"status": "interrupted"})
+    (into / "run.json").write_text(record.as_json(), encoding="utf-8")
+    rows = (into / "readings.csv").read_text(encoding="utf-8").splitlines(keepends=True)
+    (into / "readings.csv").write_text("".join(rows[: 1 + readings]), encoding="utf-8")
+    return into
 
 
 def kinds(run):

@@ -57,7 +57,7 @@ def test_errors_of_frequencies_are_as_large_as_u_says(fresh, correlation):
 
 
 def test_times_may_be_uneven(fresh):
-    times = np.cumsum(fresh.choice([1 / 300, 1 / 200], size=4800))
+    times = np.cumsum(fresh.choice([1 / 75, 1 / 50], size=1200))
     found = swings_of(times, swing(times, (-0.59, 0.77)))[0]
     assert found.frequency == pytest.approx([-0.59, 0.77, 6.0], abs=1e-6)
 
@@ -111,9 +111,9 @@ def test_the_vertical_swing_has_its_uncertainty(fresh, seen, strength):
 
 
 def test_heights_that_are_all_alike_say_nothing(fresh):
-    times = np.arange(2400) / 120
-    places = swing(times, (-0.59, 0.77)) + 1e-4 * (fresh.normal(size=2400) + 1j * fresh.normal(size=2400))
-    (without,), (alike,) = swings_of(times, places), swings_of(times, places, np.zeros(2400))
+    times = np.arange(1000) / 50
+    places = swing(times, (-0.59, 0.77)) + 1e-4 * (fresh.normal(size=1000) + 1j * fresh.normal(size=1000))
+    (without,), (alike,) = swings_of(times, places), swings_of(times, places, np.zeros(1000))
     assert alike.frequency == pytest.approx(without.frequency, abs=1e-6)  # 1 % of u
     assert alike.vertical == pytest.approx(without.vertical, rel=0.05)  # the grid of its prior is cut at 4 u
 
@@ -141,12 +141,12 @@ def test_the_image_of_a_line_hides_no_swing(fresh):
 
 
 def test_a_mirrored_view_is_known_by_the_precession(fresh):
-    times = np.arange(2400) / 120
-    places = swing(times, (-0.59, 0.77)) + 1e-4 * (fresh.normal(size=2400) + 1j * fresh.normal(size=2400))
+    times = np.arange(1000) / 50
+    places = swing(times, (-0.59, 0.77)) + 1e-4 * (fresh.normal(size=1000) + 1j * fresh.normal(size=1000))
     assert mirrored(swings_of(times, places)) is False
     assert mirrored(swings_of(times, places.conj())) is True
     slow = swing(times, (-0.59, 0.77), precession=20.0)  # too fast to be one
-    assert mirrored(swings_of(times, slow + 1e-4 * fresh.normal(size=2400))) is None
+    assert mirrored(swings_of(times, slow + 1e-4 * fresh.normal(size=1000))) is None
 
 
 def test_what_has_no_swings_is_refused(fresh):

@@ -3,7 +3,6 @@
 import dataclasses
 import itertools
 import json
-import shutil
 import signal
 from datetime import UTC, datetime, timedelta
 from types import SimpleNamespace
@@ -35,7 +34,7 @@ from levilab.simulator.laws import LAWS
 from levilab.simulator.spin import DECAYS
 from levilab.world.bench import VIRTUAL, virtual_bus
 from levilab.world.spin_world import Phase, SpinScene, SpinWorld, random_scene
-from support.acquisitions import BEFORE, Impatient, Meanwhile, Silent, acquired, asked, events, in_world, mock, of_scene
+from support.acquisitions import BEFORE, Impatient, Meanwhile, Silent, asked, cut, events, in_world, mock, of_scene
 
 
 def watch_outputs(patch):
@@ -71,11 +70,6 @@ def whole(tmp_path_factory):
 @pytest.fixture
 def usual(whole):
     return whole.run
-
-
-@pytest.fixture(scope="module")
-def in_full_motion(tmp_path_factory):
-    return acquire(mock(tmp_path_factory.mktemp("motion"), 5, scene="spindown"), Silent())
 
 
 def test_a_spin_down_is_read_every_ten_seconds_until_the_top_falls(whole):
@@ -183,7 +177,7 @@ def test_a_top_that_keeps_its_spin_is_noticed_once_while_it_is_read(tmp_path, us
 
 def test_a_scene_without_drag_is_named_as_the_reason(tmp_path):
     settings = ("hold_s=0", "drive_frequency_hz=31", "longest_s=80")
-    run = acquired("spin", out=tmp_path, seed=1, scene="driven", settings=settings)
+    run = acquire(asked("spin", out=tmp_path, seed=1, scene="driven", settings=settings), Silent())
     (seen,) = events(run, "does not fall")
     assert "the scene has no drag (drag.law); take one with drag" in seen["text"]
 
@@ -423,9 +417,7 @@ def test_what_a_resumed_virtual_run_goes_through_again_is_not_shown(tmp_path):
 
     half, first = acquire(mock(tmp_path, 3), show := Bar()), Bar()
     assert any("drive at" in text for text in show.messages)
-    record = half.record.model_copy(update={"status": "interrupted"})
-    (half.folder / "run.json").write_text(record.as_json(), encoding="utf-8")
-    acquire(mock(tmp_path, None, resume=half.folder), first)
+    acquire(mock(tmp_path, None, resume=cut(half, tmp_path / "half", half.count())), first)
     assert not any("drive" in text for text in first.messages)
 
 
@@ -472,8 +464,8 @@ def test_a_real_run_is_gone_on_with_by_the_time_on_the_wall(tmp_path):
 # --- a top in full motion ---
 
 
-def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion):
-    run = in_full_motion
+def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(tmp_path):
+    run = acquire(mock(tmp_path, 5, scene="spindown"), Silent())
     assert [event["kind"] for event in run.events()][-4:] == ["locked", "drive off", "asked again", "fell"]
     spins = run.readings().frame["spin_frequency_hz"]
     assert spins.iloc[0] == pytest.approx(40, abs=0.6)  # it swings about the drive
@@ -489,17 +481,13 @@ def test_a_spin_down_in_full_motion_has_the_drag_of_its_scene(in_full_motion):
     assert disc.value == pytest.approx(2.34e-4, rel=0.009)
 
 
-def test_a_run_in_full_motion_is_repeated_by_its_seed_and_resumed_in_its_scene(in_full_motion, tmp_path):
-    whole = in_full_motion.readings().frame
-    half, record = tmp_path / "half", in_full_motion.record.model_copy(update={"status": "interrupted"})
-    shutil.copytree(in_full_motion.folder, half)
-    (half / "run.json").write_text(record.as_json(), encoding="utf-8")
-    rows = (half / "readings.csv").read_text(encoding="utf-8").splitlines(keepends=True)
-    (half / "readings.csv").write_text("".join(rows[:4]), encoding="utf-8")
-    run = acquire(mock(tmp_path, None, resume=half), Impatient(3))
+def test_a_run_in_full_motion_is_repeated_by_its_seed_and_resumed_in_its_scene(tmp_path):
+    settings = ("spin.hold_s=0", "spin.drive_frequency_hz=31", "spin.interval_s=2")
+    first = acquire(asked("spin", out=tmp_path, seed=5, scene="spindown", settings=settings), Impatient(6))
+    run = acquire(mock(tmp_path, None, resume=cut(first, tmp_path / "half", 3)), Impatient(3))
     spins = run.readings().frame["spin_frequency_hz"]
     assert len(spins) == 6
-    assert np.allclose(spins, whole["spin_frequency_hz"][:6], rtol=0, atol=0.02)
+    assert np.allclose(spins, first.readings().frame["spin_frequency_hz"], rtol=0, atol=0.02)
     assert run.record.configuration["scene"]["name"] == "spindown"
 
 

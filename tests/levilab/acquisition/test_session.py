@@ -1,7 +1,6 @@
 """What a session offers to every experiment, shown by one that is no spin-down: a scan with a person at the bench."""
 
 import dataclasses
-import shutil
 import signal
 from pathlib import Path
 from types import SimpleNamespace
@@ -26,7 +25,7 @@ from levilab.runs.run import Run
 from levilab.world.base import Base
 from levilab.world.bench import virtual_wiring
 from levilab.world.spin_world import SpinScene, SpinWorld
-from support.acquisitions import Silent, acquired
+from support.acquisitions import Silent, acquired, cut
 
 
 class ScanSettings(ExperimentSettings):
@@ -238,12 +237,10 @@ def test_readings_come_at_whole_multiples_of_the_interval(longest, second_takes,
 
 
 def test_a_run_whose_time_zero_is_not_known_is_not_called_empty(sample_data, tmp_path):
-    folder = shutil.copytree(sample_data / "spin-down-1", tmp_path / "run")
-    record = Run.load(folder).record
-    assert record.time_zero_utc is None
-    (folder / "run.json").write_text(record.model_copy(update={"status": "interrupted"}).as_json(), encoding="utf-8")
+    run = Run.load(sample_data / "spin-down-1")
+    assert run.record.time_zero_utc is None
     with pytest.raises(CannotResume, match=r"has no time_zero_utc.* they are kept and can be analyzed"):
-        request_for("spin", AcquisitionOptions(resume=folder))
+        request_for("spin", AcquisitionOptions(resume=cut(run, tmp_path / "run", run.count())))
 
 
 def test_a_run_that_is_not_there_is_looked_for_in_words(tmp_path):

@@ -16,7 +16,7 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.runs.run import Run
 from levilab.world.bench import PickupCoil
 from levilab.world.spin_world import SpinScene, SpinWorld
-from support.acquisitions import LET_GO_AT_ONCE, RAISED_QUICKLY, Impatient, Silent, acquired, asked
+from support.acquisitions import LET_GO_AT_ONCE, RAISED_QUICKLY, Impatient, Silent, acquired, asked, cut
 from support.wire import ask
 
 ADDRESS = "sound://oscilloscope.levilab"
@@ -68,9 +68,9 @@ def test_the_clock_of_the_sound_card_is_a_line_of_the_budget(spin_run, tmp_path)
     assert "levilab bench clock" in rows["time_base"].remedy
 
 
-def test_a_resumed_run_goes_on_with_the_sound_card(tmp_path):
-    begun = acquire(request("spin", tmp_path, *RAISED_QUICKLY), Impatient(3))
-    resumed = acquire(request_for("spin", AcquisitionOptions(resume=begun.folder, out=tmp_path)), Impatient(2))
+def test_a_resumed_run_goes_on_with_the_sound_card(spin_run, tmp_path):
+    begun = cut(spin_run, tmp_path / "begun", 3)
+    resumed = acquire(request_for("spin", AcquisitionOptions(resume=begun, out=tmp_path)), Impatient(2))
     assert resumed.count() == 5
     assert resumed.record.configuration["named"] == {"oscilloscope": "sound"}
     assert np.isfinite(resumed.readings().column("spin_frequency_u_hz")).all()
@@ -94,7 +94,7 @@ def test_an_input_that_is_unplugged_for_a_while_costs_readings_and_no_more(tmp_p
     assert "found again" in kinds
 
 
-@pytest.mark.parametrize(("change", "error"), [({"unplugged_at": 100.0}, NotConnected), ({"muted": True}, SilentInput)])
+@pytest.mark.parametrize(("change", "error"), [({"unplugged_at": 40.0}, NotConnected), ({"muted": True}, SilentInput)])
 def test_an_input_that_stays_away_ends_the_run_with_the_drive_off(tmp_path, change, error):
     seen = []
 

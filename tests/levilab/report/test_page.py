@@ -278,7 +278,7 @@ def test_many_readings_are_cut_in_the_page_and_the_figure_stays_small(tmp_path):
     nu = 40 * (1 + 2.34e-4 * np.sqrt(2 * np.pi * 40) * t / 2) ** -2 + np.random.default_rng(0).normal(0, 0.03, t.size)
     path = tmp_path / "long.csv"
     np.savetxt(path, np.c_[t, nu], delimiter=",", header="time_s,spin_frequency_hz", comments="")
-    html = render(SPINDOWN.analyze([path], SpinDownOptions(reading_u=0.03)))
+    html = render(SPINDOWN.analyze([path], SpinDownOptions(reading_u=0.03, tilt="none")))
     assert "The first 200 of 4000" in Page(html).text
     assert len(html) < 3e6
 

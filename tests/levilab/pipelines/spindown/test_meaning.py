@@ -83,7 +83,7 @@ def test_the_report_begins_with_the_constant_and_its_u(tmp_path):
 
 
 def result_of(analysis):
-    section = blocks_of_part(ANALYSES["spindown"], analysis, spindown_part(analysis), Asked())[0]
+    section = blocks_of_part(ANALYSES["spindown"], analysis, spindown_part(analysis), Asked(crosscheck=False))[0]
     return section.blocks
 
 
