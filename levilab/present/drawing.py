@@ -58,11 +58,22 @@ def headline(figure: Figure, text: str, synthetic: str = "") -> None:
     text, synthetic = in_language(text), in_language(synthetic)
     width = figure.get_size_inches()[0] - 0.1
     room = width - 0.4 - (len(synthetic) + 1) * 0.075 if synthetic else width - 0.1
-    lines = textwrap.wrap(text, int(room / _LETTER), max_lines=2, placeholder=" …")
+    lines = _in_two_lines(text, int(room / _LETTER))
     write(figure, 0.08, 0.08, "\n".join(lines), fontsize=9, fontweight="bold", linespacing=1.25)
     if synthetic:
         mark = {"boxstyle": "square,pad=0.25", "facecolor": "white", "edgecolor": "black", "linewidth": 0.8}
         write(figure, width, 0.09, synthetic, fontsize=SMALL, ha="right", bbox=mark)
+
+
+def _in_two_lines(text: str, most: int) -> list[str]:
+    """Return a text in one line of so many letters, or in two that are about as long as each other.
+
+    >>> _in_two_lines("Spin-down: the mixed law is the best; Newton is excluded", 50)
+    ['Spin-down: the mixed law is', 'the best; Newton is excluded']
+    """
+    widths = range(len(text) // 2, most) if len(text) > most else ()
+    halves = (textwrap.wrap(text, width) for width in widths)
+    return next((two for two in halves if len(two) == 2), textwrap.wrap(text, most, max_lines=2, placeholder=" …"))
 
 
 def synthetic_mark(made_up: Sequence[bool]) -> str:

@@ -134,9 +134,12 @@ def change_what_if(page):
     assert page.locator("#quantities input").count() == len(WHAT_IF)
     page.evaluate(f"{slider}.value = 0.22, {slider}.dispatchEvent(new Event('input'))")
     until(page, "levilab.data.bench.what_if.washers_g === 0.22")
+    tab = "getComputedStyle(document.querySelector('[aria-controls=what-if]'), '::after').content"
+    assert page.evaluate(tab) == '" •"'  # seen from the other tabs, too
     ask_which_washers(page)
     page.click("#usual")
     until(page, f"levilab.data.bench.what_if.washers_g === 0.2 && {slider}.value === '0.2'")
+    assert page.evaluate(tab) == "none"
     page.get_by_role("tab", name="Measure").press("ArrowLeft")  # the last one
     page.get_by_role("button", name="Count the stem").click()
     until(page, "document.getElementById('guide').hidden && !levilab.data.bench.drive.output")  # each begins without it
