@@ -25,15 +25,14 @@ from analysis.sway.orbit import NoSwing, pumps, slow_swings, small_swings
 from analysis.sway.vertical import vertical_swing
 from analysis.uncertainty import Estimate, partly_believed, propagate
 
-#: The shift at finite amplitude is known to this part of it.
-SHIFT_U = 0.035
-#: The next order of the shift: part of it that it is uncertain by, over the square of the sum of amplitudes² [1/m⁴].
-NEXT_SHIFT_U = 5e10
-#: Where the beat of the slow swings comes near the vertical swing, they exchange energy with it, and the shift's next
-#: orders count: relative standard uncertainty of the split, times A⁴ over the fourth power of the difference [Hz⁴/m⁴],
-#: as full motions of 120 tops have it without the shift by the vertical swing, so that u of films is up to 1.4 times
-#: too large: a smaller one makes the choice between lines too sure.  Differences below NEAREST_HZ count as that.
-RESONANCE_U, NEAREST_HZ = 1.8e7, 0.04
+#: The shift of the split at finite amplitude is known to this part of it; by its next order to this part of the shifts
+#: of both swings, times the square of the sum of amplitudes² [1/m⁴]; and, as the swings exchange energy with the
+#: vertical one, by this standard uncertainty of the difference between their beat and it [Hz].  The likeliest by the
+#: errors of Ω_g in films of 186 tops in full motion (`levilab crosscheck sway --seed 100000`): 0.050, 8.4e9, 0.0077.
+SHIFT_U, NEXT_SHIFT_U, APART_U_HZ = 0.05, 8.4e9, 0.0077
+#: The choice between lines takes no shift from a split: its relative standard uncertainty, times A⁴ over the fourth
+#: power of that difference [Hz⁴/m⁴], as full motions of 120 tops have it; differences below NEAREST_HZ count as that.
+CHOICE_U, NEAREST_HZ = 1.8e7, 0.04
 #: Tilt and height change within a window: relative standard uncertainty of Ω_g in a motion of small swings.
 MOTION_U = 6.5e-4
 #: The part by which the precession makes Ω_g smaller is known to this part of it: a mark beside the centre of mass
@@ -53,8 +52,6 @@ _VERTICAL_SHIFT_U = 2.4e9
 _FAR, _POINTS = 4.0, 17
 #: The spin at which Ω_g is given [Hz].
 REFERENCE_HZ = 30.0
-#: The usual split over the beat: what the vertical swing does to it is no smaller where the lines have less.
-_USUAL = 0.13
 #: Step of the slopes by the ring's sizes, in their standard uncertainties.
 _STEP = 0.1
 #: Without a split the factor is that of this Ω_g/ω₃, a hundredth of the usual one.
@@ -130,13 +127,12 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
     mistaken = np.array([one.mistake for one in swings])
     heights = np.array([known.height(one, nu) for one, nu in each])
     placed = [(one, nu, z) for (one, nu), z in zip(each, heights.tolist(), strict=True)]
-    shifts = np.array([_shift(*one, known) for one in placed])
+    around = np.array([_shift(*one, known) for one in placed])
+    shifts, steps = around[:, 0], around[:, 1::2].sum(axis=2) - around[:, 2::2].sum(axis=2)
     small = np.array([one.frequency[:2] for one in swings]) - shifts
     seen, shift = small.sum(axis=1), np.abs(shifts.sum(axis=1))
-    resonance = np.array([_doubt(one) for one in swings])
-    resonance *= np.maximum(np.abs(seen), [_USUAL * (one.frequency[1] - one.frequency[0]) for one in swings])
-    size_u = np.array([2 * one.size_u for one in swings])  # the shift goes with the square
-    shift_u = shift * np.hypot(np.hypot(SHIFT_U, size_u), NEXT_SHIFT_U * np.array([one.size for one in swings]) ** 2)
+    further = NEXT_SHIFT_U * np.array([one.size for one in swings]) ** 2 * np.abs(shifts).sum(axis=1)
+    shift_u = np.linalg.norm([SHIFT_U * shift, further, *steps.T / 2], axis=0)
     leans = np.array([_lean(*one, known) for one in placed])
     value, half = REFERENCE_HZ * float(np.mean(seen / spin)), np.empty(0)
     for _ in range(_ROUNDS):  # Ω_g is the split but for some percent, which hardly depend on it
@@ -145,10 +141,11 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
         factor = (1 + leans) * size * REFERENCE_HZ / expected
         shares = factor * seen
         u_shares = np.abs(factor) * np.array([one.u_split for one in swings])
-        doubt, mistake = np.abs(factor) * (resonance + shift_u), np.abs(factor) * mistaken
+        doubt, mistake = np.abs(factor) * shift_u, np.abs(factor) * mistaken
         total = np.sqrt(u_shares**2 + doubt**2 + mistake**2)
         value, u_lines, chi_square = _mean(shares, total, u_shares)
-    lean, lean_u = float(np.mean(leans)), math.hypot(LEAN_U, float(size_u.mean()))
+    # the lean goes with the square of a size
+    lean, lean_u = float(np.mean(leans)), math.hypot(LEAN_U, 2 * float(np.mean([one.size_u for one in swings])))
     parts = {
         "lines": u_lines,
         "amplitude": float(np.average(doubt, weights=1 / total**2)),
@@ -158,7 +155,7 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
     }
     u = math.hypot(*parts.values())
     far = np.array([PRECESSION_SHIFT_U * float(np.sum(one.amplitude[:2] ** 2)) for one in swings])
-    less = Corrections(shifts, leans, lean_u, far, np.hypot(resonance + shift_u, mistaken), MOTION_U)
+    less = Corrections(shifts, leans, lean_u, far, np.hypot(shift_u, mistaken), MOTION_U)
     measured = Estimate(value, u, "Hz")
     of_base, predicted, parts_predicted = _predict(each, heights, known)
     share = (predicted.value or 0.0) / REFERENCE_HZ
@@ -249,18 +246,13 @@ def _judge(swings: Swings, spin: float, known: Known, part: float) -> tuple[floa
     u = math.hypot(_VERTICAL_U_HZ, _VERTICAL_SHIFT_U * swings.size**2 / max(_away(swings), NEAREST_HZ))
     unlikely = swings.misfit + part * ((off / u) ** 2 + 2 * math.log(u) + swings.weakness)
     share = size * swings.split / _split(size, spin, swings.frequency[:2], known)[0]
-    return unlikely, share, math.hypot(_BENT, _doubt(swings))
+    size = swings.size * math.exp(8 * swings.size_u**2)  # the root mean square of A⁴ goes into u
+    return unlikely, share, math.hypot(_BENT, min(CHOICE_U * size**2 / max(_away(swings), NEAREST_HZ) ** 4, 1.0))
 
 
 def _away(swings: Swings) -> float:
     """Return how far the beat of the slow swings is from the vertical swing [Hz]."""
     return abs(float(swings.frequency[1] - swings.frequency[0]) - swings.vertical.value)
-
-
-def _doubt(swings: Swings) -> float:
-    """Return the relative standard uncertainty of a split from the energy that the swings exchange."""
-    size = swings.size * math.exp(8 * swings.size_u**2)  # the root mean square of A⁴ goes into u
-    return min(RESONANCE_U * size**2 / max(_away(swings), NEAREST_HZ) ** 4, 1.0)
 
 
 def _split(share: float, spin: float, small: Array, known: Known) -> tuple[float, float]:
@@ -289,6 +281,7 @@ def _shift(swings: Swings, spin: float, height: float, known: Known) -> Array:
 
     Each swing and the line beside it, at the other swing ± the vertical one, push each other apart.  In the steady
     motion there is no such line: that part of its shift is replaced by the one that belongs to the distance as seen.
+    The rows, shape (5, 2), after the first are those with this distance, then with the amplitudes, one u less and more.
     """
     top = replace(known.top_at(height), stiffnesses=None)
     amplitudes = float(swings.amplitude[0]), float(swings.amplitude[1])
@@ -297,9 +290,11 @@ def _shift(swings: Swings, spin: float, height: float, known: Known) -> Array:
     pump, own = pumps(known.field, top, height, spin, amplitudes), vertical_mode(known.field, top, height)
     steady = pump / ((moving[1] - moving[0]) ** 2 - own**2)
     beat, vertical = float(swings.frequency[1] - swings.frequency[0]), swings.vertical.value
-    apart = beat - vertical
-    before = np.sqrt(np.maximum(apart**2 - 4 * pump / (beat + vertical), 0.0))
-    return np.asarray(moving - still + np.array([-1.0, 1.0]) * (np.sign(apart) * (abs(apart) - before) / 2 - steady))
+    apart = beat - vertical + math.hypot(APART_U_HZ, swings.vertical.u) * np.array([[0], [-1], [1], [0], [0]])
+    squares = np.exp(2 * swings.size_u * np.array([[0], [0], [0], [-1], [1]]))
+    before = np.sqrt(np.maximum(apart**2 - 4 * squares * pump / (beat + vertical), 0.0))
+    sense = np.array([-1.0, 1.0])
+    return np.asarray(squares * (moving - still - sense * steady) + sense * np.sign(apart) * (abs(apart) - before) / 2)
 
 
 def _lean(swings: Swings, spin: float, height: float, known: Known) -> float:

@@ -341,19 +341,28 @@ def test_the_shift_by_the_size_of_the_swings_is_in_u_by_its_part():
     found = geometric_magnetism(swings, np.array([30.0]), known(0.02526))
     (shift,) = np.abs(found.shifts.sum(axis=1))
     assert shift > 5e-4
-    part = np.hypot(0.035, 0.05 * 2**2)  # of both swings' squares in mm²
-    assert found.parts["amplitude"] == pytest.approx(part * shift, rel=0.1)  # Ω_g is the split but for some percent
+    further = 0.0084 * 2**2 * np.abs(found.shifts).sum()  # of both swings' squares in mm²
+    assert found.parts["amplitude"] == pytest.approx(
+        np.hypot(0.05 * shift, further), rel=0.1
+    )  # Ω_g is the split but for some percent
     assert found.parts["lines"] == pytest.approx(found.u_shares[0])  # it is not in the part of the lines, too
 
 
-def test_a_size_that_is_uncertain_counts_by_its_fourth_power_where_beat_and_vertical_swing_meet(fresh):
-    one = replace(lines((-0.59, 0.77)), amplitude=np.full(2, 5e-4), vertical=Vertical(1.46, 1e-3))
-    exact, uncertain = (
-        geometric_magnetism([replace(one, size_u=u)], np.array([30.0]), known(0.02526)).parts["amplitude"]
-        for u in (0.0, 0.2)
-    )
-    sizes = np.exp(0.2 * fresh.normal(size=100_000))
-    assert uncertain / exact == pytest.approx(np.sqrt(np.mean(sizes**8)), rel=0.1)  # the shift's own u is a tenth of it
+@pytest.mark.parametrize("size_u", [0.0, 0.1])
+def test_a_shift_near_the_vertical_swing_has_the_u_by_which_distance_and_size_move_it(size_u):
+    def found(distance=0.0, size=1.0):
+        sizes, vertical = np.array([3e-4, 6e-4]) * size, Vertical(1.6 + distance, 0.0)
+        one = replace(lines((-0.59, 0.77)), amplitude=sizes, vertical=vertical, size_u=size_u)
+        return geometric_magnetism([one], np.array([30.0]), known(0.02526))
+
+    def half(low, high):
+        return (high.measured.value - low.measured.value) / 2
+
+    (shift,) = np.abs(found().shifts.sum(axis=1))
+    near, large = half(found(-7.7e-3), found(7.7e-3)), half(found(size=np.exp(-size_u)), found(size=np.exp(size_u)))
+    own = [0.05 * shift, 0.0084 * 0.45**2 * np.abs(found().shifts).sum()]
+    assert found().parts["amplitude"] == pytest.approx(np.linalg.norm([*own, near, large]), rel=0.1)
+    assert abs(near) > 0.4 * np.linalg.norm(own)
 
 
 @pytest.mark.slow
