@@ -22,8 +22,8 @@ def main() -> None:
         with Image.open(Path(out) / "spindown.png") as figure:
             height = round(figure.height * 900 / figure.width)
             small = figure.convert("RGB").resize((900, height), Image.Resampling.LANCZOS)
-            small = small.crop((0, 0, 900, round(0.72 * height)))  # without the straight lines
-            small.quantize(64).save(Path(__file__).with_suffix(".png"), optimize=True)
+            small = small.crop((0, 0, 900, round(0.737 * height)))  # without the straight lines
+            small.quantize(256).save(Path(__file__).with_suffix(".png"), optimize=True)
 
 
 if __name__ == "__main__":
