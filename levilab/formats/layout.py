@@ -36,6 +36,8 @@ ALIGNED = Dialect("\t", ".")  # of a text that was written from cells
 CONTROL = re.compile("[\x00-\x08\x0e-\x19]")  # DOS may end a text with 0x1a
 #: Part of the lines of a text that a starting micro-controller or a loose plug may have filled with other bytes.
 _MOST_NOISE = 0.2
+#: Whole numbers of a column that seldom increase all by chance: such are times.
+_FEWEST_TIMES = 5
 EXPORT = "a table of text is expected: export it as CSV"
 
 
@@ -43,11 +45,11 @@ EXPORT = "a table of text is expected: export it as CSV"
 class Layout:
     """How one file's table is written.
 
-    `header`, in line `header_line`, is empty if the file has none; `header_line` is then that of titles above the rows
-    with another separator, or 0. Rows may begin in line `first_line`, which lies `start` bytes into the file;
-    lines count from 1. `width` is the number of fields a row must have. `above` are the fields of the line above the
-    header; `aligned` is that of the text; `sample` are the fields of the first rows. Where no title has a unit, `units`
-    are those behind the first numbers, and s for clocks.
+    `header`, in line `header_line`, is empty if the file has none; `header_line` is then that of a text above the rows
+    that may be titles and does not fit them, or 0. Rows may begin in line `first_line`, which lies `start` bytes into
+    the file; lines count from 1. `width` is the number of fields a row must have. `above` are the fields of the line
+    above the header; `aligned` is that of the text; `sample` are the fields of the first rows. Where no title has a
+    unit, `units` are those behind the first numbers, and s for clocks.
     """
 
     encoding: str
@@ -233,6 +235,8 @@ def lay_out(lines: list[str], encoding: str, dialect: Dialect, head: bytes) -> L
     if place is None:
         header, header_line = _header_in_comment(lines[: first_line - 1], dialect, width)
         header_line = header_line or _other_titles(lines[: first_line - 1], width)
+        if above and not header_line and _may_be_one_column(rows, dialect, width):
+            header_line = above[-1].number
     else:
         header, header_line = above[place].fields, above[place].number
         below = [*above[place + 1 :], *content_lines(lines[first_line - 1 : first_line], dialect, first_line)]
@@ -298,10 +302,19 @@ def _spread(header: tuple[str, ...], below: Sequence[Line]) -> tuple[tuple[str, 
     return tuple(wide), names
 
 
+def _may_be_one_column(rows: Sequence[Line], dialect: Dialect, width: int) -> bool:
+    """Return whether two columns, as 21,7, may be one with decimal commas: no points, and no times in the first."""
+    if width != 2 or dialect.separator != "," or any("." in "".join(row.fields) for row in rows):
+        return False
+    first = [dialect.value(row.fields[0]) for row in rows if row.kinds[0] == "number"]
+    return len(first) < _FEWEST_TIMES or not all(before < after for before, after in pairwise(first))
+
+
 def _other_titles(above: list[str], width: int) -> int:
-    """Return the line of known titles with another separator than the rows below have, 0 where there is none."""
-    fields = [(n, dialect.split(line)) for n, line in enumerate(above, 1) for dialect in DIALECTS]
-    return next((n for n, titles in fields if len(titles) == width and known_titles(titles) > 1), 0)
+    """Return the line of known titles, in any dialect, that do not fit the rows below; 0 without such a line."""
+    fields = [(n, dialect.split(line)) for n, line in enumerate(above, 1) for dialect in DIALECTS if line.strip()]
+    known = [(n, known_titles(titles), len(titles)) for n, titles in fields]
+    return next((n for n, k, count in known if k == count or (count == width and k > 1)), 0)
 
 
 def _units_above(above: Sequence[Line]) -> tuple[str, ...]:

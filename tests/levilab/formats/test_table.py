@@ -305,6 +305,7 @@ ERRORS = {
     "speed without a unit": ("a,speed\n0,1\n1,2\n2,3\n", None, ["'speed'", "`columns`"]),
     "mHz or MHz": ("a,f_mhz\n0,1\n1,2\n2,3\n", None, ["'f_mhz'"]),
     "no header, many columns": ("0,1,2,3\n1,1,2,3\n2,1,2,3\n", None, ["line 1", "4 columns and no header"]),
+    "one title, two columns": ("f [rpm]\n0,38.0\n1,37.0\n2,36.0\n", None, ["line 1", "no header", "t=1,f=2"]),
     "titles with blanks": ("t  f\n0,61\n1,61\n2,60\n", None, ["line 1", "no header", "t=1,f=2"]),
     "text in the middle": ("t,f\n0,61.5\nca. 1,61\n2,61\n3,60\n", None, ["line 3", "'ca. 1' stands in column 't'"]),
     "no times": ("RPM: 2403\nRPM: 2400\nRPM: 2397\nRPM: 2394\n", None, ["its times are needed"]),

@@ -190,10 +190,11 @@ def test_a_file_of_ones_own_needs_nothing_but_the_spins(tmp_path):
     [
         "21.7\n21.4\n21.9\n",
         "limit [Hz]\n21,7\n21,4\n21,9\n",
+        "Grenze\n21,7\n21,4\n21,9\n",
         "# ours\nf [mHz]\n21700\n21400\n\n21900\n",
         "1302\n1284\n1314",
     ],
-    ids=["numbers", "a title", "another unit", "rpm"],
+    ids=["numbers", "a title", "an unknown title", "another unit", "rpm"],
 )
 def test_a_column_of_limits_alone_is_enough(tmp_path, text, request):
     file = tmp_path / "my.csv"
