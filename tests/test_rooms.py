@@ -49,11 +49,11 @@ def loads_something_heavy(name):
 
 
 def late_imports(tree):
-    for function in ast.walk(tree):
-        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef):
-            for statement in ast.walk(function):
-                if names := imported(statement):
-                    yield statement.lineno, names
+    definitions = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+    early = {node for one in tree.body if not isinstance(one, definitions) for node in ast.walk(one)}
+    for node in ast.walk(tree):
+        if node not in early and (names := imported(node)):
+            yield node.lineno, names
 
 
 def is_a_door(name):

@@ -149,11 +149,6 @@ def test_the_voltage_of_the_pickup_coil_is_that_of_a_turning_dipole():
     assert volts.max() == pytest.approx(expected, rel=0.01)  # the spin falls by 0.3 %/s
 
 
-def test_a_sound_card_that_is_named_for_a_counter_is_refused(tmp_path):
-    with pytest.raises(UsageError, match="there is no virtual counter 'sound'"):
-        asked("spin", out=tmp_path, counter="sound")
-
-
 def test_any_oscilloscope_can_count(tmp_path):
     run = acquired("spin", Impatient(2), out=tmp_path, seed=1, scope="DS1000Z", settings=RAISED_QUICKLY)
     assert run.record.instruments["counter"]["driver"] == "SampledCounter"

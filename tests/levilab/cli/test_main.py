@@ -158,21 +158,6 @@ def test_an_input_that_a_report_skips_is_one_line_on_standard_error(levilab, tmp
 
 
 @pytest.mark.usefixtures("undrawn_figures")
-def test_two_files_in_a_folder_have_a_result_each_that_the_report_reads(levilab, tmp_path):
-    for k, (name, *options) in enumerate((("a.csv",), ("b.csv", "--tilt", "none"))):
-        levilab("analyze", "spindown", spin_down_csv(tmp_path / name, seed=k), *options)
-    names = {path.name for path in tmp_path.iterdir()}
-    assert {f"{file}.csv.{kind}" for file in "ab" for kind in ("result.json", "spindown.png")} <= names
-    levilab("report", "b.csv", "--no-crosscheck")
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "is taken to lie along its axis" in page
-    assert "as levilab analyze found it: b.csv.result.json" in page
-    levilab("report", "b.csv", "--keep-outliers", "--no-crosscheck")
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "other options than those of b.csv.result.json" in page
-
-
-@pytest.mark.usefixtures("undrawn_figures")
 def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levilab, sample_data):
     done = levilab("analyze", "spindown", sample_data, "--no-save")
     assert "skipped" not in done.stdout
@@ -180,13 +165,6 @@ def test_what_does_not_belong_to_the_analysis_is_a_message_and_no_warning(levila
     assert "4 hold runs, 3 limit runs, 1 precession run" in skipped
     assert "2 Markdown pages" in skipped
     assert "lasts [s]" in done.stdout
-
-
-def test_a_result_that_is_damaged_ends_the_report_with_one_line(levilab, tmp_path):
-    path = spin_down_csv(tmp_path / "my.csv")
-    (tmp_path / "my.csv.result.json").write_text("{", encoding="utf-8")
-    *_, line = levilab("report", path, check=1).stderr.splitlines()
-    assert line.startswith(f"levilab: {tmp_path / 'my.csv.result.json'}: is cut off")
 
 
 @pytest.mark.usefixtures("undrawn_figures")

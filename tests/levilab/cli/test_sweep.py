@@ -1,13 +1,11 @@
 """levilab sweep, as a user calls it: begin, interrupt, go on, show; and what it refuses."""
 
 import json
-import re
 import shutil
 
 import pytest
 
 from levilab.sweeps import run as run_module
-from levilab.sweeps.quantities import NAMES
 from support.commands import command
 from support.figures import with_drawing
 
@@ -109,12 +107,6 @@ def test_a_wrong_option_is_an_error_before_anything_is_computed(words, said, sho
     assert said in ended.err
     assert ended.status in {1, 2}
     assert [path.name for path in tmp_path.iterdir() if path.suffix == ".zarr"] == ["map.zarr"]
-
-
-def test_the_help_names_all_that_can_be_observed(tmp_path):
-    shown = command("sweep", "--help", cwd=tmp_path).out
-    words = set(re.findall(r"[a-z_]+", shown.replace("\n", " ")))
-    assert set(NAMES) <= words
 
 
 def test_few_points_in_a_row_are_printed_one_by_one(tmp_path):

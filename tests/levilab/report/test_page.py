@@ -17,7 +17,6 @@ from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.report import spindown_part
 from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Tabular
-from levilab.present.numbers import with_uncertainty
 from levilab.report.html.page import script
 from levilab.report.inputs import _drive
 from levilab.report.page import render as render_found
@@ -228,15 +227,6 @@ def reported(*paths, output, tell=None, **options):
     with without_figures():
         page = write_report(paths, output, options, tell).read_text(encoding="utf-8")
     return Page(page).text
-
-
-@pytest.mark.usefixtures("undrawn_figures")
-def test_the_report_shows_what_analyze_found(run, tmp_path):
-    analysis = SPINDOWN.analyze([run], SpinDownOptions(tilt="none"))
-    save(ANALYSES["spindown"], analysis)
-    text = reported(run, output=tmp_path / "report.html")
-    assert with_uncertainty(analysis.runs[0].fit("disc").parameters["c32"]).split()[0] in text
-    assert f"as levilab analyze found it: {run / 'result.json'}" in text
 
 
 @pytest.mark.usefixtures("undrawn_figures")

@@ -14,7 +14,7 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.inputs.search import collect, sha256_of
 from levilab.pipelines.inputs.source import Readings
-from levilab.pipelines.inputs.unread import NothingSuits, Skipped, SkippedRuns, left_out_of, remarks, texts_of
+from levilab.pipelines.inputs.unread import NothingSuits, Skipped, left_out_of, remarks, texts_of
 from levilab.pipelines.options import LimitOptions, SpinDownOptions
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import analyze_suiting, save
@@ -88,12 +88,6 @@ def test_a_run_that_goes_on_in_another_folder_counts_once(tmp_path, sample_data)
     analysis = SPINDOWN.analyze([tmp_path])
     assert [source.name for source in analysis.sources] == ["run-rescued"]
     assert analysis.remarks == (Skipped(f"{tmp_path / 'run'}, which was broken off: its run goes on in run-rescued"),)
-
-
-def test_runs_of_another_experiment_are_a_remark_and_no_warning(sample_data):
-    analysis = SPINDOWN.analyze([sample_data])
-    assert SkippedRuns("limit", 3) in analysis.remarks
-    assert not any("skipped" in warning for warning in analysis.all_warnings)
 
 
 def test_what_is_no_regular_file_has_no_hash(tmp_path):
