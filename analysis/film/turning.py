@@ -32,13 +32,16 @@ _NEARNESS, _NEARNESS_U = 2.16, 0.85
 #: Harmonics of the angle in a phase, and how large they may be, as a standard deviation [turns]: a top of 30 mm
 #: that turns about a point 0.2 mm beside the middle of its rim adds 0.003.
 _HARMONICS, _HARMONIC = 2, 0.003
-#: How far the turns swing with the sway of the top, as a standard deviation [turns], and how fast at most [Hz].  Else
-#: they would be taken for rows that are late, since the rows of the mark sway, too; in a long film both average out.
-_SWING, _SWING_HZ, _MOST_SWINGS = 3e-4, 3.0, 24
+#: How far the turns swing with the sway of the top, as a standard deviation [turns], and how slowly at least and how
+#: fast at most [Hz].  Else they would be taken for rows that are late, since the rows of the mark sway, too; in a long
+#: film both average out.
+_SWING, _SWING_HZ, _MOST_SWINGS = 3e-4, (0.3, 3.0), 24
 #: Means of residuals that show what neighbouring pictures share.
 _BLOCKS = 24
-#: Highest order of the polynomial (Chebyshev's) for the turns of a film: one more each two seconds.
-_MOST_BENDS = 12
+#: Highest order of the polynomial (Chebyshev's) for the turns of a film, and the number of orders that are free.  The
+#: others have a prior, as a fall has them beyond its third order, by the greatest relative slope of a free top's spin:
+#: 0.1 Hz/s of 14 Hz [1/s].
+_ORDER, _FREE, _SLOWS = 12, 3, 0.007
 #: Length of a reading of the spin [s], and the fewest pictures in it.
 WINDOW_S, _FEWEST_IN_WINDOW = 1.0, 12
 
@@ -146,22 +149,25 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, aside: Array, 
     _follow(times[middle::-1], phase[middle::-1], turns[middle::-1], start, float(phase[middle]))
     turns += _NEARNESS * aside / (2 * np.pi)
     centre, half = float((times[0] + times[-1]) / 2), float(np.ptp(times)) / 2
-    order = min(2 + int(half / WINDOW_S), _MOST_BENDS)
-    late = (times - centre) / half
-    swings = min(int(_SWING_HZ * 4 * half), _MOST_SWINGS) if np.any(rows) else 0
-    basis, swing = np.split(chebvander(late, order + swings), [order + 1], axis=1)
-    nuisance = np.concatenate([_nuisance(turns, start * (rows - rows.mean()), aside), _SWING * swing], axis=1)
-    slope, bend = (chebval(0.0, chebder(np.eye(order + 1), n)) / half**n for n in (1, 2))
-    chirp = float(bend @ _fit(basis, turns, u, nuisance)[0][: order + 1])
+    late, count = (times - centre) / half, _ORDER + 1
+    swings = min(int(_SWING_HZ[1] * 4 * half), _MOST_SWINGS) if np.any(rows) else 0
+    orders = np.arange(_FREE, _FREE + max(count, swings))
+    bends = abs(start) * half * (_SLOWS * half / 2) ** orders / orders
+    sways = _SWING * np.minimum(orders / (4 * half * _SWING_HZ[0]), 1) ** 4
+    columns, widths = chebvander(late, orders[-1]), np.diag([*np.ones(_FREE), *bends[: count - _FREE]])
+    basis, swing = columns[:, :count] @ widths, (sways * columns[:, _FREE:])[:, :swings]
+    nuisance = np.concatenate([_nuisance(turns, start * (rows - rows.mean()), aside), swing], axis=1)
+    slope, bend = (chebval(0.0, chebder(widths, n)) / half**n for n in (1, 2))
+    chirp = float(bend @ _fit(basis, turns, u, nuisance)[0][:count])
     slower = chirp * min(chirp / start, 0.0)  # of the slope, a second; that of an even drive stays
     drag = slower * (half * late) ** 3 / 6
     more = np.column_stack([nuisance, EXPONENT_U * drag])
     value, covariance, rest = _fit(basis, turns - EXPONENT * drag, u, more)
-    smooth, error = value[: order + 1], covariance[: order + 1, : order + 1]
+    smooth, error = value[:count], covariance[:count, :count]
     power = EXPONENT + EXPONENT_U * float(value[-1])
-    speed = chebval(late, chebder(smooth)) / half + power * slower * (half * late) ** 2 / 2
+    speed = chebval(late, chebder(widths @ smooth)) / half + power * slower * (half * late) ** 2 / 2
     readings = np.array([
-        _reading(times[part], rest[part], u[part], nuisance[part], covariance[order + 1 : -1, order + 1 : -1])
+        _reading(times[part], rest[part], u[part], nuisance[part], covariance[count:-1, count:-1])
         for part in windows_of(times)
     ]).reshape(-1, 3)  # fmt: skip
     return Turning(
@@ -202,12 +208,13 @@ def _follow(times: Array, phase: Array, turns: Array, frequency: float, start: f
 def _fit(basis: NDArray[np.floating], turns: Array, u: Array, nuisance: Array) -> tuple[Array, Array, Array]:
     """Return coefficients of a basis, shape (n, m), and of the nuisance, their covariance, and residuals.
 
+    The first columns of the basis are free, the others have a prior of 1, as those of the nuisance have.
     Uncertainties are those of the phases, or of their scatter where that is greater; slow residuals, which many
     pictures share, count by the scatter of their means.
     """
-    n, m = basis.shape
+    n, m = len(basis), min(basis.shape[1], _FREE)
     design = np.concatenate([basis, nuisance], axis=1)
-    prior = np.diag([0.0] * m + [1.0] * nuisance.shape[1])
+    prior = np.diag([0.0] * m + [1.0] * (design.shape[1] - m))
     weighted = np.concatenate([design / u[:, None], prior])
     found = np.linalg.lstsq(weighted, np.concatenate([turns / u, np.zeros(len(prior))]), rcond=None)[0]
     rest = turns - design @ found

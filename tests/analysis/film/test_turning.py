@@ -38,7 +38,7 @@ def test_spin_and_slope_scatter_as_u_says():
 
 
 @pytest.mark.parametrize("sense", [1, -1])
-@pytest.mark.parametrize("length", [0.8, 1.9])
+@pytest.mark.parametrize("length", [0.8, 1.9, 2.1])
 def test_the_bend_of_the_spin_by_drag_moves_no_spin_of_a_short_film(length, sense):
     times = phone_times(length)
     root = 35.0**-0.5 + 3.4e-4 * times  # of 1/spin, under the drag of a disc: 0.14 Hz/s

@@ -297,7 +297,7 @@ def test_a_film_is_recalled_from_its_result_and_reported_with_its_still(path, tm
 @pytest.mark.slow
 def test_a_top_that_falls_has_its_spin_then_as_a_limit_that_others_read(folder):
     flight = level_flight(3.0, 22.0, chirp=-0.06)
-    flight = replace(flight, yaw=flight.yaw + 0.06 * np.sin(np.pi * flight.times))  # its spin swings by 0.03 Hz
+    flight = replace(flight, yaw=flight.yaw + 0.01 * np.sin(19 * flight.times))  # its spin swings by 0.03 Hz
     shown, times = Pictures(CAMERA, flight), phone_times(2.9)[::2]
     path = write_film(
         folder / "falls.mp4", (shown.noisy(shown.take(t) if t < 2.6 else shown.background) for t in times), times
