@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from levilab.formats.understanding import UnderstoodColumn, UnderstoodRun
-    from levilab.pipelines.inputs.look import Look
     from levilab.pipelines.inputs.unread import Skipped
+    from levilab.pipelines.look import Look
 
 #: First values of a column that the terminal shows.
 _SHOWN = 3
@@ -47,7 +47,7 @@ def open_files(
 ) -> None:
     """Show how files are understood, and what the data say; writes nothing without --keep or -o."""
     from levilab.pipelines.inputs.correction import write_correction
-    from levilab.pipelines.inputs.look import look_as_kept
+    from levilab.pipelines.look import look_as_kept
 
     files, options = paths or [], read_options(given, typed=True)
     shows = _has_browser() and not (keep or out or as_json) if browser is None else browser
@@ -122,7 +122,7 @@ def _print_looks(looks: "Sequence[Look]", *, as_json: bool) -> None:
 
 def _print_look(look: "Look") -> None:
     """Print how a file is understood: its columns, and the questions that are left."""
-    from levilab.pipelines.inputs.look import QUANTITIES
+    from levilab.pipelines.look import QUANTITIES
     from levilab.present.tables import table
     from levilab.present.terminal import draw, terminal
 

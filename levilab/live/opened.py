@@ -16,7 +16,7 @@ from levilab.formats.film import NoFilm, open_film
 from levilab.formats.kinds import AUDIO
 from levilab.formats.understanding import understand
 from levilab.pipelines.inputs.correction import ENDING, read_correction, read_file_options, write_correction
-from levilab.pipelines.inputs.look import Look, look_as_kept, look_at
+from levilab.pipelines.look import Look, look_as_kept, look_at
 from levilab.pipelines.options import read_options
 from levilab.pipelines.result import relative
 from levilab.texts.text import Text, text_of

@@ -37,7 +37,7 @@ from levilab.live.running import Running
 from levilab.live.tuning import advice_on
 from levilab.live.watch import Watch
 from levilab.live.words import data_in, page_in
-from levilab.pipelines.inputs.look import QUANTITIES, name_of
+from levilab.pipelines.look import QUANTITIES, name_of
 from levilab.pipelines.result import beside
 from levilab.runs.find import RECORD
 from levilab.texts.text import ENGLISH, in_language, languages, text_of

@@ -9,7 +9,7 @@ import pytest
 import xlsxwriter
 
 from levilab.formats.titles import UNITS, dimension, read_title
-from levilab.pipelines.inputs.look import QUANTITIES, look_at
+from levilab.pipelines.look import QUANTITIES, look_at
 from support.commands import command
 from support.paths import ROOT
 

@@ -14,7 +14,7 @@ import pytest
 from levilab.errors import UsageError
 from levilab.live.opened import LONGEST_NAME, MOST_FILES, Opened, OpenedFile, plain_name
 from levilab.pipelines.inputs.correction import read_correction
-from levilab.pipelines.inputs.look import look_at
+from levilab.pipelines.look import look_at
 from levilab.texts.text import Text, as_tables
 from support.browser import PHONE
 from support.live_pages import PATIENCE_S, address, carry_out_here, request, serving, until, wait_for

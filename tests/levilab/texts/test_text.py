@@ -26,8 +26,8 @@ from levilab.motion import effects
 from levilab.motion.summary import ENDINGS, FALLS
 from levilab.pipelines.analyzed import EachAlone
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.inputs.look import QUANTITIES
 from levilab.pipelines.inputs.unread import OTHER_COLUMNS
+from levilab.pipelines.look import QUANTITIES
 from levilab.pipelines.precession.words import miscount_as_text
 from levilab.pipelines.tune.advice import MET
 from levilab.present.document.blocks import in_language_of_reader

@@ -13,7 +13,7 @@ from levilab.errors import UsageError
 from levilab.live.opened import Opened
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.inputs.correction import CorrectionError, place_of_correction, read_correction, write_correction
-from levilab.pipelines.inputs.look import look_as_kept, name_of
+from levilab.pipelines.look import look_as_kept, name_of
 from levilab.pipelines.many.table import write_table
 from support.commands import command
 from support.paths import SAMPLE_DATA
