@@ -39,19 +39,20 @@ class Swing:
     u_amplitude: float
 
 
-def swing_of(times: Array, signal: Signal, between: tuple[float, float]) -> Swing | None:
+def swing_of(times: Array, signal: Signal, between: tuple[float, float], order: int = _SLOW) -> Swing | None:
     """Return the strongest line between two frequencies of either sense; None where it does not stand out.
 
     Args:
         times: increasing, shape (n,) [s].
         signal: shape (n,).
         between: least and greatest frequency, without its sense [Hz].
+        order: of the polynomial for what is slower.
     """
-    if times.size < max(FEWEST, 2 * (_SLOW + 3)):
+    if times.size < max(FEWEST, 2 * (order + 3)):
         return None
     t = times - times.mean()
     late = t / np.abs(t).max()
-    slow = np.polynomial.chebyshev.chebvander(late, _SLOW).astype(np.complex128)
+    slow = np.polynomial.chebyshev.chebvander(late, order).astype(np.complex128)
     rest = signal - slow @ np.linalg.lstsq(slow, signal, rcond=None)[0]
     even = np.linspace(t[0], t[-1], t.size)
     regular = np.interp(even, t, rest.real) + 1j * np.interp(even, t, rest.imag)
@@ -70,9 +71,8 @@ def swing_of(times: Array, signal: Signal, between: tuple[float, float]) -> Swin
     inverse = np.linalg.inv(design.conj().T @ design).real
     # a line that a slower motion modulates has neighbours, which move it more than the noise does
     beside = np.exp(-2j * np.pi * (frequency + _BESIDE[:, None] / np.ptp(t)) * t) @ rest
-    noise = max(
-        float(np.sum(np.abs(rest) ** 2)) / (t.size - design.shape[1]), float(np.mean(np.abs(beside) ** 2)) / t.size
-    )
+    white = float(np.sum(np.abs(rest) ** 2)) / (t.size - design.shape[1])
+    noise = (white + float(np.mean(np.abs(beside) ** 2)) / t.size) / 2
     amplitude, u = abs(complex(found[-2])), float(np.sqrt(noise * inverse[-2, -2] / 2))
     if amplitude < _STANDS_OUT * u or not between[0] < abs(frequency) < between[1]:
         return None

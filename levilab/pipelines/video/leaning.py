@@ -14,6 +14,11 @@ from analysis.uncertainty import Estimate
 PRECESSION_HZ, VERTICAL_HZ = (3.0, 20.0), (0.5, 3.0)
 #: u of the precession of a short film, relative: 40 tops from above are off by 0.1 % (rms), one from beside by 1.4 %.
 _SHORT = 0.007
+#: Order of the polynomial for what is slower than the vertical swing, of a film of some seconds.
+_SLOWER = 3
+#: u of the vertical swing, in parts of what a film resolves: the beat of the slow swings, near it, moves it by so much
+#: (rms of 59 tops, from above and from beside).
+_BEAT = 0.11
 #: Share of the pictures in which a dot is seen, at least.
 _SEEN = 0.8
 
@@ -99,9 +104,9 @@ def rising_of(times: Array, z: Array) -> Rising:
         times: shape (n,) [s].
         z: height above its mean, shape (n,) [m].
     """
-    one: Swing | None = swing_of(times, z.astype(np.complex128), VERTICAL_HZ)
+    one: Swing | None = swing_of(times, z.astype(np.complex128), VERTICAL_HZ, _SLOWER)
     if one is None:
         return Rising(z, None, None)
     # a real swing is two lines of half its amplitude
     size = Estimate(2 * one.amplitude, 2 * one.u_amplitude, "m")
-    return Rising(z, Estimate(abs(one.frequency), one.u, "Hz"), size)
+    return Rising(z, Estimate(abs(one.frequency), float(np.hypot(one.u, _BEAT / np.ptp(times))), "Hz"), size)

@@ -26,6 +26,7 @@ from levilab.formats.film import open_film, pictures
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import VideoOptions
 from levilab.pipelines.suits import save
+from levilab.pipelines.video.leaning import rising_of
 from levilab.simulator.scene import preset
 from support.commands import command
 from support.equal import differences
@@ -342,3 +343,12 @@ def test_what_is_no_film_is_refused_in_one_line(path, tmp_path):
     ):
         ended = command("analyze", "video", name, "--rim", 30, cwd=tmp_path)
         assert (ended.status, text in ended.err, ended.err.count("\n")) == (1, True, 1), ended.err
+
+
+def test_the_beat_of_the_slow_swings_is_in_the_u_of_the_vertical_swing():
+    random, times, pulls = np.random.default_rng(3), phone_times(3.0), []
+    for _ in range(60):
+        swing, beat = (np.cos(2 * np.pi * (hz * times + random.uniform())) for hz in (1.2, 1.45))
+        found = rising_of(times, 3e-4 * swing + 8e-5 * beat + random.normal(0, 4e-5, times.size)).swing
+        pulls.append((found.value - 1.2) / found.u)
+    assert 0.5 < np.std(pulls) < 1.4  # 6.2 by the noise alone
