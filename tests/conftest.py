@@ -28,21 +28,24 @@ collect_ignore = ["golden/make_trajectories.py"]
 SLOW = """
     analysis/precession/test_gates.py  analysis/precession/test_sweep.py  analysis/pulses/test_times.py
     analysis/pulses/test_trace.py  analysis/rotation/test_track.py  analysis/spindown/test_fit.py
-    analysis/spindown/test_tilt.py  analysis/sway/test_sway.py  instruments/links/test_wire_faults.py
-    instruments/links/test_wire_proxy.py  instruments/virtual/bench/test_fuzz.py
+    analysis/spindown/test_tilt.py  analysis/sway/test_sway.py  analysis/test_comparison.py
+    instruments/drivers/counter/test_phyphox.py  instruments/drivers/oscilloscope/test_on_the_bench.py
+    instruments/links/test_wire_faults.py  instruments/links/test_wire_proxy.py  instruments/virtual/bench/test_fuzz.py
     instruments/virtual/core/test_long_lines.py  instruments/virtual/servers/test_at_work.py
     levilab/acquisition/experiments/test_hold.py  levilab/acquisition/experiments/test_limit.py
-    levilab/acquisition/experiments/test_precession.py  levilab/acquisition/experiments/test_trace.py
-    levilab/acquisition/test_loop.py  levilab/acquisition/test_losses.py  levilab/acquisition/test_sound.py
-    levilab/acquisition/test_triggering.py  levilab/benchmark  levilab/cli/test_main.py  levilab/cli/test_sweep.py
-    levilab/crosscheck  levilab/formats/waveforms/test_memory.py  levilab/laboratory/test_laboratory.py  levilab/live
-    levilab/motion  levilab/notebook  levilab/pipelines/spin/test_analysis.py  levilab/pipelines/spindown
-    levilab/pipelines/sway/test_sway.py  levilab/pipelines/test_result.py  levilab/pipelines/video/test_analysis.py
-    levilab/report/groups/test_class.py  levilab/report/test_language.py  levilab/report/test_page.py
+    levilab/acquisition/experiments/test_precession.py  levilab/acquisition/experiments/test_sway.py
+    levilab/acquisition/experiments/test_trace.py  levilab/acquisition/test_loop.py  levilab/acquisition/test_losses.py
+    levilab/acquisition/test_sound.py  levilab/acquisition/test_triggering.py  levilab/benchmark
+    levilab/cli/test_main.py  levilab/cli/test_sweep.py  levilab/crosscheck  levilab/formats/waveforms/test_memory.py
+    levilab/laboratory/test_laboratory.py  levilab/live  levilab/motion  levilab/notebook  levilab/pipelines/many
+    levilab/pipelines/spin  levilab/pipelines/spindown  levilab/pipelines/sway/test_sway.py
+    levilab/pipelines/test_result.py  levilab/pipelines/video/test_analysis.py  levilab/report/groups/test_class.py
+    levilab/report/test_language.py  levilab/report/test_many.py  levilab/report/test_page.py
     levilab/report/test_pdf.py  levilab/report/test_same_bytes.py  levilab/report/worksheets/test_worksheets.py
-    levilab/runs/test_hostile.py  levilab/runs/test_kill.py  levilab/simulator  levilab/stability  levilab/sweeps
-    levilab/workers  levilab/world/test_base.py  levilab/world/test_motion_world.py  levilab/world/test_serve.py
-    levilab/world/test_spin_world.py  ../levilab/simulator  test_browser.py  test_documentation.py
+    levilab/reproduce/test_chapters.py  levilab/runs/test_hostile.py  levilab/runs/test_kill.py  levilab/simulator
+    levilab/stability  levilab/sweeps  levilab/workers  levilab/world/test_base.py  levilab/world/test_motion_world.py
+    levilab/world/test_serve.py  levilab/world/test_spin_world.py  ../levilab/simulator  test_browser.py
+    test_documentation.py  test_study.py
 """
 #: Rooms of processes, sockets and types, whose slow tests a version of Python may change: `make all-pythons` leaves out
 #: all other slow ones, and .github/workflows/tests.yml carries out every test on each version.

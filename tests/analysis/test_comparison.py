@@ -70,6 +70,6 @@ def test_a_group_far_off_does_not_hide_itself():
 def test_distances_of_few_tops_that_differ_are_as_improbable_as_they_say(n, expected):
     """4.6 % of normal numbers are beyond 2; more of three or four tops, two of which may be alike by chance."""
     random = np.random.default_rng(26)
-    found = [compare(100 + 2 * random.standard_normal(n), np.full(n, 0.2)).distances for _ in range(400)]
+    found = [compare(100 + 2 * random.standard_normal(n), np.full(n, 0.2)).distances for _ in range(1200 // n)]
     share = np.mean(np.abs(np.array(found)) > 2)
-    assert share == pytest.approx(expected, abs=0.03)  # 400 classes; the n distances of a class are not independent
+    assert share == pytest.approx(expected, abs=0.03)  # 1200 distances; the n of a class are not independent

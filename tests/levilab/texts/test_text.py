@@ -281,7 +281,8 @@ def test_a_wrong_setting_is_answered_in_german(given, said):
 @pytest.mark.parametrize(
     "words",
     [
-        "simulate tilted --duration 2 --explain", "simulate driven --duration 9 --set drive.cycle_turns=1.5",
+        pytest.param("simulate tilted --duration 2 --explain", marks=pytest.mark.slow),  # it compiles the simulator
+        "simulate driven --duration 9 --set drive.cycle_turns=1.5",
         "stability sway", "stability undriven --set top.mass_kg=1", "simulate undriven --set top.masse=3",
         "simulate undriven --set base.outer_radius_m=0.01", "simulate undriven --set top.mass_kg=abc",
         "simulate undriven --duration abc", "simulate sway --set drag.law=foo", "tune --top 24 --temperature x",

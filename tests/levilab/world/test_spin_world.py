@@ -4,6 +4,7 @@ import math
 import sys
 import tracemalloc
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -466,6 +467,7 @@ def test_it_sees_an_arbitrary_waveform_too(model, load):
 # --- many changes ---
 
 
+@cache
 def changed_every_second(changes):
     top = world()
     drive(top, 0.0, "SIN", 30.0, FIELD)
