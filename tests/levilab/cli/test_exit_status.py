@@ -241,11 +241,6 @@ def test_what_may_not_be_read_is_said_in_one_line(monkeypatch, tmp_path, words):
     )
 
 
-def test_an_interrupted_command_ends_with_130(monkeypatch, tmp_path):
-    monkeypatch.setattr("levilab.runs.listing.list_runs", Mock(side_effect=KeyboardInterrupt))
-    assert command("runs", ".", cwd=tmp_path).status == exit_codes.INTERRUPTED
-
-
 def test_an_interrupted_analysis_says_in_one_line_what_is_lost(monkeypatch, tmp_path, sample_data):
     monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", Mock(side_effect=KeyboardInterrupt))
     run = sample_data / "spin-down-1"

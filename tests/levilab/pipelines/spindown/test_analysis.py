@@ -133,11 +133,6 @@ def test_a_plain_csv_is_analyzed_and_knows_nothing_of_synthetic(tmp_path):
     assert result["values"]["c32"]["value"] == pytest.approx(2.34e-4, abs=4 * result["values"]["c32"]["u"])
 
 
-def test_the_same_run_given_twice_counts_once(sample_data):
-    analysis = SPINDOWN.analyze([sample_data, sample_data / "spin-down-1"])
-    assert len(analysis.sources) == 4
-
-
 def test_the_readings_of_a_run_are_that_run_and_as_synthetic(sample_data, tmp_path):
     (source,) = SPINDOWN.analyze([sample_data / "spin-down-1" / "readings.csv"]).sources
     assert source.synthetic
