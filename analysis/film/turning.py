@@ -37,11 +37,14 @@ _HARMONICS, _HARMONIC = 2, 0.003
 #: film both average out.
 _SWING, _SWING_HZ, _MOST_SWINGS = 3e-4, (0.3, 3.0), 24
 #: Means of residuals that show what neighbouring pictures share.
-_BLOCKS = 24
+_BLOCKS = 72
 #: Highest order of the polynomial (Chebyshev's) for the turns of a film, and the number of orders that are free.  The
 #: others have a prior, as a fall has them beyond its third order, by the greatest relative slope of a free top's spin:
 #: 0.1 Hz/s of 14 Hz [1/s].
-_ORDER, _FREE, _SLOWS = 12, 3, 0.007
+_ORDER, _FREE, _SLOWS = 36, 3, 0.007
+#: What a drive adds to each order, as standard deviations: nothing, or each decade as probable [turns].  Orders above
+#: those of a swing at this frequency fall off as their fifth power [Hz].  One top in thirty is driven.
+_DRIVES, _DRIVE_HZ, _DRIVEN = np.append(0.0, 3 * 10.0 ** np.arange(-4, 4)), 0.1, 0.03
 #: Length of a reading of the spin [s], and the fewest pictures in it.
 WINDOW_S, _FEWEST_IN_WINDOW = 1.0, 12
 
@@ -152,22 +155,26 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, aside: Array, 
     late, count = (times - centre) / half, _ORDER + 1
     swings = min(int(_SWING_HZ[1] * 4 * half), _MOST_SWINGS) if np.any(rows) else 0
     orders = np.arange(_FREE, _FREE + max(count, swings))
-    bends = abs(start) * half * (_SLOWS * half / 2) ** orders / orders
+    falls = abs(start) * half * min(_SLOWS * half / 2, 1) ** orders / orders
+    drives = np.minimum(4 * half * _DRIVE_HZ / orders, 1) ** 5
     sways = _SWING * np.minimum(orders / (4 * half * _SWING_HZ[0]), 1) ** 4
-    columns, widths = chebvander(late, orders[-1]), np.diag([*np.ones(_FREE), *bends[: count - _FREE]])
-    basis, swing = columns[:, :count] @ widths, (sways * columns[:, _FREE:])[:, :swings]
+    columns = chebvander(late, orders[-1])
+    basis, swing = columns[:, :count], (sways * columns[:, _FREE:])[:, :swings]
+    widths = np.hypot(falls, _DRIVES[:, None] * drives)[:, : count - _FREE]
     nuisance = np.concatenate([_nuisance(turns, start * (rows - rows.mean()), aside), swing], axis=1)
-    slope, bend = (chebval(0.0, chebder(widths, n)) / half**n for n in (1, 2))
-    chirp = float(bend @ _fit(basis, turns, u, nuisance)[0][:count])
+    slope, bend = (chebval(0.0, chebder(np.eye(count), n)) / half**n for n in (1, 2))
+    chirp = float(bend @ _fit(basis, turns, u, nuisance, widths)[0][:count])
     slower = chirp * min(chirp / start, 0.0)  # of the slope, a second; that of an even drive stays
     drag = slower * (half * late) ** 3 / 6
     more = np.column_stack([nuisance, EXPONENT_U * drag])
-    value, covariance, rest = _fit(basis, turns - EXPONENT * drag, u, more)
+    value, covariance, rest = _fit(basis, turns - EXPONENT * drag, u, more, widths)
     smooth, error = value[:count], covariance[:count, :count]
     power = EXPONENT + EXPONENT_U * float(value[-1])
-    speed = chebval(late, chebder(widths @ smooth)) / half + power * slower * (half * late) ** 2 / 2
+    speed = chebval(late, chebder(smooth)) / half + power * slower * (half * late) ** 2 / 2
+    speeds = np.concatenate([chebval(late, chebder(np.eye(count))).T / half, np.zeros(nuisance.shape)], axis=1)
+    terms = np.stack([np.concatenate([basis, nuisance], axis=1), speeds])
     readings = np.array([
-        _reading(times[part], rest[part], u[part], nuisance[part], covariance[count:-1, count:-1])
+        _reading(times[part], rest[part], u[part], terms[:, part], covariance[:-1, :-1])
         for part in windows_of(times)
     ]).reshape(-1, 3)  # fmt: skip
     return Turning(
@@ -205,26 +212,53 @@ def _follow(times: Array, phase: Array, turns: Array, frequency: float, start: f
         frequency += _GAIN * off / step * min(1.0, abs(step) / 0.01)
 
 
-def _fit(basis: NDArray[np.floating], turns: Array, u: Array, nuisance: Array) -> tuple[Array, Array, Array]:
+def _fit(
+    basis: NDArray[np.floating], turns: Array, u: Array, nuisance: Array, widths: Array
+) -> tuple[Array, Array, Array]:
     """Return coefficients of a basis, shape (n, m), and of the nuisance, their covariance, and residuals.
 
-    The first columns of the basis are free, the others have a prior of 1, as those of the nuisance have.
-    Uncertainties are those of the phases, or of their scatter where that is greater; slow residuals, which many
-    pictures share, count by the scatter of their means.
+    The last columns of the basis have the prior of a free top, of widths in the first row, or of a driven one, in the
+    others, each as probable, shape (k, p), the widest last; the nuisance has one of 1.  All count by their evidence.
+    Uncertainties are those of the phases, or of their scatter about the widest where that is greater; slow residuals,
+    which many pictures share, count by the scatter of their means.
     """
-    n, m = len(basis), min(basis.shape[1], _FREE)
+    n, m = basis.shape
     design = np.concatenate([basis, nuisance], axis=1)
-    prior = np.diag([0.0] * m + [1.0] * (design.shape[1] - m))
-    weighted = np.concatenate([design / u[:, None], prior])
-    found = np.linalg.lstsq(weighted, np.concatenate([turns / u, np.zeros(len(prior))]), rcond=None)[0]
-    rest = turns - design @ found
-    factor = max(float(np.sum((rest / u) ** 2)) / max(n - m, 1), 1.0)
+    triangle = np.linalg.qr(np.column_stack([design, turns]) / u[:, None])[1]
+    scales, some = np.ones((len(widths), design.shape[1])), slice(m - widths.shape[1], m)
+    scales[:, some] = widths
+    prior = np.diag(np.arange(design.shape[1]) >= some.start).astype(float)
+    value, spread, _ = _solution(triangle, scales[-1], prior)
+    rest, fitted = (turns - design @ value) / u, m - float(np.sum(np.diag(spread)[some] / widths[-1] ** 2))
+    factor = max(float(np.sum(rest**2)) / max(n - fitted, 1), 1.0)
     block = n // _BLOCKS
     if block > 1:
-        means = (rest / u)[: n // block * block].reshape(-1, block).mean(axis=1)
-        factor = max(factor, block * float(np.sum(means**2)) / max(means.size - m, 1))
-    information = weighted[:n].T @ weighted[:n] / factor + prior**2
-    return found, np.linalg.inv(information), rest
+        means = rest[: n // block * block].reshape(-1, block).mean(axis=1)
+        factor = max(factor, block * float(np.sum(means**2)) / max(means.size - fitted, 1))
+    values, covariances, logs = zip(*(_solution(triangle / factor**0.5, scale, prior) for scale in scales), strict=True)
+    weight = np.exp(np.array(logs) - max(logs))
+    weight[1:] *= _DRIVEN / len(widths)
+    weight /= weight.sum()
+    found = weight @ np.array(values)
+    off = np.array(values) - found
+    covariance = np.tensordot(weight, np.array(covariances), 1) + (off.T * weight) @ off
+    return found, covariance, turns - design @ found
+
+
+def _solution(triangle: Array, scale: Array, prior: Array) -> tuple[Array, Array, float]:
+    """Return coefficients, their covariance, and the logarithm of the evidence of a prior.
+
+    Args:
+        triangle: of the weighted columns and the goal, shape (m + 1, m + 1).
+        scale: standard deviations of the prior, shape (m,).
+        prior: one where a coefficient has a prior, shape (m, m).
+    """
+    matrix = np.concatenate([triangle[:, :-1] * scale, prior])
+    goal = np.append(triangle[:, -1], np.zeros(len(prior)))
+    value = np.linalg.lstsq(matrix, goal, rcond=None)[0]
+    information = matrix.T @ matrix
+    log = -0.5 * (np.sum((goal - matrix @ value) ** 2) + np.linalg.slogdet(information)[1])
+    return scale * value, scale[:, None] * np.linalg.inv(information) * scale, float(log)
 
 
 def windows_of(times: Array) -> list[NDArray[np.intp]]:
@@ -234,9 +268,18 @@ def windows_of(times: Array) -> list[NDArray[np.intp]]:
     return [part for part in np.split(np.arange(times.size), edges) if part.size >= _FEWEST_IN_WINDOW]
 
 
-def _reading(times: Array, rest: Array, u: Array, nuisance: Array, covariance: Array) -> tuple[float, float, float]:
-    """Return time and spin of some pictures beyond the smooth one of the film, by their residuals, and its u."""
+def _reading(times: Array, rest: Array, u: Array, terms: Array, covariance: Array) -> tuple[float, float, float]:
+    """Return time and spin of some pictures beyond the smooth one of the film, by their residuals, and its u.
+
+    Args:
+        times: shape (n,) [s].
+        rest: residuals, shape (n,) [turns].
+        u: shape (n,) [turns].
+        terms: columns of the film's fit, and their slopes in the smooth spin, shape (2, n, m).
+        covariance: of their coefficients, shape (m, m).
+    """
     at = float((times[0] + times[-1]) / 2)
-    value, own, _ = _fit(np.vander(times - at, 2, increasing=True), rest, u, np.empty((times.size, 0)))
-    slopes = np.polyfit(times - at, nuisance, 1)[0]
-    return at, float(value[1]), float(np.sqrt(own[1, 1] + slopes @ covariance @ slopes))
+    line = np.vander(times - at, 2, increasing=True)
+    value, own, _ = _fit(line, rest, u, np.empty((times.size, 0)), np.ones((1, 0)))
+    shares = np.polyfit(times - at, terms[0], 1)[0] - [np.interp(at, times, speed) for speed in terms[1].T]
+    return at, float(value[1]), float(np.sqrt(own[1, 1] + shares @ covariance @ shares))

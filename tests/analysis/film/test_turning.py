@@ -53,6 +53,46 @@ def test_the_bend_of_the_spin_by_drag_moves_no_spin_of_a_short_film(length, sens
     assert found.u_frequency < 1.1 * NOISE * np.sqrt(12 / times.size) / length  # of a straight line
 
 
+def swing(size, frequency):
+    """Turns, and spin, of a top of 31 Hz whose spin swings by a size [Hz]."""
+    rate = 2 * np.pi * frequency
+    return lambda t: 31 * t - size / rate * np.cos(rate * t), lambda t: 31 + size * np.sin(rate * t)
+
+
+def switched(t):
+    return 31 * t - 0.05 * np.maximum(t - 5, 0) ** 2  # a drive, off from 5 s on
+
+
+@pytest.mark.parametrize(
+    ("length", "turns", "spin", "most", "most_u"),
+    [
+        (20, *swing(0.3, 0.1), 4, 0.48e-3),
+        (20, *swing(0.02, 0.1), 4, 0.14e-3),
+        (20, *swing(0.3, 0.33), 4, 1.5e-3),
+        (10, switched, lambda t: 31 - 0.1 * np.maximum(t - 5, 0), 10, 1.5e-3),  # a bend just there: 4 mHz
+    ],
+)
+def test_u_of_a_driven_top_holds_its_swing(length, turns, spin, most, most_u):
+    times, random = np.arange(0, length, 1 / 60), np.random.default_rng(20)
+    none, noise = 0 * times, random.normal(0, NOISE, times.size)
+    found = turning_of(times, (turns(times) + noise) % 1, none + NOISE, none, none, start=31.0)
+    assert found.frequency == pytest.approx(spin(found.middle), abs=most * found.u_frequency)
+    assert found.u_frequency < most_u
+    assert np.sqrt(np.mean(((found.spin - spin(found.time)) / found.u) ** 2)) < (1.6 if most == 4 else 5)
+
+
+def test_u_of_a_free_top_falls_with_the_length_without_a_step():
+    u, random = [], np.random.default_rng(21)
+    for length, rate in ((1.99, 240), (2.01, 240), (20, 60)):
+        times = np.arange(0, length, 1 / rate)
+        none, root = 0 * times, 35.0**-0.5 + 3.4e-4 * times
+        phase = (random.normal(0, NOISE, times.size) - 1 / (3.4e-4 * root)) % 1
+        middle = float(np.interp(length / 2, times, root)) ** -2
+        u += [turning_of(times, phase, none + NOISE, none, none, start=middle).u_frequency]
+    assert u[1] == pytest.approx(u[0], rel=0.2)
+    assert u[2] < 2e-5
+
+
 @pytest.mark.parametrize("sense", [1, -1])
 def test_uneven_times_tell_a_spin_far_above_half_the_rate(sense):
     random = np.random.default_rng(12)
