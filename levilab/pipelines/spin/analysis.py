@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.budget import rest
-from analysis.drag import EXPONENT
+from analysis.drag import fit_curve
 from analysis.errors import AnalysisError
 from analysis.pulses import (
     Finding,
@@ -132,10 +132,6 @@ class Series:
         return len(self.time)
 
 
-#: Of the exponent n of a drag through several records: an even ramp of a drive, n = 0, is two u away.
-_BEND_U = 0.75
-
-
 @dataclass(frozen=True)
 class UParts:
     """What u of a frequency, or of its slope, is made of; the squares add up.
@@ -201,25 +197,13 @@ class SpinRun:
 
     @cached_property
     def _line(self) -> tuple[Estimate, float, float] | None:
-        """Fit a line in ν^(1 − n), n of a drag; another n bends it, and has a prior."""
         series = self.series
-        if len(series) < 2 or len(series.phases) > 1 or not np.all(series.u > 0):
+        if len(series.phases) > 1 or not np.all(series.u > 0) or not np.ptp(series.time) > 0:
             return None
-        hz = series.frequency**EXPONENT  # of the line's ordinate: d(ν^(1 − n)/(1 − n)) = dν/νⁿ
-        line, u = series.frequency ** (1 - EXPONENT) / (1 - EXPONENT), series.u / hz
-        late = series.time - np.average(series.time, weights=series.u**-2)
-        straight = np.polynomial.Polynomial.fit(late, line, 1, w=1 / u).convert()
-        bend = 0.5 * straight.coef[1] ** 2 * series.frequency.mean() ** (EXPONENT - 1) * late**2
-        design = np.column_stack([np.ones_like(late), late, _BEND_U * bend]) / u[:, None]
-        design = np.vstack([design, [0.0, 0.0, 1.0]])  # the prior
-        middle, slope, other = np.linalg.lstsq(design, np.append(line / u, 0.0))[0]
-        u_slope = float(np.linalg.inv(design.T @ design)[1, 1]) ** 0.5
-        left = hz * (line - middle - slope * late - other * _BEND_U * bend)
-        freedom = max(len(series) - 2, 1)
-        units = math.sqrt((float(np.sum((left / series.u) ** 2)) + float(other) ** 2) / freedom)
-        there = ((1 - EXPONENT) * middle) ** (EXPONENT / (1 - EXPONENT))  # νⁿ in the middle
-        trend = Estimate(float(slope * there), float(u_slope * there) * max(1.0, units), "Hz/s")
-        return trend, math.sqrt(float(np.sum(left**2)) / freedom), units
+        curve, freedom = fit_curve(series.time, series.frequency, series.u), max(len(series) - 2, 1)
+        units = math.sqrt(curve.chi_square / freedom)
+        far = math.sqrt(float(np.sum(curve.residuals**2)) / freedom)
+        return Estimate(curve.slope, curve.u * max(1.0, units), "Hz/s"), far, units
 
 
 class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):

@@ -424,6 +424,9 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(served, watched, tmp_path
     save_what_is_drawn(page, run, tmp_path)
     assert page.evaluate("levilab.space.replays")
     page.reload()  # as for another language
+    until(page, "levilab.frames > 0")
+    watch = served.watches[run.folder.name]
+    publish(watch, Poses(3.0, 1 / 400, position[900:], upright[900:], up[900:]))  # the top lies there
     until(page, "levilab.space?.state && document.getElementById('replay').offsetParent")
     page.click("#replay")
     assert page.evaluate("levilab.space.replays")
@@ -433,7 +436,7 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(served, watched, tmp_path
     assert not page.evaluate("levilab.space.replays")
     page.click("#replay")
     assert page.evaluate("levilab.space.replays")
-    publish(watch, Poses(3.0, 1 / 400, position[:300], upright[:300], up[:300]))  # another top floats
+    publish(watch, Poses(4.0, 1 / 400, position[:300], upright[:300], up[:300]))  # another top floats
     until(page, "levilab.data.up")
     assert not page.evaluate("levilab.space.replays")
 

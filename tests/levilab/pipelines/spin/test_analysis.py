@@ -1,7 +1,6 @@
 """Records and pulse times at some paths: against closed forms, from all kinds of inputs, and what is passed over."""
 
 import json
-import math
 import re
 import shutil
 from dataclasses import replace
@@ -12,8 +11,6 @@ import pytest
 
 import levilab
 from analysis.rotation.result import Kind
-from analysis.spindown.drag import LAWS
-from analysis.spindown.drag import spin as spin_under_drag
 from instruments.drivers.oscilloscope import Trace
 from levilab.computer import utc_now
 from levilab.errors import DataError, DoesNotSuit
@@ -170,7 +167,7 @@ def test_the_traces_of_a_run_are_read_in_volts_on_its_clock(traced):
     assert series.time == pytest.approx([-0.2, 9.8, 19.8], abs=0.05)  # the middles of 0.4 s before they were complete
     by_start = 0.1 * 0.02 / np.sqrt(3)  # the slope, and how often a driver asks whether a record is complete
     assert series.u[1] == pytest.approx(np.hypot(analysis.runs[0].spin.frequency.u, by_start), rel=0.01)
-    assert "It loses 0.3448(7) % of its spin a second, as a free top does in air." in meaning(analysis)[0]
+    assert "It loses 0.3446(7) % of its spin a second, as a free top does in air." in meaning(analysis)[0]
     alone = Series(series.time[1:2], series.frequency[1:2], series.u[1:2])  # of 0.4 s
     (text,) = meaning(replace(analysis, runs=(replace(analysis.runs[0], series=alone),)))
     assert "In 0.38 s no change of its spin shows beyond the uncertainty: it loses or gains less than" in text
@@ -332,23 +329,6 @@ def test_records_that_scatter_by_more_than_their_u_are_of_a_spin_that_swings(sam
     assert "scatter" not in meaning(coasts)[0]
 
 
-@pytest.mark.parametrize("law", ["stokes", "disc", "newton", ""])
-def test_records_of_a_top_that_coasts_or_is_ramped_lie_on_a_curve(law, sample_data):
-    """The slope in the middle has the right u under a drag with any exponent; an even ramp is no swing."""
-    time, u, rng = np.linspace(0, 60, 13), np.full(13, 0.03), np.random.default_rng(11)
-    curve = 32 - 0.16 * time
-    if law:
-        curve = spin_under_drag(law, time, 32.0, 0.16 / 32 * (2 * math.pi * 32) ** (1 - LAWS[law].exponent))
-    (coasts,) = SPIN.analyze([sample_data / "trace-tape"]).runs
-    runs = [replace(coasts, series=Series(time, curve + rng.normal(0, u), u)) for _ in range(60)]
-    assert np.median([run.swing[1] for run in runs]) < 1.5
-    if law:
-        middle = np.polynomial.Polynomial.fit(time - 30.0, curve, 6).convert().coef[1]
-        pulls = [(run.trend.value - middle) / run.trend.u for run in runs]
-        assert abs(np.mean(pulls)) < 0.5
-        assert 0.6 < np.std(pulls) < 1.2
-
-
 def test_the_frequencies_of_a_mock_run_scatter_about_the_disc_law_as_u_says(tmp_path):
     """ν^(-1/2) falls on a straight line in time: dν/dt = -c ν^(3/2).
 
@@ -377,7 +357,7 @@ def test_of_several_records_it_is_said_which_the_numbers_are_of(sample_data):
     assert "28.111(31) Hz at 20.322 s, record 3 of 5. Its slope through all records is −0.0870(8) Hz/s." in found.text
     part = spin_part(found)
     assert part.lead == "5 records used"
-    assert "It loses 0.3094(27) % of its spin a second" in part.result[0].text
+    assert "It loses 0.3094(28) % of its spin a second" in part.result[0].text
     assert next(iter(found.about_run(run))).startswith(
         "in all 5 records, as in record 1: the pulses come early or late"
     )
