@@ -347,7 +347,7 @@ def _offered_columns(
         if _counts_turns(title):
             known = COMPANIONS.get(title.column, title.column) in totals or title.column not in {*offered, *COMPANIONS}
             totals |= {title.column} if known else set()
-        if not known and plain_unit(title.unit or "") in FOREIGN:
+        if not known and title.column == "time_s" and plain_unit(title.unit or "") in FOREIGN:
             continue  # T/°C is a temperature
         if not known and not _is_of_a_period(title, titles):
             warnings.append(_unknown_unit(path, header[index], title))

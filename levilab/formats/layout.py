@@ -36,8 +36,6 @@ ALIGNED = Dialect("\t", ".")  # of a text that was written from cells
 CONTROL = re.compile("[\x00-\x08\x0e-\x19]")  # DOS may end a text with 0x1a
 #: Part of the lines of a text that a starting micro-controller or a loose plug may have filled with other bytes.
 _MOST_NOISE = 0.2
-#: Whole numbers of a column that seldom increase all by chance: such are times.
-_FEWEST_TIMES = 5
 EXPORT = "a table of text is expected: export it as CSV"
 
 
@@ -303,11 +301,8 @@ def _spread(header: tuple[str, ...], below: Sequence[Line]) -> tuple[tuple[str, 
 
 
 def _may_be_one_column(rows: Sequence[Line], dialect: Dialect, width: int) -> bool:
-    """Return whether two columns, as 21,7, may be one with decimal commas: no points, and no times in the first."""
-    if width != 2 or dialect.separator != "," or any("." in "".join(row.fields) for row in rows):
-        return False
-    first = [dialect.value(row.fields[0]) for row in rows if row.kinds[0] == "number"]
-    return len(first) < _FEWEST_TIMES or not all(before < after for before, after in pairwise(first))
+    """Return whether two columns, as 21,7, may be one with decimal commas: no number has a point."""
+    return width == 2 and dialect.separator == "," and not any("." in "".join(row.fields) for row in rows)
 
 
 def _other_titles(above: list[str], width: int) -> int:

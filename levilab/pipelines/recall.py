@@ -46,7 +46,7 @@ def recall_suiting(
     if skipped and skipped.errors and not done:
         raise skipped.errors[0]
     done.sort(key=lambda one: [*catalogue.ANALYSES].index(one[0].name))
-    if skipped:
+    if skipped and done:
         first, found = done[0]
         done[0] = first, replace(found, unread=(*found.unread, *skipped.unread))
     return done

@@ -129,7 +129,7 @@ def known_top(
     missing = [*missing, *([] if magnet else ["magnet"])]
     covariance = made.covariance if made else None
     top = KnownTop(transverse, axial, moment, mass, height, device.gravity_m_s2, covariance, magnet)
-    return top, () if source.synthetic else tuple(missing)
+    return top, () if source.synthetic and options.device is None else tuple(missing)
 
 
 def inertias(table: TopTable) -> tuple[Estimate, Estimate, list[str]]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
 from collections import Counter
 from dataclasses import replace
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -56,11 +56,12 @@ from levilab.report.groups.sheet import class_workbook
 from levilab.report.page import FORMATS, UnknownFormat, newest_of, write_content, writing_report
 from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
+from levilab.runs.find import RECORD
 from levilab.texts.note import of_file
 from levilab.texts.text import Sentences, Text, spoken, verbatim
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from analysis.uncertainty import Estimate
     from levilab.pipelines.document import Analysis
@@ -128,26 +129,29 @@ def _left_out(results: Results, told: Sequence[Skipped]) -> tuple[dict[Path, str
     return {path: unread[path] for path in sorted(unread) if path not in used | left_out_paths}, about
 
 
-def _in_folders_of_groups(results: Results, root: Path) -> Results:
-    """Return results whose inputs that say no group have that of their folder, as Anna/readings.csv."""
+def _with_folders_as_groups(results: Results, folder_of: Callable[[Path], str]) -> Results:
+    """Return results whose files have the group of their folder, as Anna/readings.csv."""
     done = []
     for analysis, found in results:
-        sources = [one if one.group else replace(one, folder=_folder(one.path, root)) for one in found.sources]
+        sources = [one if one.run else replace(one, folder=folder_of(one.path)) for one in found.sources]
         named = with_short_names(sources) if any(one.folder for one in sources) else found.sources
         done.append((analysis, replace(found, sources=named)))
     return done
 
 
-def _folder(path: Path, root: Path) -> str:
-    """Return the folder below the root in which an input lies; empty where it lies in the root, or elsewhere."""
-    file, root = locate(path)[0].resolve(), root.resolve()
-    parts = file.relative_to(root).parts if file.is_relative_to(root) else ()
-    return parts[0] if len(parts) > 1 else ""
+def _folders_of_groups(results: Results, unread: Iterable[Path]) -> Callable[[Path], str]:
+    """Return the function file → its folder below the deepest one that holds all files; empty where it lies in that."""
+    used = (one.path for _, found in results for one in found.sources if not one.run)
+    files = {path: locate(path)[0].resolve() for path in (*used, *unread)}
+    folders = {path: file.parent.parts for path, file in files.items() if not (file / RECORD).exists()}
+    common = takewhile(lambda parts: len({*parts}) == 1, zip(*folders.values(), strict=False))
+    depth = len([*common])
+    return lambda path: "".join(folders.get(path, ())[depth : depth + 1])
 
 
-def _names_of_unread(paths: Sequence[Path], results: Results, root: Path) -> list[str]:
+def _names_of_unread(paths: Sequence[Path], results: Results, folder_of: Callable[[Path], str]) -> list[str]:
     """Return names of inputs that could not be used: the folder of a group that has no other one, or a short path."""
-    folders = [_folder(path, root) for path in paths]
+    folders = [*map(folder_of, paths)]
     known = Counter([*folders, *(source.group for _, found in results for source in found.sources)])
     names = [
         folder if folder and known[folder] == 1 else ", ".join(filter(None, [folder, path.name]))
@@ -350,13 +354,15 @@ def write_class(
     with writing_report(output):
         check_writable(output)
     told: list[Skipped] = []
-    root = paths[0] if len(paths) == 1 else Path(os.path.commonpath([path.resolve() for path in paths]))
-    recalled = recall_suiting(paths, given or {}, told.append, skips=True)
-    results = _in_folders_of_groups(_each_reading_once(recalled), root)
+    results = _each_reading_once(recall_suiting(paths, given or {}, told.append, skips=True))
+    unread, others = _left_out(results, told)
+    folder_of = _folders_of_groups(results, unread)
+    results = _with_folders_as_groups(results, folder_of)
     classes = [class_of(analysis, found) for analysis, found in results]
     classes.sort(key=lambda of: -len(of.groups))  # what one group alone measured comes last
-    unread, others = _left_out(results, told)
-    of_inputs = dict(zip(_names_of_unread([*unread], results, root), map(plain_text, unread.values()), strict=True))
+    of_inputs = dict(
+        zip(_names_of_unread([*unread], results, folder_of), map(plain_text, unread.values()), strict=True)
+    )
     classes[0] = replace(classes[0], unread=of_inputs)
     date = newest_of(results)
     if form:

@@ -472,3 +472,10 @@ def test_u_of_few_readings_with_a_tilt_is_no_smaller_than_their_noise(n, largest
         noisy = spin("disc", time, 40.0, 2.34e-4) + rng.normal(0, SIGMA, n)
         start = spin_down_fit.fit_spin_down(time, noisy, laws=["disc"]).fit("disc").parameters["start_frequency"]
         assert abs(start.value - 40.0) < largest * start.u
+
+
+def test_a_law_is_never_excluded_for_the_number_of_its_constants():
+    """Six readings: AICc charges a third constant 15; power fits as well as the disc that it contains."""
+    time = np.linspace(0, 190, 6)
+    for seed in range(5):
+        assert "power" not in fit_spin_down(time, readings(time=time, seed=seed)).verdict.excluded

@@ -5,6 +5,7 @@ from typer.testing import CliRunner
 
 from levilab.cli.later import Later
 from levilab.cli.main import app
+from support.commands import command
 
 
 def test_the_first_help_lists_every_command_and_makes_none(monkeypatch):
@@ -23,3 +24,13 @@ def test_a_command_has_the_texts_of_its_stand_in_and_the_options_of_its_function
     assert {"paths", "out", "columns"} <= {one.name for one in stand_in.command.params}
     assert stand_in.command.help.split() == stand_in.help.split()
     assert stand_in.command.epilog == "Example: levilab report sample_data/ -o report.html, or -o report.pdf --tables"
+
+
+def test_a_misspelt_command_below_a_stand_in_gets_its_suggestion(tmp_path):
+    assert "Did you mean 'spin'?" in command("acquire", "spni", cwd=tmp_path).err
+
+
+def test_a_wrong_value_is_refused_in_plain_words(tmp_path):
+    said = command("bench", "serve", "--speed", "fast", cwd=tmp_path).err
+    assert "'--speed': 'fast': a number is expected" in said
+    assert "Input should" not in said

@@ -312,7 +312,7 @@ def test_a_table_that_holds_no_samples_says_what_to_do():
 
 
 def test_text_above_numbers_without_titles_is_skipped(write):
-    file = write("counter v1\nready\n1000,38\n31000,34\n61000,31\n121000,26\n181000,22\n", "log.txt")
+    file = write("counter v1\nready\n1000,38.0\n31000,34.0\n61000,31.0\n121000,26.0\n181000,22.0\n", "log.txt")
     (run,) = understand(file).runs
     choice = run.doubts[0].choices[0]  # the first answer suffices
     assert (choice.text, choice.columns) == ("ms (3 min)", {"t": "1 [ms]", "f": "2"})

@@ -258,6 +258,7 @@ def test_the_report_says_what_it_had_to_analyze(run, tmp_path):
 def test_a_report_of_a_data_file_knows_no_instrument_and_says_so(tmp_path):
     parsed = Page(render(SPINDOWN.analyze([spin_down_csv(tmp_path / "my.csv")], SpinDownOptions(tilt="none"))))
     assert "my.csv" in parsed.text
+    assert "The moment of the top is taken to lie along its axis" in parsed.text
     assert "no instruments recorded" in parsed.text
     assert "SYNTHETIC" not in parsed.text
 

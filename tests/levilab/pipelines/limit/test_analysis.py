@@ -204,6 +204,12 @@ def test_a_column_of_limits_alone_is_enough(tmp_path, text, request):
     assert (group.which, group.statistics.n) == ("lower", 3)
 
 
+def test_limits_that_grow_under_an_unknown_title_are_no_table_of_times(tmp_path):
+    (tmp_path / "my.csv").write_text("Grenze\n21,7\n22,4\n23,9\n24,1\n25,2\n26,1\n", encoding="utf-8")
+    (group,) = LIMIT.analyze([tmp_path / "my.csv"]).groups
+    assert (group.which, group.statistics.n, round(group.statistics.mean.value, 1)) == ("lower", 6, 23.9)
+
+
 @pytest.mark.parametrize("text", ["time [s]\n21.7\n21.4\n", "21.7\nhigh\n21.9\n", "height [mm]\n21.7\n"])
 def test_another_column_is_no_limit(tmp_path, text):
     file = tmp_path / "my.csv"

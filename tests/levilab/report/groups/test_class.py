@@ -104,11 +104,20 @@ def test_a_folder_is_the_group_of_its_files(tmp_path):
         spin_down_csv(folder / "readings.csv", seed=seed)
     shutil.copy(SAMPLE_DATA / "student-files" / "runs-under-one-time.csv", folders[1] / "readings.csv")
     (folders[2] / "readings.csv").write_text("t [s],f [Hz]\n0,38\n10,37.2\n20,3x.5\n30,35\n", encoding="utf-8")
-    for paths in ([tmp_path / "class"], folders):
+    for paths in ([tmp_path], [tmp_path / "class"], folders):
         page = Page(write_class(paths, tmp_path / "class.html").read_text(encoding="utf-8")).text
         assert re.search(r"Class of 3 groups.*To repeat: Carl", page, re.DOTALL)
         assert all(name in page for name in ("Anna", "Ben, ", "Dora"))
         assert "readings.csv," not in page.split("Made by")[0].replace("readings.csv, line", "")
+
+
+def test_files_of_one_folder_and_runs_of_no_group_are_each_by_itself(tmp_path):
+    """The folder that holds all of them is no group."""
+    for name in ("anna", "ben"):
+        spin_down_csv(tmp_path / f"{name}.csv", seed=len(name))
+        shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / name)
+    page = Page(write_class([tmp_path], tmp_path / "class.html").read_text(encoding="utf-8")).text
+    assert "Class of 3 runs" in page  # one of the two copies
 
 
 def test_a_run_given_twice_is_named(of_three, tmp_path):
