@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.arrays import Array
 from analysis.errors import ShapesDiffer, TooFewReadings
@@ -128,11 +129,13 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
     heights = np.array([known.height(one, nu) for one, nu in each])
     placed = [(one, nu, z) for (one, nu), z in zip(each, heights.tolist(), strict=True)]
     around = np.array([_shift(*one, known) for one in placed])
-    shifts, steps = around[:, 0], around[:, 1::2].sum(axis=2) - around[:, 2::2].sum(axis=2)
+    shifts, of_split = around[:, 0].real, around.sum(axis=2)
+    of_split.imag /= math.sqrt(3)  # the shift is anywhere within it
     small = np.array([one.frequency[:2] for one in swings]) - shifts
     seen, shift = small.sum(axis=1), np.abs(shifts.sum(axis=1))
     further = NEXT_SHIFT_U * np.array([one.size for one in swings]) ** 2 * np.abs(shifts).sum(axis=1)
-    shift_u = np.linalg.norm([SHIFT_U * shift, further, *steps.T / 2], axis=0)
+    steps = np.abs(of_split[:, 1:] - of_split[:, :1]) / math.sqrt(2)  # of one u less and more the mean square counts
+    shift_u = np.linalg.norm([SHIFT_U * shift, further, of_split[:, 0].imag, *steps.T], axis=0)
     leans = np.array([_lean(*one, known) for one in placed])
     value, half = REFERENCE_HZ * float(np.mean(seen / spin)), np.empty(0)
     for _ in range(_ROUNDS):  # Ω_g is the split but for some percent, which hardly depend on it
@@ -276,11 +279,12 @@ def _split(share: float, spin: float, small: Array, known: Known) -> tuple[float
     return sum(slow), half
 
 
-def _shift(swings: Swings, spin: float, height: float, known: Known) -> Array:
+def _shift(swings: Swings, spin: float, height: float, known: Known) -> NDArray[np.complex128]:
     """Return by how much finite amplitude shifts the slow swings, of a point in the mean field of the magnet [Hz].
 
     Each swing and the line beside it, at the other swing ± the vertical one, push each other apart.  In the steady
     motion there is no such line: that part of its shift is replaced by the one that belongs to the distance as seen.
+    Lines nearer than any push leaves them have an imaginary one without it: within that part the shift is unknown.
     The rows, shape (5, 2), after the first are those with this distance, then with the amplitudes, one u less and more.
     """
     top = replace(known.top_at(height), stiffnesses=None)
@@ -292,9 +296,10 @@ def _shift(swings: Swings, spin: float, height: float, known: Known) -> Array:
     beat, vertical = float(swings.frequency[1] - swings.frequency[0]), swings.vertical.value
     apart = beat - vertical + math.hypot(APART_U_HZ, swings.vertical.u) * np.array([[0], [-1], [1], [0], [0]])
     squares = np.exp(2 * swings.size_u * np.array([[0], [0], [0], [-1], [1]]))
-    before = np.sqrt(np.maximum(apart**2 - 4 * squares * pump / (beat + vertical), 0.0))
+    least = 2 * np.sqrt(squares * pump / (beat + vertical) + 0j)
+    before = np.sqrt(apart - least) * np.sqrt(apart + least)  # of the sign of `apart`
     sense = np.array([-1.0, 1.0])
-    return np.asarray(squares * (moving - still - sense * steady) + sense * np.sign(apart) * (abs(apart) - before) / 2)
+    return np.asarray(squares * (moving - still - sense * steady) + sense * (apart - before) / 2)
 
 
 def _lean(swings: Swings, spin: float, height: float, known: Known) -> float:

@@ -365,6 +365,16 @@ def test_a_shift_near_the_vertical_swing_has_the_u_by_which_distance_and_size_mo
     assert abs(near) > 0.4 * np.linalg.norm(own)
 
 
+@pytest.mark.parametrize("vertical", [1.28, 1.36])  # one pair of lines nearer than it can be, and both
+def test_where_lines_coalesce_u_is_as_large_as_what_is_unknown(vertical):
+    def found(vertical):
+        one = replace(lines((-0.59, 0.77)), amplitude=np.array([3e-4, 6e-4]), vertical=Vertical(vertical, 0.0))
+        return geometric_magnetism([one], np.array([30.0]), known(0.02526)).measured
+
+    spread = np.ptp([found(other).value for other in np.arange(1.27, 1.401, 0.01)])
+    assert found(vertical).u > spread / 3  # of a rectangle as wide as the spread, u is 0.29 of it
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("duration", "rate"), [(4.0, 120.0), (4.0, 240.0), (8.0, 240.0)])
 def test_of_short_tracks_the_mistake_of_a_line_is_in_u(fresh, duration, rate):
