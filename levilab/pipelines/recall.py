@@ -1,7 +1,7 @@
 """Results that were written before, each for the inputs that it suits; other inputs are analyzed."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -35,7 +35,7 @@ def recall_suiting(
         tell: called with the reason why no analysis can use a file or a run in a folder.
         skips: whether an input that cannot be used is skipped with a note, as long as there is another one.
     """
-    skipped = Skips() if skips else None
+    skipped = Skips(skips)
     places, written = _split(paths)
     shares = _without_shared_inputs(written, [*_results_of(places)])
     names = _names_of_results(shares)
@@ -43,10 +43,10 @@ def recall_suiting(
     for k, results in enumerate(shares):
         recalled = _recall(places if k == 0 else [], results, given, tell, skipped)
         done += [(analysis, _with_names_of_results(analysis, found, results, names)) for analysis, found in recalled]
-    if skipped and skipped.errors and not done:
+    if skipped.errors and not done:
         raise skipped.errors[0]
     done.sort(key=lambda one: [*catalogue.ANALYSES].index(one[0].name))
-    if skipped and done:
+    if skipped.unread:
         first, found = done[0]
         done[0] = first, replace(found, unread=(*found.unread, *skipped.unread))
     return done
@@ -57,9 +57,9 @@ def _recall(
     written: Sequence[Written],
     given: Mapping[str, Any],
     tell: Tell | None,
-    skips: Skips | None,
+    skips: Skips,
 ) -> list[tuple[Analysis[Any], Any]]:
-    """Read or make the results of inputs; skips: where those go that are skipped; None: none is."""
+    """Read or make the results of inputs; skips: where those go that are skipped."""
     own = {name: [one for one in written if one.analysis == name] for name in catalogue.ANALYSES}
     archives: dict[str, Archive[Any]] = {}
 
@@ -82,7 +82,7 @@ def _recall(
         try:
             return read()
         except ResultError:
-            if skips is None:
+            if not skips.allowed:
                 raise
             return otherwise
 
@@ -96,8 +96,8 @@ def _recall(
     done = []
     for one in suiting_of(places, options, choose, tell, results, skips=skips):
         chosen, archive = one.analysis.options_from(given), archives[one.analysis.name]
-        with skips.over(one.found.sources[0].path, one.found.unread) if skips else nullcontext():
-            found = one.analysis.recall_found(one.paths, one.found, archive, chosen, skips=skips is not None)
+        with skips.over(one.found.sources[0].path, one.found.unread):
+            found = one.analysis.recall_found(one.paths, one.found, archive, chosen, skips=skips.allowed)
             done.append((one.analysis, found))
     return done
 

@@ -8,7 +8,7 @@ inputs without one its input is for their analyses, too, or it would be missing 
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -41,8 +41,13 @@ Choose = Callable[[Sequence[Taken]], list[Collection[str]]]
 
 @dataclass(frozen=True)
 class Skips:
-    """Inputs that cannot be used, and the errors that say why."""
+    """Inputs that cannot be used, and the errors that say why.
 
+    Attributes:
+        allowed: whether they are skipped; else the first error is raised.
+    """
+
+    allowed: bool = False
     unread: list[Skipped] = field(default_factory=list)
     errors: list[DataError] = field(default_factory=list)
 
@@ -52,6 +57,8 @@ class Skips:
         try:
             yield
         except DataError as error:
+            if not self.allowed:
+                raise
             own = error.unread if isinstance(error, NoneUsable) else ()
             self.unread.extend((*unread, *(own or [Skipped(text_of(error), path=path)])))
             self.errors.append(error)
@@ -89,7 +96,8 @@ def suiting(paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None =
         chosen = analysis.options_from(given)
         return lambda _: chosen
 
-    return suiting_of([find_run(path) for path in paths], options, lambda inputs: [*map(made_for, inputs)], tell)
+    places = [find_run(path) for path in paths]
+    return suiting_of(places, options, lambda inputs: [*map(made_for, inputs)], tell, skips=Skips())
 
 
 def analyze_suiting(
@@ -125,7 +133,7 @@ def suiting_of(
     tell: Tell | None,
     more: Mapping[str, Sequence[Path]] | None = None,
     *,
-    skips: Skips | None = None,
+    skips: Skips,
 ) -> list[Suiting]:
     """Return the analyses with the inputs that they take.
 
@@ -135,7 +143,7 @@ def suiting_of(
         choose: which of them each input gets.
         tell: see `suiting`.
         more: analysis → paths that are for it alone.
-        skips: where the paths that are skipped go; None: no path is skipped.
+        skips: where the paths that are skipped go.
     """
     rows = catalogue.ANALYSES
     readers = {name: options(row) for name, row in rows.items()}
@@ -143,7 +151,7 @@ def suiting_of(
     unusable: dict[Skipped, None] = {}
     looks: list[tuple[Path, dict[str, Found[Any]]]] = []
     for path in paths:
-        with skips.over(path) if skips else nullcontext():
+        with skips.over(path):
             found, errors = _look(path, readers)
             if not found:
                 raise _refusal(path, errors)
@@ -154,7 +162,7 @@ def suiting_of(
         taken[name].append((path, one))
     for name, inputs in (more or {}).items():
         for path in inputs:
-            with skips.over(path) if skips else nullcontext():
+            with skips.over(path):
                 taken[name].append((path, find(path, rows[name], readers[name])))
     done = [
         Suiting(rows[name], tuple(path for path, _ in those), join([one for _, one in those]))

@@ -66,7 +66,7 @@ def headline(figure: Figure, text: str, synthetic: str = "") -> None:
 
 
 def _in_two_lines(text: str, most: int) -> list[str]:
-    """Return a text in one line of so many letters, or in two that are about as long as each other.
+    """Return a text in one line of at most `most` letters, or in two lines of about the same length.
 
     >>> _in_two_lines("Spin-down: the mixed law is the best; Newton is excluded", 50)
     ['Spin-down: the mixed law is', 'the best; Newton is excluded']

@@ -66,7 +66,7 @@ class Needs(Generic[R]):
         data: the file of a run that the readings come from.
         also: whether a run of any experiment suits.
         particular: whether it reads files by columns that no other analysis reads, so that such a file is made for it.
-        wanted: such runs in words, where the experiment says too little.
+        wanted: a phrase that names such runs, where the experiment says too little.
     """
 
     name: str
@@ -80,7 +80,7 @@ class Needs(Generic[R]):
 
     @property
     def runs(self) -> str:
-        """Which runs suit, in words."""
+        """The phrase that names the runs which suit."""
         return self.wanted or f"{' or '.join(sorted(self.experiments))} run"
 
     def take(self, run: Run) -> bool:
@@ -125,7 +125,7 @@ class Source(Generic[R]):
 
     @property
     def synthetic(self) -> bool:
-        """Whether any of it is known to be simulated or made up."""
+        """Whether any of it is known to be synthetic."""
         return bool(self.run and self.run.record.synthetic)
 
     def settings(self, experiment: str) -> dict[str, Any]:
