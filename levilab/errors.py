@@ -1,7 +1,7 @@
 """Failures that a user can mend: each is one line, never a traceback."""
 
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any
 
@@ -94,18 +94,6 @@ class DoesNotSuit(DataError):
 
 class DoubtWarning(UserWarning):
     """A doubt that makes numbers worthless where it is right, as `doubts` of a result; or a setting without effect."""
-
-
-class NoneUsable(DataError):
-    """Inputs, or a folder, without anything that an analysis can use.
-
-    Attributes:
-        unread: its inputs (`levilab.pipelines.inputs.unread.Skipped`).
-    """
-
-    def __init__(self, text: str, *in_order: Any, unread: Sequence[Any] = ()) -> None:
-        self.unread = tuple(unread)
-        super().__init__(text, *in_order)
 
 
 class NoInstrument(LevilabError):

@@ -12,13 +12,12 @@ from levilab.cli.later import Later, NamedLast
 from levilab.cli.options import Json, Language, Paths, existing_path, flag, folder, number, option, place
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
-from levilab.errors import DoesNotSuit, LevilabError, NoneUsable, UsageError, as_typed
+from levilab.errors import DataError, DoesNotSuit, LevilabError, UsageError, as_typed
 from levilab.pipelines.options import DEFAULTS, KINDS, OPTIONS, Option, options_of, read_options, typed_name
 from levilab.texts.text import Text, how_many, text_of
 
 if TYPE_CHECKING:
     from levilab.pipelines.document import Analysis
-    from levilab.pipelines.inputs.unread import Skipped
     from levilab.pipelines.many.table import Tally
 
 
@@ -160,16 +159,15 @@ def _analyze(
     from levilab.pipelines.catalogue import ANALYSES
     from levilab.pipelines.suits import analyze_suiting
 
-    left_out: list[Skipped] = []
     with interruptible("what was fitted so far is lost, nothing is written"):
         _advise_on_many(paths)
         if kind == _EACH:
-            results = analyze_suiting(paths, given, left_out.append)
+            results = analyze_suiting(paths, given)
         else:
             analysis = ANALYSES[kind]
             results = [(analysis, _analyze_as(analysis, paths, given))]
     with interruptible("look which results are written: each one is whole"):
-        write_and_print(results, left_out, save=save, out=out, as_json=as_json)
+        write_and_print(results, save=save, out=out, as_json=as_json)
 
 
 def _advise_on_many(paths: Sequence[Path]) -> None:
@@ -229,7 +227,7 @@ def _tabulate(
 
 
 def _print_tally(tally: "Tally", table: Path, *, as_json: bool) -> None:
-    """Print where the table is and which inputs are not in it.  Raises NoneUsable where nothing was analyzed."""
+    """Print where the table is and which inputs are not in it.  Raises DataError where nothing was analyzed."""
     for path, problem in tally.failures:
         named = problem if PurePath(path).name in problem else f"{path}: {problem}"
         message(f"failed: {named}")
@@ -249,7 +247,7 @@ def _print_tally(tally: "Tally", table: Path, *, as_json: bool) -> None:
         kept = f", {tally.kept} of them of an earlier call" if tally.kept else ""
         result(f"the table of {how_many(tally.rows, 'run')} is in {table}{kept}; {tally.failed} could not be analyzed")
     if tally.failed and tally.failed == tally.rows:
-        raise NoneUsable(f"none of {how_many(tally.rows, 'run')} could be analyzed; their problems stand in {table}")
+        raise DataError(f"none of {how_many(tally.rows, 'run')} could be analyzed; their problems stand in {table}")
 
 
 def _analyze_as(analysis: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, Any]) -> Any:
@@ -293,32 +291,26 @@ def _advice(tried: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, A
 
 def write_and_print(
     results: list[tuple["Analysis[Any]", Any]],
-    left_out: Sequence["Skipped"],
     *,
     save: bool,
     out: Path | None,
     as_json: bool,
     tables: bool = True,
 ) -> None:
-    """Write the results before printing them: a closed pipe must not cost a result.
-
-    left_out: why other analyses have no result; tables: whether tables are printed.
-    """
+    """Write the results before printing them, and tables if asked: a closed pipe must not cost a result."""
     from levilab.pipelines.catalogue import print_analysis
-    from levilab.pipelines.inputs.unread import LeftOut, left_out_of, remarks, texts_of
+    from levilab.pipelines.inputs.unread import left_out_of, noted, skipped_by_all, texts_of
 
     failures: list[LevilabError] = []
-    named = {one.path for one in left_out}
-    said = remarks([found.remarks for _, found in results])
-    said = [one for one in said if not (isinstance(one, LeftOut) and one.path in named)]
-    messages = [*(one.note for one in left_out), *texts_of(said)]
+    skipped = skipped_by_all([found.skipped for _, found in results])
+    messages = texts_of([one for one in skipped if not noted(one)])
     for analysis, found in results:
         if save:
             failure, written = _save(analysis, found, out)
             failures += [failure] if failure else []
             messages += [Text("wrote {path:s}", path=str(path)) for path in written]
     if as_json:
-        more = {"left_out": left_out_of(said)} if left_out_of(said) else {}
+        more = {"left_out": left_out_of(skipped)} if left_out_of(skipped) else {}
         documents = [analysis.document(found, out or found.output_folder) | more for analysis, found in results]
         print_json(documents[0] if len(documents) == 1 else documents, sort_keys=True)
     else:

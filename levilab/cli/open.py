@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 from levilab.cli.analyze import takes_options, write_and_print
 from levilab.cli.options import Json, PageLanguage, argument, existing_paths, flag, place
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
-from levilab.errors import NoneUsable, UsageError, as_typed
+from levilab.errors import DataError, UsageError, as_typed
 from levilab.pipelines.options import OF_FILES, read_options
 from levilab.texts.text import Text, in_language, verbatim
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from levilab.formats.understanding import UnderstoodColumn, UnderstoodRun
-    from levilab.pipelines.inputs.unread import Skipped
     from levilab.pipelines.look import Look
 
 #: First values of a column that the terminal shows.
@@ -68,20 +67,19 @@ def open_files(
         _report(readable, options, out)
 
 
-def _refusal(look: "Look") -> NoneUsable:
+def _refusal(look: "Look") -> DataError:
     if any(run.doubts for run in look.runs):
-        return NoneUsable("{path:s}: is not read before the question is answered, by `columns`", look.path)
+        return DataError("{path:s}: is not read before the question is answered, by `columns`", look.path)
     named = str(look.path) in look.problem
-    return NoneUsable(look.problem) if named else NoneUsable("{path:s}: {what}", look.path, look.problem)
+    return DataError(look.problem) if named else DataError("{path:s}: {what}", look.path, look.problem)
 
 
 def _analyze(paths: "Sequence[Path]", options: "Mapping[str, Any]") -> None:
     from levilab.pipelines.suits import analyze_suiting
 
-    left_out: list[Skipped] = []
     with interruptible("nothing is shown"):
-        results = analyze_suiting(paths, options, left_out.append)
-    write_and_print(results, left_out, save=False, out=None, as_json=False, tables=False)
+        results = analyze_suiting(paths, options)
+    write_and_print(results, save=False, out=None, as_json=False, tables=False)
     text = "all numbers, and a figure beside the file: levilab analyze {paths:s}{same}"
     message(Text(text, paths=" ".join(map(as_typed, paths)), same=" with the same options" if options else ""))
 

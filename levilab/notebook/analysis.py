@@ -27,6 +27,7 @@ from levilab.notebook.frame import (
 from levilab.notebook.result import AnalysisResult
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.document import Analysis, refuse_columns_of_runs
+from levilab.pipelines.inputs.unread import Skipped
 from levilab.pipelines.options import read_options
 from levilab.pipelines.suits import Suiting, suiting
 from levilab.present.numbers import list_in_words
@@ -122,8 +123,10 @@ def _of_frames(result: AnalysisResult, folder: Path, called: str, in_words: Call
             own = replace(own, name=f"{called} {source.path.stem.removeprefix(FRAME)}".strip())
         sources.append(own)
     warnings = tuple(reword(text, in_words(text)) for text in result.found.warnings)
-    unread = tuple(replace(one, reason=in_words(one.reason)) for one in result.found.unread)
-    found = replace(result.found, sources=tuple(sources), warnings=warnings, unread=unread)
+    skipped = tuple(
+        replace(one, reason=in_words(one.reason)) if isinstance(one, Skipped) else one for one in result.found.skipped
+    )
+    found = replace(result.found, sources=tuple(sources), warnings=warnings, skipped=skipped)
     return AnalysisResult(result.analysis, found, tuple(copies))
 
 

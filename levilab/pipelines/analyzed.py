@@ -7,7 +7,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from analysis.budget import Budget
 from levilab.pipelines.inputs.source import Readings, Source
-from levilab.pipelines.inputs.unread import NotTaken, Skipped
+from levilab.pipelines.inputs.unread import NotTaken, noted
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.result import Place
 from levilab.texts.note import Note, is_doubt, kind_of, reword
@@ -50,8 +50,7 @@ class Analyzed(Generic[S, R, T, Opt]):
         options: how they were analyzed.
         place: where the result belongs.
         warnings: about the inputs.
-        remarks: what does not belong to the analysis, and is no cause for a warning.
-        unread: inputs that cannot be used.
+        skipped: runs and files that the analysis does not take.
         origins: one per source.
         budget: what the uncertainties of the numbers of all together are made of; empty where that is not known.
     """
@@ -62,8 +61,7 @@ class Analyzed(Generic[S, R, T, Opt]):
     options: Opt
     place: Place
     warnings: tuple[str, ...]
-    remarks: tuple[NotTaken, ...]
-    unread: tuple[Skipped, ...]
+    skipped: tuple[NotTaken, ...]
     origins: tuple[Origin[Opt], ...]
     budget: tuple[Budget, ...] = ()
 
@@ -102,7 +100,7 @@ class Analyzed(Generic[S, R, T, Opt]):
     @property
     def all_warnings(self) -> list[str]:
         """Every warning once, doubts first; an input's with its name, unless it says it or is of every input."""
-        texts = [*(one.note for one in self.unread), *self.warnings, *self.about_all()]
+        texts = [*(one.note for one in self.skipped if noted(one)), *self.warnings, *self.about_all()]
         of_runs = [
             [*source.warnings, *(() if source.readings.doubtful else self.about_run(run))]
             for source, run in zip(self.sources, self.runs, strict=True)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Generic, Literal, TypeAlias, g
 from pydantic import BeforeValidator, Field, PlainSerializer, create_model
 
 from analysis.errors import AnalysisError
-from levilab.errors import DataError, NoneUsable, UsageError, unquote
+from levilab.errors import DataError, UsageError, unquote
 from levilab.files import finite
 from levilab.formats.device import Device
 from levilab.pipelines.analyzed import FOR_THIS_PAGE, NOW, A, Origin
@@ -19,7 +19,7 @@ from levilab.pipelines.budget import budgets_of_result
 from levilab.pipelines.inputs.correction import read_correction
 from levilab.pipelines.inputs.search import Found, collect
 from levilab.pipelines.inputs.source import Needs, Source
-from levilab.pipelines.inputs.unread import Skipped
+from levilab.pipelines.inputs.unread import NoneUsable, Skipped
 from levilab.pipelines.options import OF_FILES, InputOptions, options_of
 from levilab.pipelines.result import (
     AGAIN,
@@ -217,8 +217,7 @@ class Analysis(Needs[Any], Generic[A]):
             options=used,
             place=place_of(paths, sources),
             warnings=(*found.warnings, *self.about_inputs(sources, used)),
-            remarks=found.remarks,
-            unread=(*found.unread, *skipped),
+            skipped=(*found.skipped, *skipped),
             origins=tuple(origins),
         )
         of_all = (origins[0].budget or ()) if len(origins) == 1 else self.budget_of_all(found_of_all)
@@ -238,8 +237,7 @@ class Analysis(Needs[Any], Generic[A]):
             except DataError as error:
                 skipped.append(Skipped(text_of(error), path=source.path))
         if not done:
-            said = Sentences(*(one.reason for one in skipped), between="; ")
-            raise NoneUsable(said, unread=skipped)
+            raise NoneUsable(Sentences(*(one.reason for one in skipped), between="; "), skipped)
         return done, skipped
 
     def about_inputs(self, sources: Sequence[Source[Any]], options: Any) -> Iterable[str]:

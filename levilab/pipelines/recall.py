@@ -1,27 +1,56 @@
 """Results that were written before, each for the inputs that it suits; other inputs are analyzed."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import replace
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from levilab.errors import DataError
 from levilab.pipelines import catalogue
 from levilab.pipelines.analyzed import A
 from levilab.pipelines.document import Analysis
 from levilab.pipelines.inputs.files import data_files
 from levilab.pipelines.inputs.names import short_paths
+from levilab.pipelines.inputs.search import find
 from levilab.pipelines.inputs.source import Source
+from levilab.pipelines.inputs.unread import NoneUsable, NotTaken, Skipped
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.result import Archive, ResultError, Written, read_inputs, results_in
-from levilab.pipelines.suits import Skips, Taken, Tell, made_for, suiting_of
+from levilab.pipelines.suits import Look, Readers, Taken, choose_inputs, look, made_for, together
 from levilab.runs.find import RECORD, find_run, find_runs
+from levilab.texts.text import text_of
 
 T = TypeVar("T")
 
 
+@dataclass(frozen=True)
+class Skips:
+    """Inputs that cannot be used, and the errors that say why.
+
+    Attributes:
+        allowed: whether they are skipped; else the first error is raised.
+    """
+
+    allowed: bool
+    skipped: list[Skipped] = field(default_factory=list)
+    errors: list[DataError] = field(default_factory=list)
+
+    @contextmanager
+    def over(self, path: Path, skipped: Sequence[NotTaken] = ()) -> Iterator[None]:
+        """Skip the inputs at a path that cannot be used, with those there that are skipped already."""
+        try:
+            yield
+        except DataError as error:
+            if not self.allowed:
+                raise
+            own = error.skipped if isinstance(error, NoneUsable) else [Skipped(text_of(error), path=path)]
+            self.skipped.extend((*(one for one in skipped if isinstance(one, Skipped)), *own))
+            self.errors.append(error)
+
+
 def recall_suiting(
-    paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None = None, *, skips: bool = False
+    paths: Sequence[Path], given: Mapping[str, Any], *, skips: bool = False
 ) -> list[tuple[Analysis[Any], Any]]:
     """Read the results of the inputs at the paths, of each analysis that has one; in the order of the catalogue.
 
@@ -32,7 +61,6 @@ def recall_suiting(
         paths: run folders, data files, folders to search, and results that lie elsewhere: their files, or a folder with
             nothing to analyze in it.
         given: options by their names, of any analysis.
-        tell: called with the reason why no analysis can use a file or a run in a folder.
         skips: whether an input that cannot be used is skipped with a note, as long as there is another one.
     """
     skipped = Skips(skips)
@@ -41,23 +69,19 @@ def recall_suiting(
     names = _names_of_results(shares)
     done = []
     for k, results in enumerate(shares):
-        recalled = _recall(places if k == 0 else [], results, given, tell, skipped)
+        recalled = _recall(places if k == 0 else [], results, given, skipped)
         done += [(analysis, _with_names_of_results(analysis, found, results, names)) for analysis, found in recalled]
     if skipped.errors and not done:
         raise skipped.errors[0]
     done.sort(key=lambda one: [*catalogue.ANALYSES].index(one[0].name))
-    if skipped.unread:
+    if skipped.skipped:
         first, found = done[0]
-        done[0] = first, replace(found, unread=(*found.unread, *skipped.unread))
+        done[0] = first, replace(found, skipped=(*found.skipped, *skipped.skipped))
     return done
 
 
 def _recall(
-    places: Sequence[Path],
-    written: Sequence[Written],
-    given: Mapping[str, Any],
-    tell: Tell | None,
-    skips: Skips,
+    places: Sequence[Path], written: Sequence[Written], given: Mapping[str, Any], skips: Skips
 ) -> list[tuple[Analysis[Any], Any]]:
     """Read or make the results of inputs; skips: where those go that are skipped."""
     own = {name: [one for one in written if one.analysis == name] for name in catalogue.ANALYSES}
@@ -92,14 +116,28 @@ def _recall(
         of_others = {name for own, suiting in each if not own for name in suiting}
         return [own | of_others.intersection(suiting) if own else suiting for own, suiting in each]
 
-    results = {name: [path for one in of for path in one.inputs] for name, of in own.items()}
+    readers = {name: options(row) for name, row in catalogue.ANALYSES.items()}
+    looks = [*choose_inputs([*_looks(places, readers, skips)], choose), *_inputs_of(own, readers, skips)]
     done = []
-    for one in suiting_of(places, options, choose, tell, results, skips=skips):
+    for one in together(looks):
         chosen, archive = one.analysis.options_from(given), archives[one.analysis.name]
-        with skips.over(one.found.sources[0].path, one.found.unread):
+        with skips.over(one.found.sources[0].path, one.found.skipped):
             found = one.analysis.recall_found(one.paths, one.found, archive, chosen, skips=skips.allowed)
             done.append((one.analysis, found))
     return done
+
+
+def _looks(places: Sequence[Path], readers: Readers, skips: Skips) -> Iterator[Look]:
+    for path in places:
+        with skips.over(path):
+            yield from look(path, readers)
+
+
+def _inputs_of(written: Mapping[str, Sequence[Written]], readers: Readers, skips: Skips) -> Iterator[Look]:
+    """Yield the inputs of the results of each analysis."""
+    for name, path in ((name, path) for name, of in written.items() for one in of for path in one.inputs):
+        with skips.over(path):
+            yield path, name, find(path, catalogue.ANALYSES[name], readers[name])
 
 
 def _results_of(places: Sequence[Path]) -> Iterator[Written]:

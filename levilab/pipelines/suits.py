@@ -7,61 +7,34 @@ inputs without one its input is for their analyses, too, or it would be missing 
 """
 
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from analysis.errors import AnalysisError
-from levilab.errors import DataError, DoesNotSuit, NoneUsable
+from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines import catalogue
 from levilab.pipelines.analyzed import A
 from levilab.pipelines.document import Analysis
 from levilab.pipelines.inputs.files import data_files
 from levilab.pipelines.inputs.search import Found, find, join
 from levilab.pipelines.inputs.source import Source
-from levilab.pipelines.inputs.unread import (
-    NothingSuits,
-    Skipped,
-    in_words,
-)
+from levilab.pipelines.inputs.unread import NoneUsable, NothingSuits, in_words
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.result import ResultError, is_of_another
 from levilab.pipelines.result import save as save_files
 from levilab.runs.find import find_run, find_runs
 from levilab.runs.run import Run
-from levilab.texts.text import how_many, text_of
+from levilab.texts.text import how_many
 
-Tell = Callable[[Skipped], None]
+#: How each analysis reads an input.
+Readers = Mapping[str, Callable[[Path], InputOptions]]
+#: What an analysis, by its name, finds at a path.
+Look = tuple[Path, str, Found[Any]]
 #: An input as each analysis takes it; and such inputs → the analyses that each of them gets.
 Taken = Mapping[str, Source[Any]]
 Choose = Callable[[Sequence[Taken]], list[Collection[str]]]
-
-
-@dataclass(frozen=True)
-class Skips:
-    """Inputs that cannot be used, and the errors that say why.
-
-    Attributes:
-        allowed: whether they are skipped; else the first error is raised.
-    """
-
-    allowed: bool = False
-    unread: list[Skipped] = field(default_factory=list)
-    errors: list[DataError] = field(default_factory=list)
-
-    @contextmanager
-    def over(self, path: Path, unread: Sequence[Skipped] = ()) -> Iterator[None]:
-        """Skip the inputs at a path that cannot be used, with those there that are unread already."""
-        try:
-            yield
-        except DataError as error:
-            if not self.allowed:
-                raise
-            own = error.unread if isinstance(error, NoneUsable) else ()
-            self.unread.extend((*unread, *(own or [Skipped(text_of(error), path=path)])))
-            self.errors.append(error)
 
 
 @dataclass(frozen=True)
@@ -79,34 +52,32 @@ class Suiting:
     found: Found[Any]
 
 
-def suiting(paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None = None) -> list[Suiting]:
+def suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> list[Suiting]:
     """Return the analyses that suit the inputs at the paths, in the order of the catalogue.
 
     Args:
         paths: run folders, data files, folders to search.
         given: options by their names, of any analysis.
-        tell: called with the reason why no analysis can use a file or a run in a folder.
 
     Raises:
         DoesNotSuit: no analysis suits one of the paths.
         DataError: one of them is damaged, so that no analysis can use it.
     """
 
-    def options(analysis: Analysis[Any]) -> Callable[[Path], InputOptions]:
+    def reader(analysis: Analysis[Any]) -> Callable[[Path], InputOptions]:
         chosen = analysis.options_from(given)
         return lambda _: chosen
 
-    places = [find_run(path) for path in paths]
-    return suiting_of(places, options, lambda inputs: [*map(made_for, inputs)], tell, skips=Skips())
+    readers = {name: reader(row) for name, row in catalogue.ANALYSES.items()}
+    looks = [one for path in paths for one in look(find_run(path), readers)]
+    return together(choose_inputs(looks, lambda inputs: [*map(made_for, inputs)]))
 
 
-def analyze_suiting(
-    paths: Sequence[Path], given: Mapping[str, Any], tell: Tell | None = None
-) -> list[tuple[Analysis[Any], Any]]:
+def analyze_suiting(paths: Sequence[Path], given: Mapping[str, Any]) -> list[tuple[Analysis[Any], Any]]:
     """Analyze the inputs at the paths by each analysis that suits; see `suiting`."""
     return [
         (one.analysis, one.analysis.analyze_found(one.paths, one.found, one.analysis.options_from(given)))
-        for one in suiting(paths, given, tell)
+        for one in suiting(paths, given)
     ]
 
 
@@ -126,76 +97,17 @@ def _of_experiment(run: Run) -> list[str]:
     return [row.name for row in catalogue.ANALYSES.values() if run.record.experiment in row.experiments]
 
 
-def suiting_of(
-    paths: Sequence[Path],
-    options: Callable[[Analysis[Any]], Callable[[Path], InputOptions]],
-    choose: Choose,
-    tell: Tell | None,
-    more: Mapping[str, Sequence[Path]] | None = None,
-    *,
-    skips: Skips,
-) -> list[Suiting]:
-    """Return the analyses with the inputs that they take.
+def look(path: Path, readers: Readers) -> list[Look]:
+    """Return what each analysis finds at a path, with the inputs there that none can use.
 
     Args:
-        paths: run folders, data files, folders to search.
-        options: an analysis → how it reads an input.
-        choose: which of them each input gets.
-        tell: see `suiting`.
-        more: analysis → paths that are for it alone.
-        skips: where the paths that are skipped go.
+        path: a run folder, a data file, a folder to search.
+        readers: analysis → how it reads an input.
+
+    Raises:
+        DoesNotSuit: no analysis finds anything.
+        DataError: what lies there is damaged.
     """
-    rows = catalogue.ANALYSES
-    readers = {name: options(row) for name, row in rows.items()}
-    taken: dict[str, list[tuple[Path, Found[Any]]]] = {name: [] for name in rows}
-    unusable: dict[Skipped, None] = {}
-    looks: list[tuple[Path, dict[str, Found[Any]]]] = []
-    for path in paths:
-        with skips.over(path):
-            found, errors = _look(path, readers)
-            if not found:
-                raise _refusal(path, errors)
-            none_usable = [error for error in errors.values() if isinstance(error, NoneUsable)]
-            unusable |= dict.fromkeys(one for error in none_usable for one in error.unread)
-            looks.append((path, found))
-    for path, name, one in _chosen(looks, choose):
-        taken[name].append((path, one))
-    for name, inputs in (more or {}).items():
-        for path in inputs:
-            with skips.over(path):
-                taken[name].append((path, find(path, rows[name], readers[name])))
-    done = [
-        Suiting(rows[name], tuple(path for path, _ in those), join([one for _, one in those]))
-        for name, those in taken.items()
-        if those
-    ]
-    known = {skipped for one in done for skipped in one.found.unread}
-    used = {source.path for one in done for source in one.found.sources}
-    for skipped in unusable:
-        if tell and skipped.path not in used and skipped not in known:
-            tell(skipped)
-    return done
-
-
-def _chosen(
-    looks: Sequence[tuple[Path, dict[str, Found[Any]]]], choose: Choose
-) -> Iterator[tuple[Path, str, Found[Any]]]:
-    """Yield what each analysis found at each path, with the inputs that it gets, where it gets any."""
-    found = [(path, name, one) for path, at in looks for name, one in at.items()]
-    inputs: dict[Path, dict[str, Source[Any]]] = {}
-    for _, name, one in found:
-        for source in one.sources:
-            inputs.setdefault(source.path, {})[name] = source
-    chosen = dict(zip(inputs, choose([*inputs.values()]), strict=True))
-    for path, name, one in found:
-        if own := tuple(source for source in one.sources if name in chosen[source.path]):
-            yield path, name, replace(one, sources=own)
-
-
-def _look(
-    path: Path, readers: Mapping[str, Callable[[Path], InputOptions]]
-) -> tuple[dict[str, Found[Any]], dict[str, DataError]]:
-    """Return what each analysis finds at a path, and why the others find nothing."""
     found: dict[str, Found[Any]] = {}
     errors: dict[str, DataError] = {}
     for name, row in catalogue.ANALYSES.items():
@@ -207,7 +119,36 @@ def _look(
             errors[name] = error
         except AnalysisError as error:
             errors[name] = DataError("{path:s}: {error}", path=path, error=error)
-    return found, errors
+    if not found:
+        raise _refusal(path, errors)
+    used = {source.path for one in found.values() for source in one.sources}
+    unusable = [one for error in errors.values() if isinstance(error, NoneUsable) for one in error.skipped]
+    skipped = [replace(one, noted=False) for one in unusable if one.path not in used]
+    return [(path, name, replace(one, skipped=(*one.skipped, *skipped))) for name, one in found.items()]
+
+
+def choose_inputs(looks: Sequence[Look], choose: Choose) -> Iterator[Look]:
+    """Yield what each analysis found at each path, with the inputs that it gets, where it gets any."""
+    inputs: dict[Path, dict[str, Source[Any]]] = {}
+    for _, name, one in looks:
+        for source in one.sources:
+            inputs.setdefault(source.path, {})[name] = source
+    chosen = dict(zip(inputs, choose([*inputs.values()]), strict=True))
+    for path, name, one in looks:
+        if own := tuple(source for source in one.sources if name in chosen[source.path]):
+            yield path, name, replace(one, sources=own)
+
+
+def together(looks: Iterable[Look]) -> list[Suiting]:
+    """Return each analysis with all that it found, in the order of the catalogue."""
+    taken: dict[str, list[tuple[Path, Found[Any]]]] = {name: [] for name in catalogue.ANALYSES}
+    for path, name, one in looks:
+        taken[name].append((path, one))
+    return [
+        Suiting(catalogue.ANALYSES[name], tuple(path for path, _ in those), join([one for _, one in those]))
+        for name, those in taken.items()
+        if those
+    ]
 
 
 def _refusal(path: Path, errors: Mapping[str, DataError]) -> DataError:

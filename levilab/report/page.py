@@ -12,12 +12,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from levilab.errors import DoesNotSuit, NoneUsable, UsageError
+from levilab.errors import DoesNotSuit, UsageError
 from levilab.files import check_writable, replace_atomically, writing
 from levilab.pipelines.analyzed import A
 from levilab.pipelines.document import Analysis
 from levilab.pipelines.inputs.files import data_files
-from levilab.pipelines.inputs.unread import SkippedRuns, remarks, texts_of
+from levilab.pipelines.inputs.unread import NoneUsable, SkippedRuns, skipped_by_all, texts_of
 from levilab.pipelines.recall import recall_suiting
 from levilab.present.clock import local
 from levilab.present.document.blocks import Document, in_language_of_reader
@@ -103,7 +103,7 @@ def write_report(
     write_content(output, content)
     if tables:
         write_tables(document, _values(results, others, folder_of(output)), folder_of(output))
-    for text in _remarks(results, others):
+    for text in _skipped(results, others):
         tell(text)
     return output
 
@@ -151,11 +151,11 @@ def _sorted_by_kind(paths: Sequence[Path]) -> tuple[Found, list[Path]]:
 def _results(paths: Sequence[Path], given: Mapping[str, Any], tell: Callable[[str], None], *, needed: bool) -> Results:
     """Return what was found of the measurements at the paths; none where there are none and none are needed."""
     try:
-        return recall_suiting(paths, given, lambda one: tell(one.note), skips=True) if paths or needed else []
+        return recall_suiting(paths, given, skips=True) if paths or needed else []
     except (DoesNotSuit, NoneUsable) as error:
         if needed:
             raise
-        for one in error.unread if isinstance(error, NoneUsable) else ():
+        for one in error.skipped if isinstance(error, NoneUsable) else ():
             tell(one.note)
         return []
 
@@ -182,12 +182,11 @@ def _values(results: Results, others: Found, folder: Path) -> Iterator[Values]:
         yield from kind.tables(places)
 
 
-def _remarks(results: Results, others: Found) -> Iterator[str]:
-    """Yield what lies there and is not in the report: inputs that cannot be used each by itself."""
-    yield from dict.fromkeys(one.note for _, found in results for one in found.unread)
+def _skipped(results: Results, others: Found) -> list[str]:
+    """Return what lies there and is not in the report: inputs that cannot be used each by itself."""
     reported = {kind.experiment for kind, _ in others}
-    said = remarks([found.remarks for _, found in results])
-    yield from texts_of([one for one in said if not (isinstance(one, SkippedRuns) and one.experiment in reported)])
+    skipped = skipped_by_all([found.skipped for _, found in results])
+    return texts_of([one for one in skipped if not (isinstance(one, SkippedRuns) and one.experiment in reported)])
 
 
 def render(results: Results) -> str:

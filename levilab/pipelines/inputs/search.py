@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Generic
 
-from levilab.errors import DataError, DoesNotSuit, NoneUsable
+from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import NoSuchColumn, TableError
 from levilab.formats.kinds import OTHER
 from levilab.formats.texts import locate
@@ -24,12 +24,14 @@ from levilab.pipelines.inputs.unread import (
     OTHER_COLUMNS,
     UNSUITABLE,
     LeftOut,
+    NoneUsable,
     NothingSuits,
     NotTaken,
     Skipped,
     SkippedRuns,
     files_by_kind,
     kind_of_unused,
+    noted,
 )
 from levilab.pipelines.options import InputOptions
 from levilab.runs.find import RECORD, find_runs, no_such_path
@@ -45,14 +47,12 @@ class Found(Generic[R]):
 
     Attributes:
         warnings: about them.
-        remarks: about what does not belong to the analysis.
-        unread: inputs that cannot be used.
+        skipped: runs and files that the analysis does not take.
     """
 
     sources: tuple[Source[R], ...]
     warnings: tuple[str, ...] = ()
-    remarks: tuple[NotTaken, ...] = ()
-    unread: tuple[Skipped, ...] = ()
+    skipped: tuple[NotTaken, ...] = ()
 
 
 def collect(paths: Sequence[Path], needs: Needs[R], options: Callable[[Path], InputOptions]) -> Found[R]:
@@ -82,9 +82,8 @@ def join(found: Sequence[Found[R]]) -> Found[R]:
     """Join what was found at several paths, the same data once, with short names."""
     warnings = [text for one in found for text in one.warnings]
     sources = _without_copies([source for one in found for source in one.sources], warnings)
-    remarks = tuple(remark for one in found for remark in one.remarks)
-    unread = tuple(skipped for one in found for skipped in one.unread)
-    return Found(with_short_names(by_group(sources)), tuple(warnings), remarks, unread)
+    skipped = tuple(skipped for one in found for skipped in one.skipped)
+    return Found(with_short_names(by_group(sources)), tuple(warnings), skipped)
 
 
 #: Logarithms of fingerprints that are alike differ by less: those of the same readings are in neighbouring cells.
@@ -201,50 +200,48 @@ def sha256_of(path: Path) -> str:
 def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]) -> Found[R]:
     """Find the runs and data files below a folder that suit; a broken or too short one is skipped with a warning."""
     found: list[Source[R]] = []
-    broken: list[Skipped] = []
-    remarks: list[NotTaken] = []
+    skipped: list[NotTaken] = []
     others: Counter[str] = Counter()
     for folder in find_runs(root):
         chosen = options(folder)
         try:
             run = Run.load(folder)
             if goes_on := run.continued_in:
-                remarks.append(Skipped(f"{folder}, which was broken off: its run goes on in {goes_on.name}"))
+                said = "{folder:s}, which was broken off: its run goes on in {name:s}"
+                skipped.append(Skipped(Text(said, str(folder), goes_on.name), noted=False))
             elif needs.take(run):
                 found.append(_of_run(run, needs, chosen))
             else:
                 others[run.record.experiment] += 1
         except DataError as error:
-            broken.append(Skipped(text_of(error), type(error).__name__, folder))
+            skipped.append(Skipped(text_of(error), type(error).__name__, folder))
     found.sort(key=_begun)
     files = data_files(root)
-    remarks += [LeftOut(file, kind_of_unused(file)) for file in other_files(root)]
+    skipped += [LeftOut(file, kind_of_unused(file)) for file in other_files(root)]
     for file in files:
-        with _skipping(file, broken, remarks):
+        with _skipping(file, skipped):
             found += _at(file, needs, lambda path: replace(options(path), guess=False))
     kinds = [SkippedRuns(kind, count) for kind, count in sorted(others.items())]
     if not found:
-        left_out = tuple(one for one in remarks if isinstance(one, LeftOut))
+        left_out, broken = [one for one in skipped if isinstance(one, LeftOut)], [*filter(noted, skipped)]
         text = Text("{path:s}: {why}", path=str(root), why=_nothing_found(needs, kinds, broken, left_out))
-        if not broken:
-            raise NothingSuits(text, left_out)
-        raise NoneUsable(text, unread=broken)
-    return Found(tuple(found), (), (*kinds, *remarks), tuple(broken))
+        raise NoneUsable(text, broken) if broken else NothingSuits(text, left_out)
+    return Found(tuple(found), (), (*kinds, *skipped))
 
 
 @contextmanager
-def _skipping(file: Path, broken: list[Skipped], remarks: list[NotTaken]) -> Iterator[None]:
+def _skipping(file: Path, skipped: list[NotTaken]) -> Iterator[None]:
     """Note what is wrong with a data file that was found in a folder, or of which kind it is."""
     try:
         yield
     except NoRate as error:
-        remarks.append(Skipped(text_of(error)))
+        skipped.append(Skipped(text_of(error), noted=False))
     except DoesNotSuit as error:
         kind = OTHER_COLUMNS if isinstance(error, NoSuchColumn) else kind_of_unused(file)
         fits = kind is OTHER_COLUMNS and not isinstance(error, TableError)
-        remarks.append(LeftOut(file, UNSUITABLE, text_of(error)) if fits else LeftOut(file, kind))
+        skipped.append(LeftOut(file, UNSUITABLE, text_of(error)) if fits else LeftOut(file, kind))
     except DataError as error:
-        broken.append(Skipped(text_of(error), type(error).__name__, file))
+        skipped.append(Skipped(text_of(error), type(error).__name__, file))
 
 
 def _nothing_found(

@@ -3,8 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeGuard
 
-from levilab.errors import DoesNotSuit
+from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.kinds import AUDIO, OTHER, Kind, kind_of
 from levilab.formats.waveforms.audio import advice_on_sound
 from levilab.formats.waveforms.record import SEARCHED
@@ -31,19 +32,19 @@ class Skipped:
         reason: why, with its path.
         kind: skipped ones of one kind are alike.
         path: of what cannot be used.
+        noted: whether the result of the analysis has a note on it.
     """
 
     reason: str
     kind: str = ""
     path: Path | None = None
-
-    def __str__(self) -> str:
-        return Text("skipped {things}", things=self.reason)
+    noted: bool = field(default=True, compare=False)
 
     @property
     def note(self) -> Note:
         """A note on it."""
-        return Note(f"skipped {self.kind}".rstrip(), str(self), names_input=True)
+        text = Text("skipped {things}", things=self.reason)
+        return Note(f"skipped {self.kind}".rstrip(), text, names_input=True)
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,21 @@ class LeftOut:
     kind: Kind = field(compare=False)
     why: str = field(default="", compare=False)
 
-    def __str__(self) -> str:
-        return in_words([self])
+
+#: What lies in a folder and is no input of an analysis.
+NotTaken = SkippedRuns | Skipped | LeftOut
+
+
+class NoneUsable(DataError):
+    """Inputs, or a folder, without anything that an analysis can use.
+
+    Attributes:
+        skipped: its inputs.
+    """
+
+    def __init__(self, text: str, skipped: Sequence[Skipped]) -> None:
+        self.skipped = skipped
+        super().__init__(text)
 
 
 class NothingSuits(DoesNotSuit):
@@ -70,7 +84,7 @@ class NothingSuits(DoesNotSuit):
         left_out: the files in it.
     """
 
-    def __init__(self, text: str, left_out: tuple[LeftOut, ...]) -> None:
+    def __init__(self, text: str, left_out: Sequence[LeftOut]) -> None:
         self.left_out = left_out
         super().__init__(text)
 
@@ -118,10 +132,6 @@ def files_by_kind(left_out: Sequence[LeftOut]) -> str:
     return Sentences(*texts, between="; ")
 
 
-#: What lies in a folder and is no input, without a cause for a warning.
-NotTaken = SkippedRuns | Skipped | LeftOut
-
-
 def kind_of_unused(file: Path) -> Kind:
     """Return the kind of a file that no analysis reads."""
     try:
@@ -135,33 +145,40 @@ def kind_of_unused(file: Path) -> Kind:
     return OTHER_COLUMNS if kind is OTHER and file.suffix.casefold() in SEARCHED else kind
 
 
-def remarks(of_each: Sequence[Sequence[NotTaken]]) -> list[NotTaken]:
-    """Join the remarks of several analyses; runs and files that were left out count only if all of them did."""
-    said = list(dict.fromkeys(remark for those in of_each for remark in those))
-    joined = [one for one in said if isinstance(one, Skipped) or all(one in those for those in of_each)]
+def noted(one: NotTaken) -> TypeGuard[Skipped]:
+    """Return whether the result of the analysis has a note on an input."""
+    return isinstance(one, Skipped) and one.noted
+
+
+def skipped_by_all(of_each: Sequence[Sequence[NotTaken]]) -> list[NotTaken]:
+    """Join what several analyses did not take; runs and files that were left out count only if all of them did."""
+    each_once = dict.fromkeys(sorted((one for those in of_each for one in those), key=noted, reverse=True))
+    paths = {one.path for one in each_once if isinstance(one, Skipped)}
+    joined = [one for one in each_once if isinstance(one, Skipped) or all(one in those for those in of_each)]
+    joined = [one for one in joined if not (isinstance(one, LeftOut) and one.path in paths)]
     if len(of_each) == 1:
         return joined
     return [LeftOut(one.path, OTHER_COLUMNS) if isinstance(one, LeftOut) and one.why else one for one in joined]
 
 
-def left_out_of(remarks: Sequence[NotTaken]) -> list[dict[str, str]]:
+def left_out_of(skipped: Sequence[NotTaken]) -> list[dict[str, str]]:
     """Return the files that are left out, for programs."""
     return [
         {"path": one.path.as_posix(), "kind": one.kind.name.partition(" ")[2], "advice": one.why or one.kind.advice}
-        for one in remarks
+        for one in skipped
         if isinstance(one, LeftOut)
     ]
 
 
-def texts_of(remarks: Sequence[NotTaken]) -> list[str]:
-    """Return remarks as lines of text: runs and files that are left out in one, a few files by name in their own."""
-    left_out = [one for one in remarks if isinstance(one, LeftOut)]
+def texts_of(skipped: Sequence[NotTaken]) -> list[str]:
+    """Return lines of text: runs and files that are left out in one, a few files by name in their own."""
+    left_out = [one for one in skipped if isinstance(one, LeftOut)]
     few, unexplained = len(left_out) <= FEW, [one for one in left_out if not one.why]
-    things = (*(str(one) for one in remarks if isinstance(one, SkippedRuns)), *number_by_kind([] if few else left_out))
-    skipped = "skipped {things}" if few else "skipped {things} (levilab analyze --json names the files)"
+    things = (*(str(one) for one in skipped if isinstance(one, SkippedRuns)), *number_by_kind([] if few else left_out))
+    said = "skipped {things}" if few else "skipped {things} (levilab analyze --json names the files)"
     return [
-        *(str(one) for one in remarks if isinstance(one, Skipped)),
-        *([Text(skipped, things=things)] if things else []),
-        *(str(Skipped(one.why)) for one in left_out if few and one.why),
+        *(one.note for one in skipped if isinstance(one, Skipped)),
+        *([Text(said, things=things)] if things else []),
+        *(Skipped(one.why).note for one in left_out if few and one.why),
         *([in_words(unexplained)] if few and unexplained else []),
     ]

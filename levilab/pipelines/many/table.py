@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from levilab.errors import DataError, DoesNotSuit, NoneUsable, unquote
+from levilab.errors import DataError, DoesNotSuit, unquote
 from levilab.files import CannotWrite
 from levilab.formats.texts import locate
 from levilab.formats.waveforms.header import NoRate
@@ -267,7 +267,7 @@ def write_table(
     found = {name_of(Path(path), folder): (path, is_run, searched) for path, is_run, searched in inputs(paths)}
     if not found:
         said = "{path:s}: holds no run and no data file; name run folders, or a folder with some of them"
-        raise NoneUsable(said, paths[0])
+        raise DataError(said, paths[0])
     made_with = {
         "analysis": analysis.name,
         "settings": analysis.settings(options).model_dump(mode="json", by_alias=True),

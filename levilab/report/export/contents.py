@@ -17,7 +17,7 @@ from levilab.errors import DataError, unquote
 from levilab.files import as_json
 from levilab.formats.waveforms.waveform import Waveform
 from levilab.pipelines.document import Analysis
-from levilab.pipelines.inputs.unread import remarks, texts_of
+from levilab.pipelines.inputs.unread import skipped_by_all, texts_of
 from levilab.pipelines.recall import recall_suiting
 from levilab.pipelines.result import Place, Result
 from levilab.pipelines.row import plain
@@ -143,8 +143,8 @@ def contents_of(
         return _of_sweep(Store.open(path))
     run = Run.load(path) if (path / RECORD).exists() else None
     try:
-        results = recall_suiting([path], given or {}, lambda one: tell(one.note))
-        for text in _left_out(results):
+        results = recall_suiting([path], given or {})
+        for text in texts_of(skipped_by_all([found.skipped for _, found in results])):
             tell(text)
         if not run and any(
             source.run and run_waveforms(source.run) for _, found in results for source in found.sources
@@ -156,12 +156,6 @@ def contents_of(
         tell(f"without a result: {error}")
         results = []
     return contents_of_results(path, run, results)
-
-
-def _left_out(results: Results) -> list[str]:
-    """Return what lies there and is not exported: broken runs, and what no analysis takes."""
-    skipped = (one.note for _, found in results for one in found.unread)
-    return [*dict.fromkeys(skipped), *texts_of(remarks([found.remarks for _, found in results]))]
 
 
 def contents_of_results(path: Path, run: Run | None, results: Results) -> Contents:

@@ -16,7 +16,14 @@ from levilab.formats.texts import locate
 from levilab.pipelines.analyzed import A
 from levilab.pipelines.inputs.names import short_paths, with_short_names
 from levilab.pipelines.inputs.search import Found
-from levilab.pipelines.inputs.unread import OTHER_COLUMNS, LeftOut, Skipped, kind_of_unused, number_by_kind, remarks
+from levilab.pipelines.inputs.unread import (
+    OTHER_COLUMNS,
+    LeftOut,
+    Skipped,
+    kind_of_unused,
+    number_by_kind,
+    skipped_by_all,
+)
 from levilab.pipelines.recall import recall_suiting
 from levilab.present.document.blocks import (
     Block,
@@ -105,15 +112,16 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str, o
     )
 
 
-def _left_out(results: Results, told: Sequence[Skipped]) -> tuple[dict[Path, str], str]:
+def _left_out(results: Results) -> tuple[dict[Path, str], str]:
     """Return why inputs that can hold readings were not used, and a sentence about all other files."""
     said = (
         "{file}: a table whose columns are not certain, which no search reads: name the file itself, or keep its "
         "columns with `levilab open`"
     )
     used = {source.path for _, found in results for source in found.sources}
-    unread = {one.path: one.reason for one in (*(one for _, found in results for one in found.unread), *told)}
-    left_out = [one for one in remarks([found.remarks for _, found in results]) if isinstance(one, LeftOut)]
+    skipped = skipped_by_all([found.skipped for _, found in results])
+    unread = {one.path: one.reason for one in skipped if isinstance(one, Skipped) and one.path}
+    left_out = [one for one in skipped if isinstance(one, LeftOut)]
     for one in left_out:
         if one.kind == OTHER_COLUMNS:
             unread.setdefault(one.path, Text(said, file=str(one.path)))
@@ -182,7 +190,7 @@ def _with_other_readings(analysis: Analysis[A], first: A, found: A) -> A:
         for source, run, origin in zip(one.sources, one.runs, one.origins, strict=True)
     }
     warnings = (*first.warnings, *found.warnings, *([note] if again else []))
-    together = Found(sources, warnings, (*first.remarks, *found.remarks), (*first.unread, *found.unread))
+    together = Found(sources, warnings, (*first.skipped, *found.skipped))
     paths = [source.path for source in sources]
     return analysis.gather(paths, together, first.options, lambda source: done[source.name])
 
@@ -353,9 +361,8 @@ def write_class(
         form.check()
     with writing_report(output):
         check_writable(output)
-    told: list[Skipped] = []
-    results = _each_reading_once(recall_suiting(paths, given or {}, told.append, skips=True))
-    unread, others = _left_out(results, told)
+    results = _each_reading_once(recall_suiting(paths, given or {}, skips=True))
+    unread, others = _left_out(results)
     folder_of = _folders_of_groups(results, unread)
     results = _with_folders_as_groups(results, folder_of)
     classes = [class_of(analysis, found) for analysis, found in results]

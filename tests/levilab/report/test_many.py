@@ -5,8 +5,8 @@ import shutil
 
 import pytest
 
-from levilab.errors import NoneUsable
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.inputs.unread import NoneUsable
 from levilab.pipelines.limit.figure import limit_figure
 from levilab.pipelines.suits import save
 from levilab.report.document import MOST_IN_FULL

@@ -14,7 +14,7 @@ from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.inputs.search import collect, sha256_of
 from levilab.pipelines.inputs.source import Readings
-from levilab.pipelines.inputs.unread import NothingSuits, Skipped, left_out_of, remarks, texts_of
+from levilab.pipelines.inputs.unread import NothingSuits, Skipped, left_out_of, skipped_by_all, texts_of
 from levilab.pipelines.options import LimitOptions, SpinDownOptions
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.suits import analyze_suiting, save
@@ -87,7 +87,7 @@ def test_a_run_that_goes_on_in_another_folder_counts_once(tmp_path, sample_data)
     (tmp_path / "run" / "readings.csv").write_text("".join(lines[:-2]), encoding="utf-8")
     analysis = SPINDOWN.analyze([tmp_path])
     assert [source.name for source in analysis.sources] == ["run-rescued"]
-    assert analysis.remarks == (Skipped(f"{tmp_path / 'run'}, which was broken off: its run goes on in run-rescued"),)
+    assert analysis.skipped == (Skipped(f"{tmp_path / 'run'}, which was broken off: its run goes on in run-rescued"),)
 
 
 def test_what_is_no_regular_file_has_no_hash(tmp_path):
@@ -145,7 +145,7 @@ def test_a_folder_names_every_file_that_it_leaves_out_by_kind_and_number(tmp_pat
     folder_of_a_student(tmp_path, sample_data)
     for _ in range(2):  # the second time with results and figures beside the files
         results = analyze_suiting([tmp_path], {})
-        said = remarks([found.remarks for _, found in results])
+        said = skipped_by_all([found.skipped for _, found in results])
         assert sorted(Path(one["path"]).name for one in left_out_of(said)) == [
             "README.md", "a.png", "exp.cmbl", "foto.jpg", "notes.txt", "other.csv",
         ]  # fmt: skip
@@ -175,7 +175,7 @@ def test_of_a_pattern_what_levilab_has_written_is_left_out(tmp_path):
 def test_what_another_analysis_reads_is_left_out_of_one_alone(tmp_path, sample_data):
     folder_of_a_student(tmp_path, sample_data)
     found = SPINDOWN.analyze([tmp_path])
-    (sound,) = [one for one in left_out_of(found.remarks) if one["path"].endswith(".wav")]
+    (sound,) = [one for one in left_out_of(found.skipped) if one["path"].endswith(".wav")]
     assert (sound["kind"], sound["advice"]) == ("WAV recording", "levilab analyze spin reads it")
 
 
@@ -191,7 +191,7 @@ def test_reports_of_levilab_are_named_as_such_and_need_no_advice(tmp_path):
     spin_down_csv(tmp_path / "run.csv")
     for name in ("report.html", "report.pdf"):
         write_report([tmp_path / "run.csv"], tmp_path / name)
-    (text,) = texts_of(remarks([found.remarks for _, found in analyze_suiting([tmp_path], {})]))
+    (text,) = texts_of(skipped_by_all([found.skipped for _, found in analyze_suiting([tmp_path], {})]))
     assert text == "nothing to analyze in 2 reports of levilab (report.html, report.pdf)"
 
 
@@ -199,21 +199,21 @@ def test_one_analysis_says_why_a_table_with_its_columns_does_not_suit(tmp_path):
     (tmp_path / "a.csv").write_text("spin_frequency_hz\n21.7\n21.4\n21.6\n21.5\n", encoding="utf-8")
     spin_down_csv(tmp_path / "b.csv")
     found = collect([tmp_path], ANALYSES["limit"], lambda _: LimitOptions())
-    (text,) = texts_of(remarks([found.remarks]))
+    (text,) = texts_of(skipped_by_all([found.skipped]))
     assert "b.csv: its spins differ by" in text
     assert "nothing to analyze" not in text
     (tmp_path / "a.csv").unlink()
     with pytest.raises(NothingSuits, match=r"found only \S*b.csv: its spins differ"):
         collect([tmp_path], ANALYSES["limit"], lambda _: LimitOptions())
-    assert left_out_of(remarks([found.remarks]))[0]["kind"] == "table that does not suit"
-    (text,) = texts_of(remarks([found.remarks, found.remarks]))
+    assert left_out_of(skipped_by_all([found.skipped]))[0]["kind"] == "table that does not suit"
+    (text,) = texts_of(skipped_by_all([found.skipped, found.skipped]))
     assert text == "nothing to analyze in a table with other columns (b.csv: name one to see why)"
 
 
 def test_a_damaged_spreadsheet_is_named_once(tmp_path, capsys):
     spin_down_csv(tmp_path / "run.csv")
     (tmp_path / "damaged.xlsx").write_bytes(b"PK\x03\x04" + bytes(300))
-    write_and_print(analyze_suiting([tmp_path], {}, (told := []).append), told, save=False, out=None, as_json=False)
+    write_and_print(analyze_suiting([tmp_path], {}), save=False, out=None, as_json=False)
     assert capsys.readouterr().err.count("damaged.xlsx") == 1
 
 
@@ -222,10 +222,10 @@ def test_sound_without_the_extra_is_counted_with_what_to_install(tmp_path, sampl
     for name in ("a.m4a", "b.m4a"):
         shutil.copy(sample_data / "scope-files" / "phone.m4a", tmp_path / name)
     monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)
-    (text,) = texts_of(remarks([found.remarks for _, found in analyze_suiting([tmp_path], {})]))
+    (text,) = texts_of(skipped_by_all([found.skipped for _, found in analyze_suiting([tmp_path], {})]))
     assert text.startswith("nothing to analyze in 2 sound files and films (a.m4a, b.m4a: the extra video")
     assert "names all" not in text
     shutil.copy(tmp_path / "a.m4a", tmp_path / "c.m4a")
-    (text,) = texts_of(remarks([found.remarks for _, found in analyze_suiting([tmp_path], {})]))
+    (text,) = texts_of(skipped_by_all([found.skipped for _, found in analyze_suiting([tmp_path], {})]))
     assert "(a.m4a, b.m4a, …" in text
     assert text.endswith("levilab analyze --json names all")

@@ -68,7 +68,7 @@ def test_both_kinds_together_have_values_of_both(sample_data, tmp_path):
     assert off.startswith("loose-washers: limits that do not belong to the others: 1, 2")
     assert "LOOSE WASHERS" in warning
     assert warning.endswith("(the first of 16 such warnings)")
-    assert SkippedRuns("spin", 4) in analysis.remarks
+    assert SkippedRuns("spin", 4) in analysis.skipped
     assert limit_tables(analysis)[1].title == "Beside theory, for 3 kinds of top"  # of 26 tops
     # the lower limits are real, so nothing that is made of them alone bears the mark
     assert marks_of_budgets(analysis) == ["", "SYNTHETIC.", "SYNTHETIC."]

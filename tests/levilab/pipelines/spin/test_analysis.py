@@ -63,7 +63,7 @@ def test_every_sample_file_gives_the_spin_that_it_was_made_with(scope_files):
         assert frequency.value == pytest.approx(truth, abs=4 * frequency.u), source.name
         assert chirp.value == pytest.approx(-0.095, abs=4 * chirp.u), source.name
         assert frequency.u < 1.4 * 3e-3, source.name
-    assert [remark for remark in analysis.remarks if "samples-4000hz.npy" in str(remark)]
+    assert [remark for remark in analysis.skipped if "samples-4000hz.npy" in str(remark)]
     assert {run.trend for run in analysis.runs if not run.which} == {None}  # of a single record the slope is its own
 
 
@@ -259,7 +259,7 @@ def test_each_analysis_takes_its_own_out_of_a_folder(sample_data, tmp_path):
     assert len(spin.sources) == 30  # 27 files, the long one, two runs with traces of a tape
     quiet = [text for each in (down, spin) for text in each.warnings]
     assert not [text for text in quiet if any(name in text for name in ("notes", "field.csv", "no titles"))]
-    assert {one.kind.name for one in down.remarks if "npy" in str(one)} == {"a NumPy array"}
+    assert {one.kind.name for one in down.skipped if "npy" in str(one)} == {"a NumPy array"}
 
 
 def test_what_is_damaged_is_a_note_of_the_analysis_that_it_belongs_to(sample_data, tmp_path):
