@@ -53,10 +53,8 @@ EXPERIMENT_HELP = {
     "sway": "Sway, with --mock: films of a free top and its spin; a real top's film is for levilab analyze video.",
     "precession": "Precession: sweep the drive, and count at each frequency how often the stem cuts a laser beam.",
 }
-#: Option → the setting that it stands for, as --set takes it; only this experiment has the option.
-SHORT = {"upper": "limit.which=upper"}
-#: Option → the key of any experiment to which it gives a value.
-KEYS = {"drive": "drive", "spin": "drive_frequency_hz"}
+#: Option → the setting that it stands for, as --set takes it; where that names an experiment, only this has the option.
+SHORT = {"drive": "drive={}", "spin": "drive_frequency_hz={}", "upper": "limit.which=upper"}
 _ENDING = "Ctrl-C ends the run after the reading under way; outputs go off and the run is kept."
 
 
@@ -116,12 +114,8 @@ def acquire_experiment(
     """Carry out an experiment."""
     if not list_settings:
         look_at_files(bench, resume, out, scene, virtual=mock, named=bool(counter or scope))
-    typed = {KEYS["drive"]: drive, KEYS["spin"]: spin}
-    given = (
-        *(f"{key}={value}" for key, value in typed.items() if value is not None),
-        *(settings or ()),
-        *[SHORT["upper"]] * upper,
-    )
+    typed = {"drive": drive, "spin": spin, "upper": upper or None}
+    given = (*(SHORT[name].format(value) for name, value in typed.items() if value is not None), *(settings or ()))
     with importing():
         if temperature or washers:  # wrong ones are refused before the rest is imported
             from levilab.acquisition.given import read_conditions
@@ -224,7 +218,7 @@ def _command_of(experiment: str) -> Callable[[], Callable[..., None]]:
 
         shared = signature(acquire_experiment)
         _, *options = shared.parameters.values()
-        own = [one for one in options if SHORT.get(one.name, experiment).startswith(experiment)]
+        own = [one for one in options if SHORT.get(one.name, "").rpartition(".")[0] in {"", experiment}]
         command.__signature__ = shared.replace(parameters=own)  # type: ignore[attr-defined]
         return command
 
@@ -247,9 +241,10 @@ def _named_as_typed(experiment: str, given: Mapping[str, Any]) -> Iterator[None]
         yield
     except UsageError as error:
         refused = (error.value or "").removeprefix(f"{experiment}.")
-        for option_name, key in KEYS.items():
-            if error.name == "settings" and refused in {key, f"{key}={given[option_name]}"}:
-                raise UsageError(option_name, error.text, value=given[option_name]) from error
+        for name, setting in SHORT.items():
+            typed = setting.format(given.get(name))
+            if error.name == "settings" and given.get(name) and refused in {typed, typed.partition("=")[0]}:
+                raise UsageError(name, error.text, value=given[name]) from error
         raise
 
 

@@ -99,14 +99,16 @@ def test_a_wrong_condition_is_refused_before_a_run_is_made(tmp_path, words, says
 
 
 @pytest.mark.parametrize(("words", "says"), [
-    (("--spin", "500"), "--spin 500: spin.drive_frequency_hz = 500 is more than this bench allows, limits."),
-    (("--spin", "-5"), "--spin -5: a number above 0 up to 100 [Hz] is expected"),
-    (("--drive", "no"), "--drive no: ramp or triggered is expected"),
-    (("--spin", "40", "--set", "drive_frequency_hz=500"), "--set drive_frequency_hz=500: spin.drive_frequency_hz = "),
-    (("--spin", "500", "--language", "de"), "--spin 500: spin.drive_frequency_hz = 500 ist mehr, als dieser"),
+    (("spin", "--spin", "500"), "--spin 500: spin.drive_frequency_hz = 500 is more than this bench allows, limits."),
+    (("spin", "--spin", "-5"), "--spin -5: a number above 0 up to 100 [Hz] is expected"),
+    (("spin", "--drive", "no"), "--drive no: ramp or triggered is expected"),
+    (("spin", "--spin", "40", "--set", "drive_frequency_hz=500"),
+     "--set drive_frequency_hz=500: spin.drive_frequency_hz = "),
+    (("spin", "--spin", "500", "--language", "de"), "--spin 500: spin.drive_frequency_hz = 500 ist mehr, als dieser"),
+    (("field", "--set", "drive=ramp"), "--set field.drive: there is no such setting; levilab acquire field --settings"),
 ])  # fmt: skip
 def test_a_refused_setting_is_called_as_it_was_typed(tmp_path, words, says):
-    assert command("acquire", "spin", "--mock", *words, cwd=tmp_path).err.startswith(f"levilab: {says}")
+    assert command("acquire", *words, "--mock", cwd=tmp_path).err.startswith(f"levilab: {says}")
 
 
 def said_at_the_bench(tmp_path, name, *words):
