@@ -309,25 +309,27 @@ def _question(
 ) -> Doubt | None:
     """Return the question in which unit a spin is, None where it can be in none or, if not always, in Hz alone."""
     numbers = _numbers(layout, index)
-    spins = possible_spins(median(numbers)) if numbers else {}
     total = _spins_of_total(layout, numbers, time)
-    if total:
-        spins = {TOTAL: 0.0}
-    elif not always and list(spins) == ["Hz"]:
+    units = [TOTAL] if total else [*possible_spins(median(numbers))] if numbers else []
+    if units == ["Hz"] and not always:
         return None
-    elif numbers and (per_reading := _turns_per_reading(layout, numbers, time)):
-        spins = {per_reading: 0.0} | spins
-    if not spins:
-        return None
-    answers = dict[str, str]()
-    for unit in spins:
-        ends = total or [number * (unit_factor(unit, "frequency") or 1.0) for number in numbers]
-        of_total = "turns since the start ({first:.3g} to {last:.3g} Hz)"
-        range_ = of_total if total else "{unit:s} ({first:.3g} to {last:.3g} Hz)"
-        answers[unit] = Said(range_, unit=unit, first=ends[0], last=ends[-1])
-    at = {"t": str(time.index + 1)} if time else {}
-    said = what or "no unit", answers, ("rpm", "Hz")
-    return _ask(layout, index, "f", {**at, **given}, numbers=numbers, said=said)
+    if numbers and not total and (per_reading := _turns_per_reading(layout, numbers, time)):
+        units = [per_reading, *units]
+    spins = {unit: total or [number * (unit_factor(unit, "frequency") or 1.0) for number in numbers] for unit in units}
+    said = what or "no unit", _ranges(spins), ("rpm", "Hz")
+    return _ask(layout, index, "f", {**_at(time), **given}, numbers=numbers, said=said) if spins else None
+
+
+def _ranges(spins: Mapping[str, Sequence[float]]) -> dict[str, str]:
+    """Return the text of each unit in which spins can be, with their first and last one in it [Hz]."""
+    said = {TOTAL: "turns since the start ({first:.3g} to {last:.3g} Hz)"}
+    usual = "{unit:s} ({first:.3g} to {last:.3g} Hz)"
+    return {unit: Said(said.get(unit, usual), unit=unit, first=of[0], last=of[-1]) for unit, of in spins.items()}
+
+
+def _at(time: Column | None) -> dict[str, str]:
+    """Return the times in the option `columns`."""
+    return {"t": str(time.index + 1)} if time else {}
 
 
 def _ask(
@@ -364,18 +366,11 @@ def _ask(
 def _question_of_period(plan: "Plan", column: Column) -> Doubt | None:
     """Return the question in which unit the times of turns are: of ms and s that in which a top can have them."""
     numbers = [number for number in _numbers(plan.layout, column.index) if number > 0]
-    answers = dict[str, str]()
-    if not numbers:
-        return None
-    for unit in ("ms", "s"):
-        turn = column.factor * (unit_factor(unit, "time") or 1.0)
-        if is_possible_spin(1 / (turn * median(numbers))):
-            ends = 1 / (turn * numbers[0]), 1 / (turn * numbers[-1])
-            answers[unit] = Said("{unit:s} ({first:.3g} to {last:.3g} Hz)", unit, *ends)
-    time = plan.column("time_s")
-    given = {**({"t": str(time.index + 1)} if time else {}), **plan.request.columns}
-    said = "no unit", answers, () if answers else ("ms", "s")
-    return _ask(plan.layout, column.index, "f", given, numbers=numbers, said=said)
+    spins = {unit: [1 / (column.factor * size * one) for one in numbers] for unit, size in (("ms", 1e-3), ("s", 1.0))}
+    likely = {unit: of for unit, of in spins.items() if of and is_possible_spin(median(of))}
+    said = "no unit", _ranges(likely), () if likely else (*spins,)
+    given = {**_at(plan.column("time_s")), **plan.request.columns}
+    return _ask(plan.layout, column.index, "f", given, numbers=numbers, said=said) if numbers else None
 
 
 def _spins_of_total(layout: Layout, numbers: Sequence[float], time: Column | None) -> list[float]:
