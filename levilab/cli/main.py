@@ -67,10 +67,8 @@ _MEANT = {
     **dict.fromkeys(("gui", "demo", "app", "start"), "live --mock"),
 }
 
-#: Options of other programs → what to do here.
-_MEANT_OPTIONS = dict.fromkeys(
-    ("--format", "--pdf", "--html", "--xlsx"), "The ending of a file's name chooses the format: -o report.pdf"
-)
+#: Options of other programs for the format of a file.
+_OF_FORMATS = ("--format", "--pdf", "--html", "--xlsx")
 
 
 #: Wrong words on the command line; typer has no public name for them.
@@ -119,8 +117,8 @@ def _as_text(message: str, what: str = "") -> str:
     """
     if isinstance(message, Text):
         return message
-    if (option := message.removeprefix("No such option: ").partition(" ")[0]) in _MEANT_OPTIONS:
-        return Text("No such option: {name:s}. {meant}", option, Text(_MEANT_OPTIONS[option]))
+    if (option := message.removeprefix("No such option: ").partition(" ")[0]) in _OF_FORMATS:
+        return Text("No such option: {name:s}. The ending of a file's name chooses the format: -o report.pdf", option)
     for template in _TEMPLATES:
         pattern = re.sub(r"\\\{(\w+)(?::s)?\\\}", r"(?P<\1>.+?)", re.escape(template))
         if found := re.fullmatch(pattern, message, re.DOTALL):

@@ -497,10 +497,7 @@ def _beside_theory(limits: Limits) -> Iterable[str]:
     )
     if edge.p is not None:
         p = f"p = {digits(edge.p)}" if edge.p >= 1e-6 else "p < 10⁻⁶"
-        once = (
-            Text("once in {n:.0f} such runs", n=1 / edge.p)
-            if edge.p >= _SELDOM
-            else "in fewer than one of 1000 such runs"
-        )
+        seldom = "once in {n:.0f} such runs" if edge.p >= _SELDOM else "in fewer than one of {n:.0f} such runs"
+        once = Text(seldom, n=1 / max(edge.p, _SELDOM))
         often = Text("in {percent:.0f} % of such runs", percent=100 * edge.p) if edge.agrees else once
         yield Text("By chance alone so large a difference comes {often} ({p:n}).", often=often, p=p)
