@@ -413,7 +413,8 @@ def _views(pages: Pages) -> list[BaseRoute]:
 
 def _language(request: Request | WebSocket, hall: Hall) -> str:
     """Return the language of the page that asks: of its address, else chosen last in this browser, else its own."""
-    of_browser = re.findall(r"(?:^|,)\s*(\w+)", request.headers.get("accept-language", ""))
+    weighted = re.findall(r"(?:^|,)\s*(\w+)[^,;]*(?:;\s*q=([01]\.?\d*))?", request.headers.get("accept-language", ""))
+    of_browser = [code for code, weight in sorted(weighted, key=lambda one: -float(one[1] or 1)) if float(weight or 1)]
     codes = request.query_params.get("language"), request.cookies.get(_COOKIE), hall.language, *of_browser
     return next((code for code in codes if code in languages()), ENGLISH)
 

@@ -133,7 +133,7 @@ def test_a_page_in_german_stays_german_and_nothing_is_cut(viewport, hall, watche
 
 @pytest.mark.parametrize(("browser", "started_in", "seen"), [
     ("de-DE,de;q=0.9,en;q=0.8", "", "de"), ("fr,de;q=0.5", "", "de"), ("en-GB,de;q=0.5", "", "en"), ("fr", "", "en"),
-    ("de-DE", "en", "en"), ("en", "de", "de"),
+    ("de-DE", "en", "en"), ("en", "de", "de"), ("en;q=0.5,de", "", "de"), ("fr, de;q=0", "", "en"),
 ])  # fmt: skip
 def test_a_page_is_in_the_language_of_the_browser_where_none_was_chosen(hall, browser, started_in, seen):
     hall.language = started_in
