@@ -45,11 +45,11 @@ def compare(values: ArrayLike, u: ArrayLike) -> Comparison:
 
     x: NDArray[np.float64] = np.asarray(values, float)
     of_x: NDArray[np.float64] = np.asarray(u, float)
-    chi_square, freedom = _about_mean(x, of_x)[2], len(x) - 1
+    chi_square, freedom = weighted_mean(x, of_x)[2], len(x) - 1
     if not freedom:
         return Comparison(0.0, chi_square, 0, 1.0, None, (None,))
     return Comparison(
-        _between(x, of_x),
+        scatter_between(x, of_x),
         chi_square,
         freedom,
         float(chdtrc(freedom, chi_square)),
@@ -68,8 +68,8 @@ def _from_others(x: NDArray[np.float64], u: NDArray[np.float64], k: int) -> floa
     from scipy.special import ndtri, stdtr
 
     others, of_others = np.delete(x, k), np.delete(u, k)
-    between = _between(others, of_others)
-    mean, of_mean, _ = _about_mean(others, np.hypot(of_others, between))
+    between = scatter_between(others, of_others)
+    mean, of_mean, _ = weighted_mean(others, np.hypot(of_others, between))
     variance, of_tops = u[k] ** 2 + of_mean**2 + between**2, between**2 * (1 + 1 / len(others))
     distance = float(x[k] - mean) / math.sqrt(variance)
     if not of_tops:
@@ -78,19 +78,20 @@ def _from_others(x: NDArray[np.float64], u: NDArray[np.float64], k: int) -> floa
     return math.copysign(-float(ndtri(p)), distance) if p > 0 else distance
 
 
-def _about_mean(x: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float, float, float]:
-    """Return the mean weighted by 1/u², its u, and χ² about it."""
+def weighted_mean(x: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float, float, float]:
+    """Return the mean weighted by 1/u², its u, and χ² about it (W. G. Cochran, Biometrics 10, 101 (1954))."""
     weights = (u.min() / u) ** 2
     mean = float(weights @ x / weights.sum())
     return mean, float(u.min() / math.sqrt(weights.sum())), float((((x - mean) / u) ** 2).sum())
 
 
-def _between(x: NDArray[np.float64], u: NDArray[np.float64]) -> float:
-    """Return τ, with which χ² is its expectation n − 1; zero where it is smaller without."""
+def scatter_between(x: NDArray[np.float64], u: NDArray[np.float64]) -> float:
+    """Return τ, with which χ² is its expectation n − 1; zero where it is smaller without.  u may be zero."""
     from scipy.optimize import brentq
 
     def excess(tau: float) -> float:
-        return _about_mean(x, np.hypot(u, tau))[2] - (len(x) - 1)
+        both = np.hypot(u, tau)
+        return weighted_mean(x, both)[2] - (len(x) - 1) if both.all() else math.inf
 
     if len(x) < 2 or excess(0.0) <= 0:
         return 0.0

@@ -21,11 +21,10 @@ import numpy as np
 from analysis.arrays import Array
 from analysis.drag import EXPONENT, EXPONENT_U
 from analysis.least_squares import solve
-from analysis.pulses.regression import student
 from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.selection import Statistics, statistics, weigh
 from analysis.spindown.tilt import THESIS_TOP
-from analysis.uncertainty import Estimate, curvature, propagate
+from analysis.uncertainty import Estimate, curvature, propagate, student
 
 #: Readings that follow each other by more than this multiple of the usual time have a loss of the top between them.
 _GAP = 1.5

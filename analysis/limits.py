@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.arrays import Array
+from analysis.comparison import scatter_between
 from analysis.errors import AnalysisError, NotFinite, NotPositive, TooFewReadings
 from analysis.uncertainty import ROUNDING, Estimate
 
@@ -247,7 +248,7 @@ def combine(runs: Sequence[Sample]) -> Statistics:
     means = np.array([one.mean() for one in limits])
     square = sum((one.size - 1) * _scatter(one) ** 2 for one in limits if one.size > 1) / within
     own = np.maximum(square / numbers, [run.least for run in runs])
-    between = _between(means, own)
+    between = scatter_between(means, np.sqrt(own)) ** 2 if _scatter(means) else 0.0
     weights = _weights(own + between)
     mean = float(weights @ means)
     by_scatter = float(weights**2 @ (own + between))
@@ -299,27 +300,6 @@ def _with_own_u(scatter: float, freedom: int) -> Estimate:
 def _freedom(variance: float, by_scatter: float, freedom: int) -> float | None:
     """Return the degrees of freedom of a variance that only partly comes from a scatter (GUM G.4)."""
     return None if by_scatter == 0 else freedom * (variance / by_scatter) ** 2
-
-
-def _between(means: Array, own: Array) -> float:
-    """Return the variance between runs [Hz²], from the runs' means and the variances of these within a run."""
-    wanted = means.size - 1
-    if not _scatter(means):
-        return 0.0
-
-    def excess(between: float) -> float:
-        if not (own + between > 0).all():
-            return math.inf
-        weights = _weights(own + between)
-        return float(np.sum((means - weights @ means) ** 2 / (own + between))) - wanted
-
-    if excess(0.0) <= 0:
-        return 0.0
-    low, high = 0.0, float(np.ptp(means)) ** 2
-    for _ in range(100):  # halved until rounding ends it
-        middle = (low + high) / 2
-        low, high = (middle, high) if excess(middle) > 0 else (low, middle)
-    return high
 
 
 def _weights(variances: Array) -> Array:

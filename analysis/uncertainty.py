@@ -22,6 +22,15 @@ def partly_believed(chi_square: float, freedom: int) -> float:
     return math.sqrt((chi_square + BELIEVED) / (freedom + BELIEVED))
 
 
+def student(freedom: float, deviations: float = 1.0) -> float:
+    """Return the factor that widens a standard deviation from few degrees of freedom to the same coverage."""
+    if freedom > 200:
+        return deviations
+    from scipy.special import ndtr, stdtrit
+
+    return float(stdtrit(max(freedom, 1.0), float(ndtr(deviations))))
+
+
 @dataclass(frozen=True)
 class Estimate:
     """A quantity as estimated.

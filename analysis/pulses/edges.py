@@ -6,7 +6,8 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.pulses.matched import turn_times
-from analysis.pulses.regression import Fit, Grid, fit_turns, median, student
+from analysis.pulses.regression import Fit, Grid, fit_turns, median
+from analysis.uncertainty import student
 
 #: Samples on either side, as a part of the width at half height: 0.92 of the information of a Gaussian pulse.
 SIDE = 0.93

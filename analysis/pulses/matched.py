@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
-from analysis.pulses.regression import Fit, Grid, fit_turns, median, student
+from analysis.pulses.regression import Fit, Grid, fit_turns, median
+from analysis.uncertainty import student
 
 #: Points of the pulse's table: a place is off by at most 1/8192 of the window.
 TABLE = 4096

@@ -12,7 +12,7 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.pulses.jump import Jump
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate, student
 
 #: The frequency's bend as a multiple of slope²/frequency, with its standard uncertainty.  Slower and slower: n under a
 #: drag in proportion to the n-th power of the spin, which is 1 to 2; an even ramp, 0, is three u away.
@@ -214,15 +214,6 @@ def _polynomial(coefficients: Array, u: Array) -> Array:
 def median(values: Array) -> float:
     """Return the upper middle value; several times faster than numpy's for short arrays."""
     return float(np.partition(values, values.size // 2)[values.size // 2])
-
-
-def student(freedom: float, deviations: float = 1.0) -> float:
-    """Return the factor that widens a standard deviation from few degrees of freedom to the same coverage."""
-    if freedom > 200:
-        return deviations
-    from scipy.special import ndtr, stdtrit
-
-    return float(stdtrit(max(freedom, 1.0), float(ndtr(deviations))))
 
 
 def fit_turns(

@@ -9,9 +9,10 @@ from analysis.arrays import Array
 from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing
 from analysis.pulses.errors import TooFewPulses
 from analysis.pulses.jump import Jump
-from analysis.pulses.regression import Fit, fit_turns, median, student
+from analysis.pulses.regression import Fit, fit_turns, median
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.turns import Numbering, number_turns
+from analysis.uncertainty import student
 
 FEWEST = 4
 #: A pulse farther from its place than this number of standard deviations of the others is no pulse of the top; with

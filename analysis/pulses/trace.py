@@ -16,11 +16,11 @@ from analysis.pulses.edges import Edges, place_edges
 from analysis.pulses.errors import OnlyHum, TooFewPulses
 from analysis.pulses.likelihood import search
 from analysis.pulses.matched import Match, match, window_of
-from analysis.pulses.regression import Fit, Grid, fit_turns, median, student
+from analysis.pulses.regression import Fit, Grid, fit_turns, median
 from analysis.pulses.result import Finding, Method, SpinFrequency
 from analysis.pulses.search import Events, find_events, shorten
 from analysis.pulses.times import FEWEST, Train, check_times, findings_of_fit, fit_train
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate, student
 
 Choice = Literal["auto", "edges", "matched", "likelihood"]
 

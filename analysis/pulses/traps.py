@@ -5,9 +5,8 @@ import numpy as np
 from analysis.arrays import Array
 from analysis.pulses.clean import MAINS
 from analysis.pulses.matched import COARSE, Match
-from analysis.pulses.regression import student
 from analysis.pulses.result import Finding
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate, student
 
 #: Every second pulse differs where the means of both halves are this number of standard errors apart (with few pulses
 #: the quantile of Student's t of the same probability) ...

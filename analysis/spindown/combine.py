@@ -10,7 +10,7 @@ from math import hypot
 
 import numpy as np
 
-from analysis.arrays import Array
+from analysis.comparison import weighted_mean
 from analysis.errors import AnalysisError
 from analysis.remarks import Remark
 from analysis.residuals import durbin_watson, runs_test_p
@@ -20,7 +20,7 @@ from analysis.spindown.joint import JointExponent, joint_exponent
 from analysis.spindown.lawfit import LawFit
 from analysis.spindown.selection import NO_FIT, Statistics, statistics, weigh
 from analysis.spindown.verdict import Verdict, verdict
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate, student
 
 
 class NothingToCombine(AnalysisError):
@@ -129,8 +129,7 @@ def _correlation(runs: Sequence[SpinDown]) -> Estimate | None:
     if not seen:
         return None
     values, u = np.array(seen).T
-    weight = u**-2 / (u**-2).sum()
-    value = float(weight @ values)
+    value, weight = weighted_mean(values, u)[0], u**-2 / (u**-2).sum()
     spread = float(np.sqrt(weight**2 @ (u**2 + (values - value) ** 2))) if len(seen) > 1 else float(u[0])
     return Estimate(value, spread, "1")
 
@@ -150,9 +149,7 @@ def _about_number(runs: Sequence[SpinDown]) -> list[Remark]:
     if n == 1:
         said.append(Remark("one run"))
     elif n < FEW_RUNS:
-        from scipy.special import stdtrit
-
-        said.append(Remark("few runs", values=(n, float(stdtrit(n - 1, 0.5 + 0.5 * 0.6827)))))
+        said.append(Remark("few runs", values=(n, student(n - 1))))
     return said
 
 
@@ -181,12 +178,6 @@ def _statistics(runs: Sequence[SpinDown], name: str, joint: JointExponent | None
         runs_test_p=runs_test_p(*series),
         runs=len(fits),
     )
-
-
-def _cochran(values: Array, u: Array) -> float:
-    """Return Σ(xᵢ − x̄)²/uᵢ² about the weighted mean (W. G. Cochran, Biometrics 10, 101 (1954))."""
-    weights = (u.min() / u) ** 2
-    return float((((values - weights @ values / weights.sum()) / u) ** 2).sum())
 
 
 def _combine_law(name: str, fits: Sequence[LawFit], stats: Statistics) -> CombinedLaw:
@@ -246,8 +237,8 @@ def _remarks(law: str, constant: str, estimates: Sequence[Estimate], average: Me
     u = np.array([estimate.u for estimate in estimates if estimate.value is not None and estimate.u])
     if average.scatter is None or len(u) != len(values):
         return said
-    from scipy.special import gammaincc
+    from scipy.special import chdtrc
 
-    if gammaincc((len(u) - 1) / 2, _cochran(values, u) / 2) < NO_FIT:
+    if chdtrc(len(u) - 1, weighted_mean(values, u)[2]) < NO_FIT:
         said.append(Remark("scatters", law, constant, (average.scatter / float(np.sqrt((u**2).mean())),)))
     return said

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.comparison import weighted_mean
 from analysis.spindown.fit import SpinDown
 
 
@@ -55,9 +56,8 @@ def joint_exponent(runs: Sequence[SpinDown]) -> JointExponent | None:
     if len(runs) < 2 or len(seen) < len(runs):
         return None
     values, u = np.array(seen).T
-    weights = (u.min() / u) ** 2
-    centre, step = float(weights @ values / weights.sum()), float(u.min() / np.sqrt(weights.sum()))
-    shared = float(weights @ [fit.shared_u.get("exponent", 0.0) for fit in fits] / weights.sum())
+    centre, step, _ = weighted_mean(values, u)
+    shared, *_ = weighted_mean(np.array([fit.shared_u.get("exponent", 0.0) for fit in fits]), u)
     for _ in range(_MOST_STEPS):
         below, here, above = (sum(run.misfit(n) for run in runs) for n in (centre - step, centre, centre + step))
         # the runs' u are no smaller than those of their misfits: a bend below a tenth of theirs is one of rounding

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
+from analysis.comparison import weighted_mean
 from analysis.errors import ShapesDiffer, TooFewReadings
 from analysis.stability import vertical_mode
 from analysis.sway.joint import Corrections, Joint, fit_together
@@ -187,10 +188,8 @@ def geometric_magnetism(swings: Sequence[Swings], spin_hz: Array, known: Known) 
 
 def _mean(values: Array, u: Array, independent: Array) -> tuple[float, float, float]:
     """Return the mean weighted by u, its standard uncertainty from the independent part, partly believed, and χ²."""
-    weight = 1 / u**2
-    mean = float(np.average(values, weights=weight))
-    chi_square = float(np.sum(weight * (values - mean) ** 2))
-    own = float(np.linalg.norm(weight * independent) / np.sum(weight))
+    mean, u_mean, chi_square = weighted_mean(values, u)
+    own = u_mean**2 * float(np.linalg.norm(independent / u**2))
     return mean, partly_believed(chi_square, values.size - 1) * own, chi_square
 
 

@@ -14,7 +14,7 @@ from scipy.special import betaincinv, ndtr, stdtr
 from scipy.stats import poisson
 
 from analysis.arrays import Array
-from analysis.pulses.regression import student
+from analysis.uncertainty import student
 from levilab.crosscheck.study import FALSE_ALARM, Spread, Verdict
 
 

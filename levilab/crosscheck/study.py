@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from analysis.errors import AnalysisError
-from analysis.pulses.regression import student
+from analysis.uncertainty import student
 from instruments.errors import InstrumentError
 from levilab.crosscheck.subject import Pull, Subject, Trial, TrialFailed
 from levilab.errors import LevilabError

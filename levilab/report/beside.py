@@ -16,7 +16,7 @@ from analysis.comparison import Comparison, compare
 from analysis.numbers import digits
 from analysis.spindown.combine import mean
 from analysis.spindown.drag import LAWS
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate, student
 from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import unquote
 from levilab.present.numbers import enumeration, plain, with_sign, with_uncertainty
@@ -470,11 +470,9 @@ def _chi_square(one: Compared, together: Comparison) -> str:
 
 def _known_to(freedom: int) -> str:
     """Return how well few groups give their scatter, with the interval that holds the mean in 68 % of all classes."""
-    from scipy.special import stdtrit
-
     if freedom >= _FEW:
         return ""
-    known, factor = 100 / math.sqrt(2 * freedom), float(stdtrit(freedom, 0.5 + 0.6827 / 2))
+    known, factor = 100 / math.sqrt(2 * freedom), student(freedom)
     return Text(
         "; {n} values give their scatter to {percent:.0f} % only: a 68 % interval is {factor:n} u",
         n=freedom + 1,

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from analysis.arrays import Array
+from analysis.comparison import compare
 from analysis.errors import AnalysisError
 from analysis.precession.coherence import Coherence, coherence, pulse_times
 from analysis.precession.sweep import Sweep, SweepFit, fit_sweep
@@ -117,13 +118,9 @@ def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[Remark]:
     slopes = [(fit.line.slope, fit.line.u_slope) for fit in fits if fit.line.u_slope]
     if len(slopes) < 2:
         return
-    from scipy.special import chdtrc
-
-    slope, u = (np.array(values, dtype=float) for values in zip(*slopes, strict=True))
-    mean = np.sum(slope / u**2) / np.sum(u**-2.0)
-    p = float(chdtrc(len(slope) - 1, float(np.sum(((slope - mean) / u) ** 2))))
+    p = compare(*zip(*slopes, strict=True)).p
     if p < DIFFERENT_P:
-        yield Remark("slopes differ", values=(len(slope), p))
+        yield Remark("slopes differ", values=(len(slopes), p))
 
 
 # --- phase lock ----------------------------------------------------------------------------------------

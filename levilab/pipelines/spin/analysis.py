@@ -12,6 +12,7 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.budget import rest
+from analysis.comparison import weighted_mean
 from analysis.drag import fit_curve
 from analysis.errors import AnalysisError
 from analysis.pulses import (
@@ -260,10 +261,8 @@ def drive_offset(series: Series, drive: float) -> Estimate:
     """
     held = [(start <= series.time) & (series.time <= end) for kind, start, end in series.phases if kind == "held"]
     chosen = np.any(held, axis=0) if held else np.ones(len(series), dtype=bool)
-    off, weight = series.frequency[chosen] - drive, series.u[chosen] ** -2
-    mean, u = float(np.average(off, weights=weight)), float(weight.sum()) ** -0.5
-    scatter = math.sqrt(float(weight @ (off - mean) ** 2) / max(off.size - 1, 1))
-    return Estimate(mean, u * max(1.0, scatter), "Hz")
+    mean, u, chi_square = weighted_mean(series.frequency[chosen] - drive, series.u[chosen])
+    return Estimate(mean, u * max(1.0, math.sqrt(chi_square / max(chosen.sum() - 1, 1))), "Hz")
 
 
 def _spin_of(source: Source[Records], options: SpinOptions) -> SpinRun:

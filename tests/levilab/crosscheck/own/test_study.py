@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.pulses.regression import student
+from analysis.uncertainty import student
 from levilab.crosscheck.own.model import Own
 from levilab.crosscheck.own.study import ENOUGH, FEWEST, OWN, TRIALS, seed_of, study_result, trials_of_report
 from levilab.crosscheck.stored import file_of, read_study, store
