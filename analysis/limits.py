@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from analysis.arrays import Array
+from analysis.checks import check_finite, check_positive
 from analysis.comparison import scatter_between
-from analysis.errors import AnalysisError, NotFinite, NotPositive, TooFewReadings
+from analysis.errors import AnalysisError, TooFewReadings
 from analysis.uncertainty import ROUNDING, Estimate
 
 #: Repetitions below which nothing is said of a scatter, and below which nothing is said of outliers and a trend.
@@ -274,11 +275,8 @@ def combine(runs: Sequence[Sample]) -> Statistics:
 def _check_limits(limits: Array) -> Array:
     if limits.size == 0:
         raise TooFewReadings(seen=0, needed=1)
-    for i, value in enumerate(limits.tolist()):
-        if not math.isfinite(value):
-            raise NotFinite(quantity="limit", index=i, value=value)
-        if value <= 0:
-            raise NotPositive(quantity="limit", unit="Hz", index=i, value=value)
+    check_finite("limit", limits)
+    check_positive("limit", limits)
     return limits
 
 

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from analysis.arrays import Array
-from analysis.errors import NotFinite, NotPositive, ShapesDiffer
+from analysis.checks import check_finite
+from analysis.errors import NotPositive, ShapesDiffer
 from analysis.field.errors import FieldStandsStill, FieldTurnsOver, ImpossibleRing, NoField, NotFitted, TooFewHeights
 from analysis.field.ring import Ring, on_axis, reversal, slopes
 from analysis.least_squares import solve
@@ -257,9 +258,7 @@ def _check_columns(
     for quantity, values in columns.items():
         if values.shape != z.shape or z.ndim != 1:
             raise ShapesDiffer(quantity=quantity, seen=values.shape, expected=z.shape)
-        if not np.isfinite(values).all():
-            index = int(np.flatnonzero(~np.isfinite(values))[0])
-            raise NotFinite(quantity=quantity, index=index, value=float(values[index]))
+        check_finite(quantity, values)
     for quantity, allowed in (("uncertainty of height", columns["uncertainty of height"] >= 0),) + (
         () if u is None else (("uncertainty", columns["uncertainty"] > 0),)
     ):

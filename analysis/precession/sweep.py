@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
-from analysis.errors import NotFinite, NotPositive, ShapesDiffer
+from analysis.checks import check_finite, check_positive
+from analysis.errors import ShapesDiffer
 from analysis.precession.gates import Gates
 from analysis.precession.line import FEWEST, NO_FIT, Line, fit_line, fit_orthogonal, influence
 from analysis.precession.miscounts import Miscount, Robust, find_miscounts, robust_line
@@ -165,12 +166,8 @@ def _check(sweep: Sweep) -> None:
             continue
         if values.shape != sweep.drive.shape or values.ndim != 1:
             raise ShapesDiffer(quantity=quantity, seen=values.shape, expected=sweep.drive.shape)
-        wrong = np.flatnonzero(~np.isfinite(values))
-        if wrong.size:
-            raise NotFinite(quantity=quantity, index=int(wrong[0]), value=float(values[wrong[0]]))
-        below = np.flatnonzero(values <= 0)
-        if below.size:
-            raise NotPositive(quantity=quantity, unit="Hz", index=int(below[0]), value=float(values[below[0]]))
+        check_finite(quantity, values)
+        check_positive(quantity, values)
 
 
 def _used_points(sweep: Sweep, found: list[Miscount], *, keep: bool) -> tuple[NDArray[np.bool_], list[Remark]]:

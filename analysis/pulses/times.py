@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.arrays import Array
-from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing
+from analysis.checks import check_finite, check_increasing
+from analysis.errors import ShapesDiffer
 from analysis.pulses.errors import TooFewPulses
 from analysis.pulses.jump import Jump
 from analysis.pulses.regression import Fit, fit_turns, median
@@ -105,14 +106,10 @@ def check_times(pulse_times: ArrayLike, *, increasing: bool = True) -> Array:
     times = np.asarray(pulse_times, dtype=np.float64)
     if times.ndim != 1:
         raise ShapesDiffer(quantity="pulse times", seen=times.shape, expected=(times.size,))
-    if (wrong := np.flatnonzero(~np.isfinite(times))).size:
-        raise NotFinite(quantity="pulse time", index=int(wrong[0]), value=float(times[wrong[0]]))
+    check_finite("pulse time", times)
     if times.size < FEWEST:
         raise TooFewPulses(seen=times.size, needed=FEWEST, duration=float(np.ptp(times)) if times.size else 0.0)
-    apart = np.diff(times)
-    if (wrong := np.flatnonzero(apart <= 0 if increasing else apart < 0)).size:
-        i = int(wrong[0])
-        raise TimesNotIncreasing(index=i + 1, before=float(times[i]), after=float(times[i + 1]))
+    check_increasing(times, strictly=increasing)
     return times
 
 

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
-from analysis.errors import NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewReadings
+from analysis.checks import check_finite, check_increasing
+from analysis.errors import ShapesDiffer, TooFewReadings
 
 #: Least number of samples, and least duration [s].
 FEWEST, SHORTEST_S = 60, 0.5
@@ -162,15 +163,10 @@ def read_samples(times: Any, field: Any) -> tuple[Array, Array]:
     b = b[:, None] if b.ndim == 1 else b
     if t.ndim != 1 or b.ndim != 2 or b.shape[0] != t.size or not 1 <= b.shape[1] <= 3:
         raise ShapesDiffer(quantity="the field", seen=b.shape, expected=(t.size, min(max(b.shape[-1], 1), 3)))
-    if not np.isfinite(t).all():
-        k = int(np.flatnonzero(~np.isfinite(t))[0])
-        raise NotFinite(quantity="time", index=k, value=float(t[k]))
+    check_finite("time", t)
     good = np.isfinite(b).all(axis=1)
     t, b = t[good], b[good]
-    back = np.flatnonzero(np.diff(t) < 0)
-    if back.size:
-        k = int(back[0])
-        raise TimesNotIncreasing(index=k + 1, before=float(t[k]), after=float(t[k + 1]))
+    check_increasing(t, strictly=False)
     needed = FEWEST if t.size < 2 or t[-1] <= t[0] else max(FEWEST, round(SHORTEST_S * t.size / float(t[-1] - t[0])))
     if t.size < needed or t[-1] <= t[0]:
         raise TooFewReadings(seen=t.size, needed=needed)

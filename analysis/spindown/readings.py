@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.arrays import Array
-from analysis.errors import AnalysisError, NotFinite, NotPositive, ShapesDiffer, TimesNotIncreasing, TooFewReadings
+from analysis.checks import check_finite, check_increasing, check_positive
+from analysis.errors import AnalysisError, ShapesDiffer, TooFewReadings
 
 FEWEST = 3
 
@@ -111,13 +112,10 @@ def check_readings(time: ArrayLike, frequency: ArrayLike, u: ArrayLike | None) -
     f = _column("spin frequency", frequency, len(t))
     sigma = _column("standard uncertainty", 1.0 if u is None else u, len(t), spread=True)
     for quantity, column in (("time", t), ("spin frequency", f), ("standard uncertainty", sigma)):
-        _all_finite(quantity, column)
-    still = np.flatnonzero(np.diff(t) <= 0)
-    if still.size:
-        i = int(still[0])
-        raise TimesNotIncreasing(index=i + 1, before=float(t[i]), after=float(t[i + 1]))
+        check_finite(quantity, column)
+    check_increasing(t)
     for quantity, column in (("spin frequency", f), ("standard uncertainty", sigma)):
-        _all_positive(quantity, column)
+        check_positive(quantity, column)
     must_fall(f)
     reference_hz, duration = float(np.exp(np.log(f).mean())), float(t[-1] - t[0])
     return Readings(
@@ -142,18 +140,6 @@ def _column(quantity: str, values: ArrayLike, n: int | None, *, spread: bool = F
         raise ShapesDiffer(quantity=quantity, seen=column.shape, expected=(column.size if n is None else n,))
     column.flags.writeable = False
     return column
-
-
-def _all_finite(quantity: str, column: Array) -> None:
-    bad = np.flatnonzero(~np.isfinite(column))
-    if bad.size:
-        raise NotFinite(quantity=quantity, index=int(bad[0]), value=float(column[bad[0]]))
-
-
-def _all_positive(quantity: str, column: Array) -> None:
-    bad = np.flatnonzero(column <= 0)
-    if bad.size:
-        raise NotPositive(quantity=quantity, unit="Hz", index=int(bad[0]), value=float(column[bad[0]]))
 
 
 def must_fall(frequency: Array) -> None:

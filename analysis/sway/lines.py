@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
-from analysis.errors import AnalysisError, NotFinite, ShapesDiffer, TimesNotIncreasing, TooFewReadings
+from analysis.checks import check_finite, check_increasing
+from analysis.errors import AnalysisError, ShapesDiffer, TooFewReadings
 from analysis.lines import Line, spectral_lines
 from analysis.residuals import independent
 from analysis.sway.vertical import (
@@ -170,11 +171,8 @@ def _check(times: Array, places: Places, heights: Array | None) -> tuple[Array, 
     if t.size < FEWEST:
         raise TooFewReadings(seen=t.size, needed=FEWEST)
     for quantity, values in columns:
-        if (wrong := np.flatnonzero(~np.isfinite(values))).size:
-            raise NotFinite(quantity=quantity, index=int(wrong[0]), value=math.nan)
-    if (back := np.flatnonzero(np.diff(t) <= 0)).size:
-        k = int(back[0])
-        raise TimesNotIncreasing(index=k + 1, before=float(t[k]), after=float(t[k + 1]))
+        check_finite(quantity, np.abs(values))
+    check_increasing(t)
     return t, s, z
 
 
