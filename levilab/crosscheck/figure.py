@@ -4,17 +4,15 @@ import math
 import textwrap
 from collections.abc import Callable, Sequence
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from levilab.crosscheck.calibration import band_of, by_ranks, ranks_of
 from levilab.crosscheck.study import FALSE_ALARM, Judge, Spread, Study, Verdict, by_pulls
-from levilab.present.drawing import SMALL, headline, panel, write
+from levilab.present.drawing import SMALL, new_figure, panel, write
 from levilab.present.looks import BLUE, VERMILION
 from levilab.present.numbers import with_sign
-from levilab.present.style import STYLE, WIDE
 
 _COLUMNS = 3
 #: Left edge of the first panel, a panel's size, and from one to the next [inch].
@@ -51,9 +49,7 @@ def _panels(
     panels = [(one.name, spread, judge(spread)) for one in checked for spread in one.spreads]
     rows = max(1, math.ceil(len(panels) / _COLUMNS))
     top = _TOP + _LINE * about.count("\n")
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDE, top + _DOWN * (rows - 1) + _SIZE[1] + 0.55))
-        headline(figure, _finding(panels), "SYNTHETIC")
+    with new_figure(top + _DOWN * (rows - 1) + _SIZE[1] + 0.55, _finding(panels), [True]) as figure:
         write(figure, 0.08, 0.5, about, fontsize=SMALL)
         for k, (name, spread, verdict) in enumerate(panels):
             down, across = divmod(k, _COLUMNS)

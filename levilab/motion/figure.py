@@ -19,7 +19,7 @@ from levilab.motion.summary import Summary, changing_energy
 from levilab.present.drawing import SMALL, curve, headline, panel
 from levilab.present.looks import GREY, LOOKS
 from levilab.present.numbers import enumeration, with_decimals
-from levilab.present.style import STYLE, WIDE
+from levilab.present.style import STYLE, WIDE, without_formula
 from levilab.texts.text import Sentences, Text, in_language
 
 #: A curve of more points is drawn as the envelope of this number of pieces.
@@ -101,8 +101,8 @@ def _spin_figure(summary: Summary) -> Figure:
 
 
 def _finding(summary: Summary) -> str:
-    name = (summary.motion.scene.name or "simulation").replace("\\", "\\\\").replace("$", r"\$")
-    return Text("Simulated motion: {name:s}, {ending}", name=name[:60], ending=summary.ending)
+    name = without_formula(summary.motion.scene.name or "simulation", 60)
+    return Text("Simulated motion: {name:s}, {ending}", name=name, ending=summary.ending)
 
 
 def _zoom(summary: Summary) -> tuple[float, float] | None:

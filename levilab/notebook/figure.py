@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from levilab.notebook.fit import axes_of
-from levilab.present.drawing import headline, panel, run_look, synthetic_mark
+from levilab.present.drawing import headline, new_figure, panel, run_look, synthetic_mark
 from levilab.present.looks import BLACK
 from levilab.present.style import STYLE, WIDE, as_png, for_notebooks
 from levilab.present.units import split
@@ -42,9 +42,7 @@ def residuals_figure(
         synthetic: whether each input is synthetic.
         curves: input → its fitted curve, None where there is none.
     """
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDE, _HEIGHT))
-        headline(figure, title, synthetic_mark(synthetic))
+    with new_figure(_HEIGHT, title, synthetic) as figure:
         left = panel(figure, _LEFT, _TOP, _WIDTH, _PANEL)
         right = panel(figure, _RIGHT, _TOP, _WIDTH, _PANEL, sharex=left)
         for axes, kind in ((left, "fit"), (right, "residuals")):

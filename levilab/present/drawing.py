@@ -7,19 +7,22 @@ from __future__ import annotations
 
 import re
 import textwrap
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 
 from levilab.present.looks import GREY, MARKERS, SERIES, Look
+from levilab.present.style import STYLE, WIDE
 from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Sequence
 
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
     from numpy.typing import ArrayLike
 
     from analysis.arrays import Array
@@ -33,6 +36,21 @@ SMALL = 7.0
 _LETTER = 0.078
 #: Height of a line of small text [inch].
 _LINE = 0.125
+
+
+@contextmanager
+def new_figure(height: float, text: str, made_up: Sequence[bool] = ()) -> Iterator[Figure]:
+    """Yield a figure as wide as a page, in the style of all, with its headline.
+
+    Args:
+        height: of the figure [inch].
+        text: see `headline`.
+        made_up: whether each input is synthetic.
+    """
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(WIDE, height))
+        headline(figure, text, synthetic_mark(made_up))
+        yield figure
 
 
 def panel(figure: Figure, left: float, top: float, width: float, height: float, **more: Any) -> Axes:
@@ -158,6 +176,17 @@ def run_look(k: int, total: int) -> Look:
     if total <= len(MARKERS):
         return Look(SERIES[k], marker=MARKERS[k])
     return Look(GREY, marker="o")
+
+
+def power_of_ten(values: ArrayLike) -> tuple[float, str]:
+    """Return the power of ten for an axis's label, and its text: above the axis it would push the title out.
+
+    >>> power_of_ten([2e-5, -3e-4]), power_of_ten([12.0])
+    ((0.0001, '$10^{−4}$ '), (1.0, ''))
+    """
+    largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
+    power = int(np.floor(np.log10(largest))) if largest > 0 and not 0.01 <= largest < 1e4 else 0
+    return 10.0**power, f"$10^{{{power}}}$ ".replace("-", "−") if power else ""
 
 
 def limits_about(values: ArrayLike, margin: float) -> tuple[float, float]:

@@ -140,6 +140,12 @@ def for_notebooks(figure: Figure) -> Figure:
     return figure
 
 
+def without_formula(text: str, most: int = 1000) -> str:
+    """Return what a person typed as a text of a figure that stands there letter by letter, cut to `most` of them."""
+    text = text if len(text) <= most else f"{text[: most - 1]}…"
+    return text.replace("\\", "\\\\").replace("$", r"\$")
+
+
 def label_of_run(name: str, k: int, total: int, alone: str) -> str | None:
     """Return what the legend says of the k-th of several runs: its name, where each has a marker of its own.
 
@@ -155,7 +161,7 @@ def label_of_run(name: str, k: int, total: int, alone: str) -> str | None:
     if total == 1:
         return alone
     if total <= len(MARKERS):
-        return short_name(name).replace("$", r"\$").replace("_", " ")  # matplotlib reads both
+        return without_formula(short_name(name)).replace("_", " ")  # matplotlib hides a label that begins with it
     return None if k else f"{total} runs: {alone}"
 
 

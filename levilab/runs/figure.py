@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from levilab.present.drawing import headline, panel
+from levilab.present.drawing import new_figure, panel
 from levilab.present.looks import LOOKS
-from levilab.present.style import STYLE, WIDE
+from levilab.present.style import without_formula
 from levilab.present.units import split
 
 if TYPE_CHECKING:
@@ -33,10 +32,9 @@ def readings_figure(frame: pd.DataFrame, title: str) -> Figure:
     against = next((name for name in _AGAINST if name in frame), None)
     ours = [name for name in map(str, frame.columns) if name not in _AGAINST and "_u_" not in name]
     names = ours or [name for name in map(str, frame.columns) if name != against]
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDE, _TOP + _PITCH * (max(len(names), 1) - 1) + _HEIGHT + _BOTTOM))
-        headline(figure, title.replace("\\", "\\\\").replace("$", r"\$"))
-        panels = [panel(figure, _LEFT, _TOP + _PITCH * k, _WIDTH, _HEIGHT) for k in range(max(len(names), 1))]
+    count = max(len(names), 1)
+    with new_figure(_TOP + _PITCH * (count - 1) + _HEIGHT + _BOTTOM, without_formula(title)) as figure:
+        panels = [panel(figure, _LEFT, _TOP + _PITCH * k, _WIDTH, _HEIGHT) for k in range(count)]
         x = _in_axis_unit(frame, against) if against else frame.index + 1
         colour = LOOKS["readings"].colour
         for axes, name in zip(panels, names, strict=False):

@@ -30,7 +30,7 @@ from levilab.motion.lock import LAST_SHARE
 from levilab.motion.summary import changing_energy
 from levilab.present.drawing import SMALL, headline
 from levilab.present.looks import LOOKS, PURPLE
-from levilab.present.style import STYLE, WIDE
+from levilab.present.style import STYLE, WIDE, without_formula
 from levilab.simulator.equilibrium import stability_of, windows_over
 from levilab.simulator.scene import Scene
 from levilab.stability.thesis import HIGHEST_HZ, MEASURED_HZ, MEASURED_U_HZ, SIMULATED_HZ, is_thesis_device
@@ -459,7 +459,7 @@ def _kind_patches(kinds: NDArray[Any], numbers: Array, column: str, plan: Plan) 
 
 
 def _headline(found: Map, column: str) -> str:
-    name = (found.plan.scene.name or "scene").replace("$", r"\$")[:50]
+    name = without_formula(found.plan.scene.name or "scene", 50)
     said = {
         "survived": "{scene:s}: {n} of {size} tops are still up after {seconds:g} s",
         "locked": "{scene:s}: {n} of {size} tops are locked to the drive after {seconds:g} s",

@@ -3,7 +3,6 @@
 import math
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,10 +12,10 @@ from analysis.field.floating import floating_spins, floating_top
 from analysis.field.magnet import axial_field
 from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun
 from levilab.pipelines.field.words import QUANTITIES
-from levilab.present.drawing import SMALL, band, headline, panel, sigma_bands, synthetic_mark
+from levilab.present.drawing import SMALL, band, new_figure, panel, sigma_bands
 from levilab.present.looks import BLUE, GREY, LOOKS, PURPLE, SKY, VERMILION
 from levilab.present.numbers import short_name, with_uncertainty
-from levilab.present.style import STYLE, WIDE
+from levilab.present.style import without_formula
 from levilab.texts.text import Text
 
 #: A scan each as long as there are so few: colour and marker.
@@ -35,9 +34,7 @@ _INSIDE = 1e-6
 
 def field_figure(analysis: FieldAnalysis) -> Figure:
     """Draw flux density and fit, residuals in units of their uncertainty, and what follows: masses, heights, spins."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDE, 6.9))
-        headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
+    with new_figure(6.9, _finding(analysis), [one.synthetic for one in analysis.sources]) as figure:
         above = panel(figure, _LEFT, 0.45, _WIDTH, 2.0)
         _draw_field(above, analysis)
         _draw_residuals(panel(figure, _LEFT, 2.62, _WIDTH, 1.0), analysis, above.get_xlim())
@@ -94,7 +91,7 @@ def _curve_label(analysis: FieldAnalysis, k: int) -> str | None:
 def _points_label(analysis: FieldAnalysis, k: int) -> str | None:
     if len(analysis.runs) == 1:
         return "readings"
-    return short_name(analysis.sources[k].name)[:24].replace("$", r"\$") if k < len(COLOURS) else None
+    return without_formula(short_name(analysis.sources[k].name), 24) if k < len(COLOURS) else None
 
 
 def _mark_window(axes: Axes, analysis: FieldAnalysis) -> None:

@@ -2,15 +2,13 @@
 
 from collections.abc import Callable
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from levilab.pipelines.hold.analysis import HoldAnalysis, text_of
-from levilab.present.drawing import headline, panel, synthetic_mark
+from levilab.present.drawing import new_figure, panel
 from levilab.present.looks import LOOKS
-from levilab.present.style import STYLE, WIDE
 from levilab.texts.text import Text
 
 #: Where the drag over that of the best law is drawn: laws that are excluded leave it.
@@ -19,13 +17,10 @@ _RATIOS = (0.9, 1.1)
 
 def hold_figure(analysis: HoldAnalysis) -> Figure:
     """Draw the drag of an upright top against the spin, with the laws through it; and both over the best law's."""
-    found = analysis.combined
-    with mpl.rc_context(STYLE):
-        best = found.best
-        figure = Figure(figsize=(WIDE, 5.3 if best else 3.3))
-        finding = Text("The drag at {n} held spins, and the drag laws through it", n=len(analysis.runs))
-        headline(figure, finding if len(analysis.runs) > 1 else text_of(analysis.runs[0]).each[0],
-                 synthetic_mark([one.synthetic for one in analysis.sources]))  # fmt: skip
+    found, best = analysis.combined, analysis.combined.best
+    of_several = Text("The drag at {n} held spins, and the drag laws through it", n=len(analysis.runs))
+    finding = of_several if len(analysis.runs) > 1 else text_of(analysis.runs[0]).each[0]
+    with new_figure(5.3 if best else 3.3, finding, [one.synthetic for one in analysis.sources]) as figure:
         upper = panel(figure, 0.75, 0.5, 4.05, 2.3)
         _draw(upper, analysis, "readings", np.ones_like)
         upper.set(ylabel="drag  [Hz/s]")

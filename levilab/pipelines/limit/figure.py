@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,10 +10,10 @@ from matplotlib.ticker import MaxNLocator
 
 from analysis.arrays import Array
 from levilab.pipelines.limit.analysis import ISLANDS, LOWER_EDGE, RESONANCE, UPPER_EDGE, LimitAnalysis, Limits
-from levilab.present.drawing import SMALL, headline, panel, synthetic_mark
+from levilab.present.drawing import SMALL, new_figure, panel
 from levilab.present.looks import BLACK, GREEN, GREY, LOOKS, MARKERS, ORANGE, PURPLE, SKY, VERMILION, YELLOW
 from levilab.present.numbers import with_uncertainty
-from levilab.present.style import STYLE, TALLEST, WIDE, label_of_run
+from levilab.present.style import TALLEST, label_of_run
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Sentences, Text
 
@@ -42,12 +41,11 @@ _BINS, _REACH, _FEWEST = 14, 3.5, 5
 
 def limit_figure(analysis: LimitAnalysis) -> Figure:
     """Draw for each of the conditions the limits top by top with mean, scatter and theory, and their distribution."""
-    with mpl.rc_context(STYLE):
-        legends = [_legend_lines(group) for group in analysis.groups]
-        around = _HEAD + sum(_ABOVE + _BELOW + _LINE * lines for lines in legends)
-        high = min(max((TALLEST - around) / len(legends), _LOWEST), _PANEL)
-        figure = Figure(figsize=(WIDE, around + high * len(legends)))
-        headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
+    legends = [_legend_lines(group) for group in analysis.groups]
+    around = _HEAD + sum(_ABOVE + _BELOW + _LINE * lines for lines in legends)
+    high = min(max((TALLEST - around) / len(legends), _LOWEST), _PANEL)
+    height = around + high * len(legends)
+    with new_figure(height, _finding(analysis), [one.synthetic for one in analysis.sources]) as figure:
         top = _HEAD
         for k, (group, lines) in enumerate(zip(analysis.groups, legends, strict=True)):
             left = panel(figure, _LEFT, top + _ABOVE, _WIDTH, high, label=f"limits {k}")

@@ -1,6 +1,5 @@
 """Sweeps → their figure."""
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -11,10 +10,10 @@ from analysis.numbers import digits
 from analysis.precession.sweep import SweepFit
 from levilab.pipelines.precession.analysis import PrecessionAnalysis
 from levilab.pipelines.precession.words import intercept_of, miscount_as_text, slope_of
-from levilab.present.drawing import SMALL, band, headline, panel, run_look, synthetic_mark
+from levilab.present.drawing import SMALL, band, new_figure, panel, run_look
 from levilab.present.looks import GREY, LOOKS
 from levilab.present.numbers import plain, without_unit
-from levilab.present.style import STYLE, WIDE, label_of_run
+from levilab.present.style import label_of_run
 from levilab.texts.text import Text
 
 #: More points have no bars.
@@ -28,9 +27,7 @@ _LEFT, _WIDTH, _BESIDE = 0.66, 3.95, 1.03
 def precession_figure(analysis: PrecessionAnalysis) -> Figure:
     """Draw points with line and bands, departures from a locked top, the influence of each point, phase lock."""
     phases = any(run.coherences for run in analysis.runs)
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDE, 6.8))
-        headline(figure, _finding(analysis.combined), synthetic_mark([one.synthetic for one in analysis.sources]))
+    with new_figure(6.8, _finding(analysis.combined), [one.synthetic for one in analysis.sources]) as figure:
         _draw_line(panel(figure, _LEFT, 0.45, _WIDTH, 2.25), analysis)
         _draw_departures(panel(figure, _LEFT, 3.3, _WIDTH, 1.3), analysis)
         count = 3 if phases else 2

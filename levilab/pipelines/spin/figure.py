@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -18,10 +17,10 @@ from levilab.formats.waveforms.waveform import Waveform
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.spin.analysis import MOST_DRAWN, SpinAnalysis, SpinRun
 from levilab.pipelines.spin.readings import Records
-from levilab.present.drawing import SMALL, band, headline, panel, synthetic_mark, write
+from levilab.present.drawing import SMALL, band, new_figure, panel, write
 from levilab.present.looks import LOOKS
 from levilab.present.numbers import short_name, with_uncertainty
-from levilab.present.style import STYLE, TALLEST, WIDE
+from levilab.present.style import TALLEST, WIDE, without_formula
 from levilab.texts.text import Text
 
 #: Points of a panel.
@@ -53,13 +52,12 @@ class _Excerpt:
 def spin_figure(analysis: SpinAnalysis) -> Figure:
     """Draw for each input its trace with the turns, all turns over each other, residuals, and frequency."""
     shown = list(zip(analysis.sources, analysis.runs, strict=True))[:MOST_DRAWN]
-    with mpl.rc_context(STYLE):
-        several = len(analysis.runs) > 1
-        head = _HEAD if several else _HEAD - 0.2
-        high = min(max(((TALLEST - head) / len(shown) - _NAME) / 2 - _AROUND, _LOWEST), _PANEL)
-        each = 2 * (high + _AROUND) + _NAME
-        figure = Figure(figsize=(WIDE, head + each * len(shown)))
-        headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
+    several = len(analysis.runs) > 1
+    head = _HEAD if several else _HEAD - 0.2
+    high = min(max(((TALLEST - head) / len(shown) - _NAME) / 2 - _AROUND, _LOWEST), _PANEL)
+    each = 2 * (high + _AROUND) + _NAME
+    height = head + each * len(shown)
+    with new_figure(height, _finding(analysis), [one.synthetic for one in analysis.sources]) as figure:
         for k, (source, run) in enumerate(shown):
             top = head + each * k
             panels = [panel(figure, x, top + 0.5 + y, 2.62, high) for y in (0.0, high + _AROUND) for x in (0.72, 4.25)]
@@ -82,17 +80,12 @@ def _finding(analysis: SpinAnalysis) -> str:
 def _title(source: Source[Records], run: SpinRun) -> str:
     spin = run.spin
     made_up = "  (SYNTHETIC)" if source.synthetic else ""
-    name = _drawable(short_name(source.name))
+    name = without_formula(short_name(source.name), 40)
     return f"{name}: spin {with_uncertainty(spin.frequency)} at {_reference(spin)}{made_up}"
 
 
 def _reference(spin: SpinFrequency) -> str:
     return with_minus(f"{spin.reference_time:.4g} s")
-
-
-def _drawable(name: str) -> str:
-    text = name if len(name) <= 40 else name[:39] + "…"
-    return text.replace("\\", "\\\\").replace("$", r"\$")
 
 
 def _draw(panels: list[Axes], source: Source[Records], run: SpinRun, k: int) -> None:

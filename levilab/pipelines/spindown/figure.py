@@ -23,18 +23,18 @@ from levilab.pipelines.spindown.words import STRAIGHT_LINES, SYMBOLS, finding, l
 from levilab.present.drawing import (
     SMALL,
     band,
-    headline,
     in_mathtext,
     limits_about,
+    new_figure,
     panel,
+    power_of_ten,
     run_look,
     sigma_bands,
-    synthetic_mark,
     write,
 )
 from levilab.present.looks import GREY, LOOKS, MARKERS
 from levilab.present.numbers import short_name
-from levilab.present.style import STYLE, WIDE
+from levilab.present.style import without_formula
 from levilab.present.units import unit as unit_row
 from levilab.texts.text import Text
 
@@ -68,10 +68,9 @@ class _Unit:
 
 def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
     """Draw readings and best law, the other laws less the best one, residuals of each, and the straight lines."""
-    with mpl.rc_context(STYLE):
-        straight = [law for law in laws_of(analysis) if law in STRAIGHT_LINES]
-        figure = Figure(figsize=(WIDE, _HEIGHT if straight else _LINES_TOP - 0.4))
-        headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
+    straight = [law for law in laws_of(analysis) if law in STRAIGHT_LINES]
+    height, made_up = _HEIGHT if straight else _LINES_TOP - 0.4, [one.synthetic for one in analysis.sources]
+    with new_figure(height, _finding(analysis), made_up) as figure:
         unit = _unit(analysis)
         _draw_spin(panel(figure, _LEFT, 0.62, 4.3, 1.75), analysis)
         if len(analysis.runs) > len(MARKERS):
@@ -87,9 +86,7 @@ def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
 
 def short_figure(analysis: SpinDownAnalysis) -> Figure:
     """Draw readings and best law, and below readings and laws less the best one."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDE, _SHORT_HEIGHT))
-        headline(figure, _finding(analysis), synthetic_mark([source.synthetic for source in analysis.sources]))
+    with new_figure(_SHORT_HEIGHT, _finding(analysis), [one.synthetic for one in analysis.sources]) as figure:
         _draw_spin(panel(figure, _LEFT, 0.62, 4.3, 1.35), analysis)
         _draw_differences(panel(figure, _LEFT, 2.55, 4.3, 1.1), analysis, _unit(analysis))
     return figure
@@ -161,8 +158,7 @@ def _legend_text(name: str) -> str:
     """Return a name for a legend: no formula, no hidden label, and no character that the font lacks."""
     font = get_font(findfont("DejaVu Sans"))
     text = "".join(c if c.isprintable() and font.get_char_index(ord(c)) else "□" for c in name)
-    text = text if len(text) <= 24 else text[:23] + "…"
-    return (" " if text.startswith("_") else "") + text.replace("\\", "\\\\").replace("$", r"\$")
+    return (" " if text.startswith("_") else "") + without_formula(text, 24)
 
 
 def _draw_outliers(axes: Axes, analysis: SpinDownAnalysis, k: int) -> None:
@@ -233,29 +229,22 @@ def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
     value, u = (
         np.array([np.nan if x is None else x for x in of]) for of in zip(*((f.value, f.u) for f in found), strict=True)
     )
-    power = _power_of_ten(value)
-    value, u = value / 10.0**power, u / 10.0**power
+    scale, times = power_of_ten(value)
+    value, u = value / scale, u / scale
     number = np.arange(1, len(found) + 1)
     look = LOOKS[best.name]
     if mean.value is not None:
         if mean.scatter is not None:
-            ends = ((mean.value + side * mean.scatter) / 10.0**power for side in (-1, 1))
+            ends = ((mean.value + side * mean.scatter) / scale for side in (-1, 1))
             axes.axhspan(*ends, color="black", alpha=0.12, linewidth=0)
-        axes.axhline(mean.value / 10.0**power, color=look.colour, linewidth=1.2)
+        axes.axhline(mean.value / scale, color=look.colour, linewidth=1.2)
     few = len(found) <= MOST_BARS
     axes.errorbar(number, value, u if few else None, color="black", linestyle="none", elinewidth=0.6)
     axes.plot(number, value, color="black", linestyle="none", marker="o", markersize=2.5 if few else 1.2)
     unit = in_mathtext(unit_row(mean.unit).text)
-    times = f"$10^{{{power}}}$ ".replace("-", "−") if power else ""
     groups = [_legend_text(source.group) for source in analysis.sources if source.group]
     axes.set(xlabel=f"{groups[0]} … {groups[-1]}" if groups else "run", ylabel=f"{SYMBOLS[name]}  [{times}{unit}]")
     axes.set_title(Text("{symbol}, {law}: mean, ±s", symbol=SYMBOLS[name], law=short_law(best.name)), pad=3, fontsize=8)
-
-
-def _power_of_ten(values: Array) -> int:
-    """Return the power of ten for an axis's label: above the axis it would push the title out of the figure."""
-    largest = float(np.max(np.abs(values), initial=0.0, where=np.isfinite(values)))
-    return math.floor(math.log10(largest)) if largest > 0 and not 0.01 <= largest < 1e4 else 0
 
 
 # --- what the laws differ from each other --------------------------------------------------------------

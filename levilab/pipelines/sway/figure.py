@@ -1,15 +1,14 @@
 """Slow swings → their figure."""
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from levilab.pipelines.sway.analysis import SwayAnalysis
-from levilab.present.drawing import SMALL, headline, panel, run_look, synthetic_mark
+from levilab.present.drawing import SMALL, new_figure, panel, run_look
 from levilab.present.looks import LOOKS
 from levilab.present.numbers import with_uncertainty
-from levilab.present.style import STYLE, WIDE, label_of_run
+from levilab.present.style import label_of_run
 from levilab.texts.text import Text
 
 #: Left edge and width of the panels [inch], and where what explains them begins, in parts of the width.
@@ -20,9 +19,7 @@ _WIDEST_HZ, _LEAST = 1.8, 2e-3
 
 def sway_figure(analysis: SwayAnalysis) -> Figure:
     """Draw the split against the spin with the prediction and the null, and the spectrum of a window."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDE, 5.6))
-        headline(figure, _finding(analysis), synthetic_mark([one.synthetic for one in analysis.sources]))
+    with new_figure(5.6, _finding(analysis), [one.synthetic for one in analysis.sources]) as figure:
         _draw_splits(panel(figure, _LEFT, 0.5, _WIDTH, 2.2), analysis)
         _draw_spectrum(panel(figure, _LEFT, 3.3, _WIDTH, 1.75), analysis)
     return figure

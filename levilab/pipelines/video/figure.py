@@ -1,6 +1,5 @@
 """Films → their figure: the first picture with the rim, the mark, the base and the path of the centre over it."""
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -9,10 +8,9 @@ from matplotlib.patches import Circle as Ring
 from levilab.formats.film import pictures
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.video.analysis import FilmReadings, Video, VideoAnalysis
-from levilab.present.drawing import headline, panel
+from levilab.present.drawing import new_figure, panel
 from levilab.present.looks import GREEN, SKY, VERMILION, YELLOW
 from levilab.present.numbers import short_name, with_uncertainty
-from levilab.present.style import STYLE, WIDE
 from levilab.texts.text import Text
 
 #: Width of a still and room above and below it [inch], and of the most films that are drawn.
@@ -23,11 +21,9 @@ def video_figure(analysis: VideoAnalysis) -> Figure:
     """Draw the still of each of the first films."""
     shown = list(zip(analysis.sources, analysis.runs, strict=True))[:_MOST]
     heights = [_WIDTH * source.readings.film.height / source.readings.film.width for source, _ in shown]
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDE, sum(heights) + _ROOM * (len(shown) + 1)))
-        spin = analysis.runs[0].spin
-        turns = Text("Its mark turns at {spin}", with_uncertainty(spin)) if spin else "The top in the first picture"
-        headline(figure, turns)
+    spin = analysis.runs[0].spin
+    turns = Text("Its mark turns at {spin}", with_uncertainty(spin)) if spin else "The top in the first picture"
+    with new_figure(sum(heights) + _ROOM * (len(shown) + 1), turns) as figure:
         top = _ROOM
         for height, (source, run) in zip(heights, shown, strict=True):
             _draw(panel(figure, 0.1, top, _WIDTH, height), source, run)

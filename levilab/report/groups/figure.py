@@ -2,14 +2,13 @@
 
 from collections.abc import Sequence
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from levilab.present.drawing import SMALL, headline, in_mathtext, panel, synthetic_mark, write
+from levilab.present.drawing import SMALL, in_mathtext, new_figure, panel, power_of_ten, write
 from levilab.present.looks import BLUE, GREEN, VERMILION
-from levilab.present.style import STYLE, WIDE, label_of_run
+from levilab.present.style import label_of_run
 from levilab.present.units import unit
 from levilab.report.beside import Class, Compared, Group, finding
 from levilab.texts.text import in_language
@@ -31,19 +30,11 @@ def class_figure(of: Class) -> Figure:
     height = max(_ROW * count, 0.6)
     panels = len(shown) + of.knows_truth
     width = (_RIGHT - _LEFT - (panels - 1) * _GAP) / panels
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(WIDE, _HEAD + height + _FOOT))
-        headline(
-            figure,
-            in_mathtext(in_language(finding(of))),
-            synthetic_mark([group.source.synthetic for group in of.groups]),
-        )
+    said, made_up = in_mathtext(in_language(finding(of))), [group.source.synthetic for group in of.groups]
+    with new_figure(_HEAD + height + _FOOT, said, made_up) as figure:
         about = in_language("point and bar: value ± u of a group; line: mean of the class")
         diamond = in_language("; diamond: truth of the virtual bench") if of.knows_truth else ""
-        write(
-            figure, 0.08, 0.52, f"{about}{diamond}",
-            fontsize=SMALL,
-        )  # fmt: skip
+        write(figure, 0.08, 0.52, f"{about}{diamond}", fontsize=SMALL)
         for k in range(panels):
             axes = panel(figure, _LEFT + k * (width + _GAP), _HEAD, width, height)
             if k < len(shown):
@@ -65,8 +56,8 @@ def _label(group: Group) -> str:
 
 def _draw_values(axes: Axes, of: Compared) -> None:
     factor = unit(of.unit).shown.factor
-    power = _power(of)
-    scale = factor / 10.0**power
+    power, times = power_of_ten([one.value * factor for one in of.estimates if one and one.value])
+    scale = factor / power
     if of.mean and of.mean.value is not None and of.mean.u is not None:
         mean, u = of.mean.value * scale, of.mean.u * scale
         axes.axvspan(mean - u, mean + u, color=BLUE, alpha=0.2)
@@ -76,16 +67,8 @@ def _draw_values(axes: Axes, of: Compared) -> None:
             axes.plot(truth * scale, k, marker="D", markersize=5, color=VERMILION, markerfacecolor="none")
         if one is not None and one.value is not None and one.u is not None:
             axes.errorbar(one.value * scale, k, xerr=one.u * scale, fmt="o", markersize=3, color="black", elinewidth=1)
-    times = f"10$^{{{power}}}$ ".replace("-", "−") if power else ""
     shown = in_mathtext(of.shown_unit)
     axes.set_xlabel(f"{of.symbol}  [{times}{shown}]" if times or shown else of.symbol, fontsize=8)
-
-
-def _power(of: Compared) -> int:
-    """Return the power of ten in the label of the axis."""
-    factor = unit(of.unit).shown.factor
-    largest = max((abs(one.value * factor) for one in of.estimates if one and one.value), default=1.0)
-    return 0 if 0.01 <= largest < 1e4 else int(np.floor(np.log10(largest)))
 
 
 def _draw_distances(axes: Axes, quantities: Sequence[Compared]) -> None:
