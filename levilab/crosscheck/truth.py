@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from levilab.runs.events import RunEvent
-from levilab.runs.run import Run
+from levilab.runs.run import Run, RunRecord
 from levilab.simulator.laws import LAWS
 from levilab.world.spin_world import SpinScene, random_scene
 
@@ -33,19 +33,19 @@ def truth_of(run: Run | None, analysis: str) -> Truth:
     record = run.record if run else None
     if record is None or not record.synthetic or record.seed is None:
         return Truth()
-    scene = record.configuration.get("scene")
+    scene = record.table("scene")
     if analysis == "precession":
         lost = any(event["kind"] == RunEvent.LOCK_LOST for event in run.events()) if run else False
         return Truth() if lost or _is_loose(scene) else Truth({"slope": 1.0, "intercept": 0.0})
     if record.world == "spin":
         known = _OF_SPIN_WORLD.get(analysis)
-        return known(random_scene(record.seed), record.configuration) if known else Truth()
-    return _of_scene(scene.get("drag")) if analysis == "spindown" and isinstance(scene, dict) else Truth()
+        return known(random_scene(record.seed), record) if known else Truth()
+    return _of_scene(scene.get("drag")) if analysis == "spindown" else Truth()
 
 
-def _is_loose(scene: Any) -> bool:
+def _is_loose(scene: Mapping[str, Any]) -> bool:
     """Return whether washers turn on the top: the tape is on them, and their spin is not the drive's frequency."""
-    washers = scene.get("washers") if isinstance(scene, dict) else None
+    washers = scene.get("washers")
     return isinstance(washers, dict) and bool(washers.get("inertia_kg_m2"))
 
 
@@ -57,22 +57,20 @@ def _of_scene(drag: Any) -> Truth:
     return Truth({LAWS[law].names[0]: drag["coefficient"]}, law)
 
 
-def _drag(scene: SpinScene, _: Mapping[str, Any]) -> Truth:
+def _drag(scene: SpinScene, _: RunRecord) -> Truth:
     return Truth(dict(zip(LAWS[scene.drag].names, scene.constants, strict=True)), scene.drag)
 
 
-def _base(scene: SpinScene, _: Mapping[str, Any]) -> Truth:
+def _base(scene: SpinScene, _: RunRecord) -> Truth:
     names = {"strength": "strength_t_m", "origin": "origin_m", "thickness": "thickness_m"}
     return Truth({name: getattr(scene.base, of_base) for name, of_base in names.items()})
 
 
-def _lower_limit(_: SpinScene, configuration: Mapping[str, Any]) -> Truth:
-    settings = configuration.get("limit")
-    lower = isinstance(settings, dict) and settings.get("which") == "lower"
-    return Truth({"mean": SpinScene().fall_hz} if lower else {})
+def _lower_limit(_: SpinScene, record: RunRecord) -> Truth:
+    return Truth({"mean": SpinScene().fall_hz} if record.table("limit").get("which") == "lower" else {})
 
 
-_OF_SPIN_WORLD: Mapping[str, Callable[[SpinScene, Mapping[str, Any]], Truth]] = {
+_OF_SPIN_WORLD: Mapping[str, Callable[[SpinScene, RunRecord], Truth]] = {
     "spindown": _drag,
     "field": _base,
     "limit": _lower_limit,

@@ -77,8 +77,7 @@ def _choice(folder: Path) -> Choice:
 
 def _title(record: RunRecord) -> str:
     """Return the name of what was measured."""
-    settings = record.configuration.get(record.experiment)
-    settings = settings if isinstance(settings, dict) else {}
+    settings = record.table(record.experiment)
     how = (settings.get("which"), settings.get("drive"))
     return next(
         (title for name, one, title in _TITLES if name == record.experiment and (not one or one in how)),

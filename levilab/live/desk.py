@@ -110,10 +110,9 @@ class Desk:
 def scene_of_run(folder: Path) -> dict[str, Any] | None:
     """Return the scene in a run's record; None where there is none."""
     try:
-        scene = read_record(folder).configuration.get("scene")
+        return read_record(folder).table("scene") or None
     except LevilabError:
         return None
-    return scene if isinstance(scene, dict) else None
 
 
 def parts_for(scene: dict[str, Any] | None) -> dict[str, Any]:

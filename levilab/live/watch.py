@@ -173,8 +173,7 @@ class Watch:
             return None
         self._fitted = (followed.version, ended)
         experiment, columns, groups = followed.record.experiment, followed.columns, followed.readings.groups()
-        settings = followed.record.configuration.get(experiment)
-        settings = settings if isinstance(settings, dict) else {}
+        settings = followed.record.table(experiment)
         fit = partial(fit_so_far, experiment, columns, groups, settings, events=[*followed.events], ended=ended)
         return followed.folder, fit
 

@@ -39,12 +39,11 @@ def time_base(source: Source[Any], kind: str, sensitivity: float, given: float |
         what: the row in words; empty: the time base of the instrument.
     """
     what = what or Text("time base of the {kind}", kind=kind)
-    configuration = source.run.record.configuration if source.run else {}
-    if kind == "counter" and configuration.get("count_with"):
-        kind = str(configuration["count_with"])
-    about = source.run.record.instruments.get(kind) if source.run else None
-    described = configuration.get(kind)
-    measured = described.get("clock_u") if isinstance(described, dict) else None
+    record = source.run.record if source.run else None
+    if record and kind == "counter" and record.configuration.get("count_with"):
+        kind = str(record.configuration["count_with"])
+    about = record.instruments.get(kind) if record else None
+    measured = source.settings(kind).get("clock_u")
     driver = str((about or {}).get("driver", ""))[:40]
     known = TIME_BASES.get(driver)
     remedy = known.remedy if known and known.remedy else _REFERENCE

@@ -407,7 +407,7 @@ def _scenes(of: Class) -> list[str]:
     if all(truth is not None for one in of.quantities for truth in one.truths):
         return []
     records = [source.run.record for source in of.found.sources if source.run]
-    scenes = {(record.configuration.get("scene") or {}).get("name", "") for record in records if record.synthetic}
+    scenes = {record.table("scene").get("name", "") for record in records if record.synthetic}
     if len(scenes) < 2:
         return []
     named = enumeration(sorted(name or "a spin alone" for name in scenes))

@@ -203,23 +203,21 @@ def _moment(event: Mapping[str, Any], zero: str | None) -> str:
 
 def _drive(record: RunRecord) -> tuple[str, ...]:
     """Return what drove the top before the readings, and what the bench stands."""
-    settings, limits = (record.configuration.get(name) for name in (record.experiment, "limits"))
-    if not isinstance(settings, dict) or settings.get(_DRIVE[1], 0) is None:  # nothing drives the top
+    settings = record.table(record.experiment)
+    if settings.get(_DRIVE[1], 0) is None:  # nothing drives the top
         return ()
     signal = [value_in_words(key, settings[key]) for key in _DRIVE if key in settings]
     ramp = [Text("raised by {ramp} Hz/s", ramp=settings["ramp_hz_per_s"])] if "ramp_hz_per_s" in settings else []
     if not signal + ramp:
         return ()
-    bounds = [setting_in_words(key, value) for key, value in limits.items()] if isinstance(limits, dict) else []
+    bounds = [setting_in_words(key, value) for key, value in record.table("limits").items()]
     limit = [Text("limits of the bench: {bounds}", bounds=tuple(bounds))] if bounds else []
     return (Text("{settings}", settings=(*signal, *ramp)), *limit)
 
 
 def _conditions(record: RunRecord) -> tuple[str, ...]:
     """Return the other settings of the experiment."""
-    settings = record.configuration.get(record.experiment)
-    if not isinstance(settings, dict):
-        return ()
+    settings = record.table(record.experiment)
     said = _IN_DRIVE if _drive(record) else frozenset()
     others = [
         setting_in_words(key, settings[key])

@@ -79,6 +79,11 @@ class RunRecord(BaseModel):
     #: Of a virtual bench, if its top only spins.
     world: Literal["spin"] | None = None
 
+    def table(self, name: str) -> dict[str, Any]:
+        """Return a table of the configuration; an empty one where there is none."""
+        found = self.configuration.get(name)
+        return found if isinstance(found, dict) else {}
+
     def as_json(self) -> str:
         """Return the file's text."""
         unsaid = {"synthetic_says"} if self.synthetic_says is None else None

@@ -81,8 +81,7 @@ def _why_it_keeps_its_spin(session: Session[SpinSettings], first: Row, last: Row
         last=last["spin_frequency_hz"],
         later=last["time_s"] - first["time_s"],
     )
-    scene = session.writer.record.configuration.get("scene") or {}
-    if scene.get("drag", {}).get("law") == "none":
+    if session.writer.record.table("scene").get("drag", {}).get("law") == "none":
         return Text(
             "{seen}: the scene has no drag (drag.law); take one with drag, such as spindown, or end the run", seen=seen
         )

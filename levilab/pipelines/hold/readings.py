@@ -60,8 +60,7 @@ def read_hold_run(run: Run, _: InputOptions) -> HoldReadings:
                 fewest=FEWEST,
             ),
         )
-    settings = run.record.configuration.get("hold")
-    full = settings.get("drive_amplitude_vpp") if isinstance(settings, dict) else None
+    full = run.record.table("hold").get("drive_amplitude_vpp")
     if not isinstance(full, int | float) or not full > 0:
         said = "{path:s}/run.json: configuration.hold.drive_amplitude_vpp, above 0, is expected"
         raise DataError(Text(said, path=run.folder))

@@ -128,10 +128,9 @@ class Source(Generic[R]):
         """Whether any of it is known to be synthetic."""
         return bool(self.run and self.run.record.synthetic)
 
-    def settings(self, experiment: str) -> dict[str, Any]:
-        """Return the settings of the run's experiment; empty where none are recorded."""
-        table = self.run.record.configuration.get(experiment) if self.run else None
-        return table if isinstance(table, dict) else {}
+    def settings(self, name: str) -> dict[str, Any]:
+        """Return a table of the run's configuration, as of its experiment; empty where none is recorded."""
+        return self.run.record.table(name) if self.run else {}
 
     @property
     def time_zero(self) -> datetime | None:

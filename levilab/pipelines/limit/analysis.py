@@ -4,7 +4,7 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -356,7 +356,7 @@ def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> 
 
 
 def _is_triggered(source: Source[LimitReadings]) -> bool:
-    return (source.settings(EXPERIMENT) or {}).get("drive") == "triggered"
+    return source.settings(EXPERIMENT).get("drive") == "triggered"
 
 
 def _number(value: object) -> float | None:
@@ -380,8 +380,7 @@ def _which(source: Source[LimitReadings], device: Device) -> Which:
 
 def device_of(source: Source[LimitReadings]) -> Device:
     """Return the top of the run's scene, or else the thesis's.  Raises DataError for an odd scene."""
-    table: Any = source.run.record.configuration.get("scene") if source.run else None
-    if not isinstance(table, dict):
+    if not (table := source.settings("scene")):
         return described_device(Scene(), "the thesis's top, 25.26 g")
     try:
         scene = scene_of(table)

@@ -76,8 +76,7 @@ def read_sweep_run(run: Run, _: InputOptions) -> SweepReadings:
 
 def _given_u(run: Run) -> float | None:
     """Return what the configuration says a count scatters by [Hz]."""
-    settings = run.record.configuration.get("precession")
-    u = settings.get("reading_u_hz") if isinstance(settings, dict) else None
+    u = run.record.table("precession").get("reading_u_hz")
     return float(u) if isinstance(u, int | float) else None
 
 

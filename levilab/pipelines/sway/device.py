@@ -30,8 +30,7 @@ _MASS = Estimate(0.02526, 1e-5, "kg")
 
 def known_of(source: Source[SwayReadings], options: SwayOptions) -> tuple[Known, tuple[str, ...]]:
     """Return what is known of an input's top and base, and what of it is the thesis's.  Raises DataError."""
-    table: Any = source.run.record.configuration.get("scene") if source.run else None
-    if isinstance(table, dict) and not (options.device or options.scan):
+    if (table := source.settings("scene")) and not (options.device or options.scan):
         return _of_scene(source, table), ()
     device = options.device or Device()
     made = top_of(parts_of(device.top)) if device.top.parts else None

@@ -48,7 +48,7 @@ BY_MASS = {"mass to set", "mass by height"}
 )
 def test_a_top_that_does_not_follow_its_drive_has_no_true_precession(inertia, events, known):
     scene = {"washers": {"inertia_kg_m2": inertia}}
-    record = SimpleNamespace(synthetic=True, seed=1, world=None, configuration={"scene": scene})
+    record = SimpleNamespace(synthetic=True, seed=1, world=None, table={"scene": scene}.get)
     run = SimpleNamespace(record=record, events=lambda: [{"kind": kind} for kind in events])
     assert truth_of(run, "precession").values == ({"slope": 1.0, "intercept": 0.0} if known else {})
 
