@@ -108,14 +108,8 @@ def direct_row(  # noqa: PLR0917 - the fields of a row
 
 def gate_of(source: Source[Any], experiment: str) -> float | None:
     """Return the counter's gate [s], where a run says it."""
-    gate = setting_of(source, experiment, "gate_s")
+    gate = source.number(experiment, "gate_s")
     return gate if gate is not None and 0 < gate < _LONGEST_GATE_S else None
-
-
-def setting_of(source: Source[Any], experiment: str, name: str) -> float | None:
-    """Return a setting of the run's experiment, where that is a number."""
-    value = source.settings(experiment).get(name)
-    return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
 
 
 # --- how people are shown it ---------------------------------------------------------------------------

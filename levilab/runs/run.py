@@ -84,6 +84,11 @@ class RunRecord(BaseModel):
         found = self.configuration.get(name)
         return found if isinstance(found, dict) else {}
 
+    def number(self, table: str, name: str) -> float | None:
+        """Return a number in a table of the configuration; None where there is none."""
+        found = self.table(table).get(name)
+        return float(found) if isinstance(found, int | float) and not isinstance(found, bool) else None
+
     def as_json(self) -> str:
         """Return the file's text."""
         unsaid = {"synthetic_says"} if self.synthetic_says is None else None

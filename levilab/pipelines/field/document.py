@@ -9,7 +9,6 @@ import numpy as np
 from analysis.budget import Budget, Component
 from analysis.field.fit import UNITS, FieldScan, UPart, parts_of
 from analysis.uncertainty import Estimate
-from levilab.pipelines.budget import setting_of
 from levilab.pipelines.document import Analysis, statistics_of, value_of, values_of
 from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun, Mean, analyze_source
 from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
@@ -81,7 +80,7 @@ def _input(source: Source[FieldReadings], scan: FieldScan, part: UPart) -> tuple
     if part.name == "readings":
         if readings.u is None:
             return None, "", "their scatter about the fit"
-        number = setting_of(source, EXPERIMENT, "readings")
+        number = source.number(EXPERIMENT, "readings")
         text = Text("mean of {n:g} readings; the last digit is in it", n=number) if number else "each reading by itself"
         return float(np.sqrt(np.mean(readings.u**2))), "T", text
     return None, "", ""

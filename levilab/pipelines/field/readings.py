@@ -63,8 +63,7 @@ def field_readings(table: Table) -> FieldReadings:
     columns = table.columns
     own = OWN_U in columns
     u_name = OWN_U if own else "flux_density_u_t"
-    height_u = table.column("height_u_m") if "height_u_m" in columns else None
-    u = table.column(u_name) if u_name in columns else None
+    height_u, u = columns.get("height_u_m"), columns.get(u_name)
     for values, what, lowest in ((height_u, "the uncertainty of a height", 0.0), (u, "an uncertainty", 1e-12)):
         if values is not None:
             refuse(table, values < lowest, "{what} is {value:g}, more than 0 is expected: correct it", what, values)

@@ -60,8 +60,8 @@ def read_hold_run(run: Run, _: InputOptions) -> HoldReadings:
                 fewest=FEWEST,
             ),
         )
-    full = run.record.table("hold").get("drive_amplitude_vpp")
-    if not isinstance(full, int | float) or not full > 0:
+    full = run.record.number("hold", "drive_amplitude_vpp")
+    if full is None or not full > 0:
         said = "{path:s}/run.json: configuration.hold.drive_amplitude_vpp, above 0, is expected"
         raise DataError(Text(said, path=run.folder))
     return HoldReadings(time, spin, u, volts / (full / 2), _gains(run), table.warnings)

@@ -132,6 +132,10 @@ class Source(Generic[R]):
         """Return a table of the run's configuration, as of its experiment; empty where none is recorded."""
         return self.run.record.table(name) if self.run else {}
 
+    def number(self, table: str, name: str) -> float | None:
+        """Return a number in a table of the run's configuration; None where none is recorded."""
+        return self.run.record.number(table, name) if self.run else None
+
     @property
     def time_zero(self) -> datetime | None:
         """When the clock of the readings was zero, in local time; None where that is not known."""

@@ -340,13 +340,15 @@ def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> 
     if which == "lower" or not said:
         return Conditions(which, device.name, synthetic=synthetic_source(source))
     triggered = _is_triggered(source)
-    creep, interval = (None if triggered else _number(said.get(name)) for name in ("creep_hz_per_s", "interval_s"))
+    creep, interval = (
+        None if triggered else source.number(EXPERIMENT, name) for name in ("creep_hz_per_s", "interval_s")
+    )
     waveform = said.get("drive_waveform")
     return Conditions(
         which,
         device.name,
         waveform=waveform if isinstance(waveform, str) else None,
-        amplitude_vpp=_number(said.get("drive_amplitude_vpp")),
+        amplitude_vpp=source.number(EXPERIMENT, "drive_amplitude_vpp"),
         creep_hz_per_s=creep,
         step_hz=None if creep is None or interval is None else round(creep * interval, 9),
         synthetic=synthetic_source(source),
@@ -357,10 +359,6 @@ def _conditions(source: Source[LimitReadings], which: Which, device: Device) -> 
 
 def _is_triggered(source: Source[LimitReadings]) -> bool:
     return source.settings(EXPERIMENT).get("drive") == "triggered"
-
-
-def _number(value: object) -> float | None:
-    return float(value) if isinstance(value, int | float) else None
 
 
 def _comparisons(statistics: Statistics, device: Device, conditions: Conditions) -> tuple[Comparison, ...]:

@@ -195,8 +195,7 @@ def limit_readings(table: Table) -> LimitReadings:
     limit = table.column("spin_frequency_hz")
     if not limit.size:
         raise TableError(table.path, "holds no limit: at least one repetition is needed")
-    has_u = "spin_frequency_u_hz" in table.columns
-    u = table.column("spin_frequency_u_hz") if has_u else None
+    u = table.columns.get("spin_frequency_u_hz")
     must_be_positive(
         table, limit, "the limit", "Hz; above 0 is expected: a sign is the sense of the spin, give the magnitude"
     )

@@ -10,7 +10,7 @@ from analysis.budget import Budget, Component, printed_step, rest, u_of_step
 from analysis.numbers import digits
 from analysis.precession.line import Line
 from analysis.precession.sweep import SweepFit
-from levilab.pipelines.budget import gate_of, setting_of, time_base
+from levilab.pipelines.budget import gate_of, time_base
 from levilab.pipelines.document import Analysis, number, values_of
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import PrecessionOptions
@@ -138,7 +138,7 @@ def _what_points(options: PrecessionOptions, *, stated: bool) -> tuple[str, Lite
 
 
 def _better(source: Source[SweepReadings], fit: SweepFit) -> str:
-    counts, gate = setting_of(source, EXPERIMENT, "counts"), gate_of(source, EXPERIMENT)
+    counts, gate = source.number(EXPERIMENT, "counts"), gate_of(source, EXPERIMENT)
     n = fit.line.n
     text = Text(
         "a wider range of drive frequencies (u falls with it), or {n} points instead of {now} to halve it",

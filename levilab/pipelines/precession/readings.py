@@ -71,13 +71,8 @@ def read_sweep_run(run: Run, _: InputOptions) -> SweepReadings:
     if readings.time is None:
         return readings
     gates = gates_of(run, readings.time.tolist(), readings.drive.tolist())
-    return readings if gates is None else _from_gates(readings, gates, _given_u(run))
-
-
-def _given_u(run: Run) -> float | None:
-    """Return what the configuration says a count scatters by [Hz]."""
-    u = run.record.table("precession").get("reading_u_hz")
-    return float(u) if isinstance(u, int | float) else None
+    given_u = run.record.number("precession", "reading_u_hz")
+    return readings if gates is None else _from_gates(readings, gates, given_u)
 
 
 def _from_gates(readings: SweepReadings, gates: Sequence[tuple[Gates, Gates]], given_u: float | None) -> SweepReadings:
@@ -143,15 +138,15 @@ def sweep_readings(table: Table) -> SweepReadings:
         warnings.append(of_file("of the precession", Text(text, table.path.name)))
     for name, values in u.items():
         _check_u(table, values, _OF_U[name], precession)
-    has_spin = "spin_frequency_hz" in table.columns
+    spin = table.columns.get("spin_frequency_hz")
     return SweepReadings(
         drive=drive,
         precession=precession,
         u=u.get("precession_frequency_u_hz"),
         u_drive=u.get("drive_frequency_u_hz"),
-        spin=table.column("spin_frequency_hz") if has_spin else None,
-        u_spin=u.get("spin_frequency_u_hz") if has_spin else None,
-        time=table.column("time_s") if "time_s" in table.columns else None,
+        spin=spin,
+        u_spin=None if spin is None else u.get("spin_frequency_u_hz"),
+        time=table.columns.get("time_s"),
         warnings=tuple(warnings),
     )
 

@@ -16,7 +16,7 @@ from analysis.spindown.lawfit import LawFit, Parts
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.verdict import Verdict
 from analysis.uncertainty import Estimate
-from levilab.pipelines.budget import bench_clock, direct_row, gate_of, setting_of, time_base
+from levilab.pipelines.budget import bench_clock, direct_row, gate_of, time_base
 from levilab.pipelines.document import Analysis, number, statistics_of, value_of, values_of
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SpinDownOptions
@@ -177,7 +177,7 @@ def _by_clocks(fit: LawFit, name: str) -> tuple[float, float]:
 
 def _better_readings(source: Source[SpinReadings]) -> str:
     """Return advice for better readings, as the end of a sentence."""
-    gate, interval = gate_of(source, EXPERIMENT), setting_of(source, EXPERIMENT, "interval_s")
+    gate, interval = gate_of(source, EXPERIMENT), source.number(EXPERIMENT, "interval_s")
     if gate is None or not interval:
         return "more readings in the same time, or a longer gate"
     longer = min(_LONGER * gate, _MOST_OF_INTERVAL * interval)

@@ -243,8 +243,7 @@ def spin_readings(table: Table) -> SpinReadings:
     """
     table = _without_rest(table)
     time, frequency = table.column("time_s"), table.column("spin_frequency_hz")
-    has_u = "spin_frequency_u_hz" in table.columns
-    u = table.column("spin_frequency_u_hz") if has_u else None
+    u = table.columns.get("spin_frequency_u_hz")
     if time.size < FEWEST:
         what = "holds {n}, at least {fewest} are needed: record longer"
         raise TableError(table.path, Text(what, n=how_many(time.size, "reading"), fewest=FEWEST))
