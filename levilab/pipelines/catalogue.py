@@ -15,6 +15,7 @@ from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.sway.document import SWAY
 from levilab.pipelines.video.document import VIDEO
 from levilab.present.clock import moment
+from levilab.present.document.blocks import MOST_ALIKE
 from levilab.present.numbers import short_name
 from levilab.texts.text import Text, in_language
 
@@ -28,8 +29,6 @@ if TYPE_CHECKING:
 
 #: Starts of runs that the terminal shows; the report has all.
 MOST_STARTS = 6
-#: From this number on, warnings that are like an earlier one are only counted.
-MANY_ALIKE = 3
 
 
 #: In the order in which they are tried.
@@ -76,7 +75,7 @@ def print_analysis(
         more = [Text("and {n} more", n=len(starts) - MOST_STARTS)] * (len(starts) > MOST_STARTS)
         say("Start, local time.", "; ".join([*starts[:MOST_STARTS], *map(in_language, more)]))
     for first, *others in (group for group in found.grouped_warnings if group[0] not in found.doubts):
-        many = len(others) >= MANY_ALIKE
+        many = len(others) >= MOST_ALIKE  # with the first one it is more
         alike = Text("{note} (and {n} more like this one)", note=first, n=len(others))
         for warning in [alike] if many else [first, *others]:
             say("note:", warning, "yellow")

@@ -1,6 +1,7 @@
-"""An instrument's settings, from run.json, in the words of a lab book."""
+"""An instrument's settings, from run.json, in the words of a lab book; names of which each is there once."""
 
 from collections.abc import Mapping
+from itertools import chain, count
 from typing import Any
 
 from analysis.numbers import digits
@@ -15,6 +16,19 @@ _DRIVE = ("frequency_hz", "amplitude_vpp", "waveform")
 _LEAST, _MOST = 0.1, 1000.0
 #: Prefixes of units that have no scale of their own in this laboratory, and below 0.1 of its finest.
 _PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
+
+
+def free_name(name: str, taken: set[str], between: str = "_") -> str:
+    """Return the name, with a number behind it where it is taken; it is taken from then on.
+
+    >>> taken = {"CH1_v"}
+    >>> free_name("CH1_v", taken), free_name("CH1_v", taken), free_name("CH2_v", taken)
+    ('CH1_v_2', 'CH1_v_3', 'CH2_v')
+    """
+    names = chain([name], (f"{name}{between}{number}" for number in count(2)))
+    free = next(one for one in names if one not in taken)
+    taken.add(free)
+    return free
 
 
 def settings_in_words(settings: Mapping[str, Any]) -> str:

@@ -67,12 +67,16 @@ class Banner:
     text: str
 
 
+#: Warnings of a group that are shown like the first.
+MOST_ALIKE = 3
+
+
 @dataclass(frozen=True)
 class Warnings:
     """What to know before the numbers are used: a list, set off so that a reader sees it before tables and figures.
 
     Attributes:
-        groups: warnings that are alike stand together.  Of a group of more than three the first is shown, and the
+        groups: warnings that are alike stand together.  Of more than `MOST_ALIKE` the first one is shown, and the
             others can be folded away below it ("and 12 more like this one"); on paper they are printed smaller.
             Without any group the block says that there are none.
     """

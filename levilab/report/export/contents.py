@@ -5,7 +5,6 @@ import re
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib.metadata import version
-from itertools import chain, count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,6 +21,7 @@ from levilab.pipelines.recall import recall_suiting
 from levilab.pipelines.result import Place, Result
 from levilab.pipelines.row import plain
 from levilab.present.units import UNITS, split
+from levilab.present.words import free_name
 from levilab.runs.find import RECORD, find_run
 from levilab.runs.run import EVENTS, READINGS, STATES, Run
 from levilab.runs.waveforms import run_waveforms
@@ -362,19 +362,6 @@ def _of_sweep(store: Store) -> Contents:
     }
     table = Table("points", tuple(rows), "a point of the map")
     return Contents(name, in_language(headline(summarise(store)), ENGLISH), (table,), about, axes=grid, arrays=arrays)
-
-
-def free_name(name: str, taken: set[str]) -> str:
-    """Return the name, with a number behind it where it is taken; it is taken from then on.
-
-    >>> taken = {"CH1_v"}
-    >>> free_name("CH1_v", taken), free_name("CH1_v", taken), free_name("CH2_v", taken)
-    ('CH1_v_2', 'CH1_v_3', 'CH2_v')
-    """
-    names = chain([name], (f"{name}_{number}" for number in count(2)))
-    free = next(one for one in names if one not in taken)
-    taken.add(free)
-    return free
 
 
 def unit_of_name(name: str) -> str:

@@ -3,7 +3,6 @@
 import base64
 import math
 import re
-from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from html import escape
@@ -11,6 +10,7 @@ from types import MappingProxyType
 from typing import Any, TypeAlias
 
 from levilab.present.document.blocks import (
+    MOST_ALIKE,
     Banner,
     Block,
     Bullets,
@@ -31,6 +31,7 @@ from levilab.present.document.blocks import (
 )
 from levilab.present.document.typesetting import typeset
 from levilab.present.tables import Row, Table
+from levilab.present.words import free_name
 from levilab.texts.text import Text, in_language
 
 #: Elements that have no content and no end.
@@ -104,8 +105,6 @@ def lines(text: str) -> Html:
     return join([words(first), *((element("br"), words(line)) for line in others)])
 
 
-#: Warnings of a group that are shown without opening it.
-MOST_ALIKE = 3
 #: No heading is of a deeper level in HTML.
 _DEEPEST = 6
 
@@ -116,22 +115,20 @@ class Writer:
 
     Attributes:
         prefix: of all ids, so that pieces of several documents can stand in one notebook.
-        names: how often each id was used.
+        taken: all ids, without the prefix.
         points: texts of the points that answer to the pointer, by the id of their element.
         is_alive: whether something in the page wants its script.
     """
 
     prefix: str = ""
-    names: Counter[str] = field(default_factory=Counter)
+    taken: set[str] = field(default_factory=set)
     points: dict[str, tuple[str, ...]] = field(default_factory=dict)
     is_alive: bool = False
 
     def new_id(self, name: str) -> str:
         """Return an id that no other element has: the name, and from the second use on a number."""
         plain = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "part"
-        self.names[plain] += 1
-        count = self.names[plain]
-        return f"{self.prefix}{plain}" if count == 1 else f"{self.prefix}{plain}-{count}"
+        return f"{self.prefix}{free_name(plain, self.taken, '-')}"
 
     def blocks(self, blocks: Iterable[Block], level: int) -> Html:
         """Return blocks below each other; level: of the headings among them."""

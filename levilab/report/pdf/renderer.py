@@ -17,6 +17,7 @@ from typing import Any
 from levilab.errors import LevilabError
 from levilab.present.characters import printable
 from levilab.present.document.blocks import (
+    MOST_ALIKE,
     Banner,
     Block,
     Bullets,
@@ -55,8 +56,6 @@ SETTING = "setting.json"
 LARGEST, SMALLER, NEARLY_EMPTY = 10.0, 9.4, 0.5
 #: Height over width from which a figure may leave its place in the text for the top of a page.
 TALL = 0.4
-#: Of alike warnings so many are printed like the first.
-FEW_ALIKE = 3
 #: What no PDF may contain: code points that are no characters, and those for private use, which no font has.
 _NO_CHARACTERS = re.compile("[\ufdd0-\ufdef\ufffe\uffff\ue000-\uf8ff\U000f0000-\U0010ffff]")
 
@@ -359,7 +358,7 @@ def _banner(block: Banner, _: _Drawing) -> Drawn:
 def _warnings(block: Warnings, _: _Drawing) -> Drawn:
     groups: list[Drawn] = []
     for alike in block.groups:
-        if len(alike) > FEW_ALIKE:
+        if len(alike) > MOST_ALIKE:
             more = in_language(Said("and {n} more like this one", n=len(alike) - 1))
             groups.append({"first": _text(alike[0]), "more": more, "others": [_text(text) for text in alike[1:]]})
         else:

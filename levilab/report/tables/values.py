@@ -12,6 +12,7 @@ from levilab.files import replace_atomically, writing
 from levilab.pipelines.row import Cell, Column, plain, text_of
 from levilab.present.document.blocks import Banner, Block, Details, Document, Section, Tabular
 from levilab.present.units import split
+from levilab.present.words import free_name
 from levilab.report.tables.latex import as_latex, title_of
 
 if TYPE_CHECKING:
@@ -209,16 +210,16 @@ def _listed_before(contents: Path) -> set[str]:
 
 
 def _csv_files(values: Iterable[Values]) -> Iterator[tuple[str, tuple[str, str]]]:
-    names = _Names()
+    taken: set[str] = set()
     for one in values:
-        yield f"{names.new(one.name)}.csv", (one.about, as_csv(one))
+        yield f"{_file_name(one.name, taken)}.csv", (one.about, as_csv(one))
 
 
 def _latex_files(document: Document) -> Iterator[tuple[str, tuple[str, str]]]:
-    names = _Names()
+    taken: set[str] = set()
     for block, around in _tables_in(document.blocks, document.banner.lead if document.banner else ""):
         mark = around if block.mark is None else block.mark
-        name = names.new(block.name)
+        name = _file_name(block.name, taken)
         latex = as_latex(name, block.table, note=block.note, mark=mark)
         yield f"{name}.tex", (block.table.title or title_of(block.name), latex)
 
@@ -233,14 +234,6 @@ def _tables_in(blocks: Sequence[Block], mark: str) -> Iterator[tuple[Tabular, st
             yield from _tables_in(block.blocks, mark)
 
 
-class _Names:
-    """Names of files, each once."""
-
-    def __init__(self) -> None:
-        self._used: dict[str, int] = {}
-
-    def new(self, name: str) -> str:
-        """Return the name, and from the second use on a number."""
-        plain = re.sub(r"[^a-z0-9_]+", "-", name.lower()).strip("-_") or "table"
-        self._used[plain] = self._used.get(plain, 0) + 1
-        return plain if self._used[plain] == 1 else f"{plain}-{self._used[plain]}"
+def _file_name(name: str, taken: set[str]) -> str:
+    """Return a name for a file that no other one has."""
+    return free_name(re.sub(r"[^a-z0-9_]+", "-", name.lower()).strip("-_") or "table", taken, "-")
