@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from levilab.formats.table import FEWEST
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.part import VALUE_U, FigureText, ReportPart, input_parts, title_of
 from levilab.pipelines.row import cells_of
@@ -13,6 +14,11 @@ from levilab.present.document.blocks import Block, Listing, Paragraph, Tabular
 from levilab.present.numbers import short_name, with_decimals
 from levilab.present.tables import Table, table
 from levilab.texts.text import Sentences, Text
+
+#: Columns of a sweep, a row a film.
+_SWEEP = ("drive_frequency_hz", "drive_frequency_u_hz", "precession_frequency_hz", "precession_frequency_u_hz")
+#: A film whose spin changes by less on average is of a driven top; a free one loses 0.05 Hz/s or more [Hz/s].
+_KEEPS_SPIN = 0.02
 
 
 def video_tables(analysis: VideoAnalysis) -> tuple[Table, ...]:
@@ -44,7 +50,24 @@ def video_files(analysis: VideoAnalysis) -> dict[str, str]:
     for source, run, track in zip(analysis.sources, analysis.runs, video_columns(analysis), strict=True):
         tables = (("tracks", track), *_readings(run))
         files |= {f"{source.path.stem}.{name}.csv": _csv(columns) for name, columns in tables}
+    points = [point for run in analysis.runs if (point := _point_of_sweep(run))]
+    if len(points) >= FEWEST:
+        files["films.precession.csv"] = _csv(dict(zip(_SWEEP, np.array(points).T, strict=True)))
     return files
+
+
+def _point_of_sweep(run: Video) -> tuple[float, ...]:
+    """Return frequency of the drive and precession with their u in a film of a driven top, which turns with its drive.
+
+    Empty: it is of a free top, or no precession stands out.
+    """
+    precession = (run.leaning and run.leaning.middle) or run.precession
+    if run.turning is None or precession is None or precession.value is None or precession.u is None:
+        return ()
+    slope = np.polyfit(run.time, np.abs(run.turning.smooth), 1)[0]
+    if abs(slope) > _KEEPS_SPIN:
+        return ()
+    return abs(run.turning.frequency), run.turning.u_frequency, precession.value, precession.u
 
 
 def _readings(run: Video) -> Iterator[tuple[str, Mapping[str, np.ndarray]]]:

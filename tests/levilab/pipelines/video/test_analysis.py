@@ -9,6 +9,7 @@ from runpy import run_path
 import numpy as np
 import pytest
 
+from analysis.uncertainty import Estimate
 from levilab.animation.camera import (
     BASE,
     BESIDE,
@@ -316,6 +317,21 @@ def test_a_top_that_falls_has_its_spin_then_as_a_limit_that_others_read(folder):
     (limit,) = ANALYSES["limit"].analyze([folder / "falls.limit.csv"]).runs
     assert limit.statistics.mean.value == pytest.approx(spin.value)
     ANALYSES["spindown"].analyze([folder / "falls.spin.csv"])
+
+
+def test_films_of_a_driven_top_are_a_sweep_of_the_drive(path, found, tmp_path):
+    video, films = ANALYSES["video"], []
+    for spin in (30.0, 32.0, 34.0, 37.0):
+        turning = replace(found.turning, frequency=-spin, smooth=np.full_like(found.time, -spin))
+        films += [replace(found, turning=turning, precession=Estimate(14.0 - 0.2 * spin, 0.01, "Hz"))]
+    one = video.analyze([path], VideoOptions(rim_m=2 * RIM))
+    names = {"films.precession.csv"}
+    assert not names & video.files(replace(one, sources=4 * one.sources, runs=4 * one.runs)).keys()  # it slows down
+    table = video.files(replace(one, sources=4 * one.sources, runs=tuple(films)))["films.precession.csv"]
+    (tmp_path / "films.precession.csv").write_text(table)
+    sweep = ANALYSES["precession"].analyze([tmp_path]).combined
+    assert sweep.line.slope == pytest.approx(-0.2)
+    assert sweep.column("drive") == pytest.approx([30, 32, 34, 37])
 
 
 @pytest.mark.slow
