@@ -3,9 +3,10 @@
 import re
 from collections.abc import Iterable
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
-from levilab.texts.text import Text, languages
+from levilab.texts.text import Text, either, languages
 
 
 class LevilabError(Exception):
@@ -76,6 +77,13 @@ class UsageError(RequestError):
         self.name, self.text = name, Text(text, *in_order) if in_order else text
         self.value = None if value is None else _short_text(value)
         super().__init__("{name}: {text}" if value is None else "{name} = {value}: {text}", **vars(self))
+
+
+def check_ending(path: Path, endings: Iterable[str], name: str = "out") -> None:
+    """Raise UsageError for a file that an argument of this name has, and whose name has none of the endings."""
+    known = [*endings]
+    if path.suffix.lower() not in known:
+        raise UsageError(name, Text("a name that ends in {named} is expected", named=either(known)), value=path)
 
 
 def check_language(code: str, name: str = "language") -> None:

@@ -18,7 +18,7 @@ from levilab.formats.typed import read_masses, read_temperature
 from levilab.present.units import split
 from levilab.settings import hint_about, own_words
 from levilab.simulator.keys import SceneError, parse_setting
-from levilab.texts.text import Sentences, Text, text_of, verbatim
+from levilab.texts.text import Sentences, Text, either, text_of, verbatim
 
 _TYPES = {"number": "a number", "integer": "a whole number", "string": "a text", "boolean": "true or false"}
 #: Lists as they are typed, by the type of what stands in them.
@@ -116,17 +116,13 @@ def describe_values(name: str, schema: Mapping[str, Any]) -> str:
     """
     _, unit = split(name)
     kinds = [schema | one for one in schema.get("anyOf", [{}]) if one.get("type") != "null"]
-    said = _one_of([_describe_schema(one) for one in kinds])
+    said = either([_describe_schema(one) for one in kinds])
     return Text("{values} [{unit:s}]", values=said, unit=unit.text) if unit else said
-
-
-def _one_of(texts: Sequence[str]) -> str:
-    return texts[0] if len(texts) == 1 else Text("{first} or {last}", first=tuple(texts[:-1]), last=texts[-1])
 
 
 def _describe_schema(schema: Mapping[str, Any]) -> str:
     if "enum" in schema:
-        return _one_of([verbatim(str(one)) for one in schema["enum"]])
+        return either([verbatim(str(one)) for one in schema["enum"]])
     if schema.get("type") == "array":
         each = _describe_schema(schema["items"])
         example = _LISTS.get(schema["items"].get("type"), "[…]")
@@ -148,7 +144,7 @@ def _refuse_unknown(now: ExperimentSettings, experiment: str, name: str) -> None
     if name in known:
         return
     near = [f"{experiment}.{one}" for one in get_close_matches(name, known, cutoff=0.5)]
-    meant = Text(", did you mean {names}?", names=_one_of(near)) if near else ";"
+    meant = Text(", did you mean {names}?", names=either(near)) if near else ";"
     said = Text("there is no such setting{meant} {where}", meant=meant, where=_where(experiment))
     raise UsageError("settings", said, value=f"{experiment}.{name}")
 

@@ -14,7 +14,7 @@ from levilab.cli.output import interruptible, message, print_json, result
 from levilab.cli.quantities import with_options
 from levilab.errors import DataError, DoesNotSuit, LevilabError, UsageError, as_typed
 from levilab.pipelines.options import DEFAULTS, KINDS, OPTIONS, Option, options_of, read_options, typed_name
-from levilab.texts.text import Text, how_many, text_of
+from levilab.texts.text import Text, either, how_many, text_of, verbatim
 
 if TYPE_CHECKING:
     from levilab.pipelines.document import Analysis
@@ -283,9 +283,8 @@ def _advice(tried: "Analysis[Any]", paths: Sequence[Path], given: Mapping[str, A
             continue
         names = [one.name for one in found if one.name not in needs_more]
         if names and tried not in found:
-            *first, last = names
-            either = Text("{first:s} or {last:s}" if first else "{last:s}", first=(*first,), last=last)
-            return Text("; levilab analyze {names} {path:s} reads it", names=either, path=as_typed(path))
+            said = "; levilab analyze {names} {path:s} reads it"
+            return Text(said, names=either(map(verbatim, names)), path=as_typed(path))
     return ""
 
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 from levilab.cli.analyze import takes_options
 from levilab.cli.options import argument, existing_path, flag, option, place, writable
 from levilab.cli.output import interruptible, message, result
-from levilab.errors import UsageError
+from levilab.errors import UsageError, check_ending
 from levilab.pipelines.options import OF_REPORT, read_options
 from levilab.report.export.endings import ENDINGS
 
@@ -24,8 +24,8 @@ def _named_file(file: Path | None) -> Path | None:
     """Return the name of a file in one of the formats that can be written.  Raises UsageError, CannotWrite."""
     if file and file.suffix.lower() not in ENDINGS and file.exists():
         raise UsageError("PATH", _ONE, value=f"… {file}")
-    if file and file.suffix.lower() not in ENDINGS:
-        raise UsageError("out", f"a name that ends in {', '.join(ENDINGS)} is expected", value=file)
+    if file:
+        check_ending(file, ENDINGS)
     return writable(file)
 
 

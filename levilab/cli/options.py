@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from levilab.errors import UsageError, check_language, list_known
+from levilab.errors import UsageError, check_ending, check_language, list_known
 from levilab.texts.text import ENGLISH, Text, languages, speak
 
 
@@ -72,10 +72,8 @@ def place(metavar: str, text: str, endings: Collection[str] = (), **more: Any) -
     """
 
     def check(path: Path | None) -> Path | None:
-        if path is not None and endings and path.suffix.lower() not in endings:
-            *some, last = endings
-            named = Text("{some:s} or {last:s}", some=", ".join(some), last=last) if some else last
-            raise UsageError("out", Text("a name that ends in {named} is expected", named=named), value=path)
+        if path is not None and endings:
+            check_ending(path, endings)
         target = path if endings else folder(path)
         return target if target is None or target.suffix == ".zarr" else writable(target)
 

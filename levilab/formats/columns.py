@@ -35,7 +35,7 @@ from levilab.formats.titles import (
     without_runs_of_blanks,
 )
 from levilab.texts.note import of_file
-from levilab.texts.text import Text, verbatim
+from levilab.texts.text import Text, either, verbatim
 
 SHORTHANDS = {
     "t": "time_s",
@@ -475,12 +475,11 @@ def _only_one(path: Path, header: Sequence[str], name: str, indices: list[int]) 
     if len(exact or indices) == 1:
         return (exact or indices)[0]
     key = next((short for short, long in SHORTHANDS.items() if long == name), name)
-    *some, last = (f"{key}={index + 1}" for index in indices)
     period = "; if T is the time of a turn say its unit, as T [ms]" if any(header[i] == "T" for i in indices) else ""
     text = Text("columns {names:s} could each be {name:s}", quote_names(header[i] for i in indices), name)
     choices = tuple(Choice(verbatim(shorten(header[index])), {key: str(index + 1)}) for index in indices)
     doubt = Doubt("column", Text("{text}: which?", text), None, choices)
-    numbers = Text("{some:s} or {last:s}", " or ".join(some), last)
+    numbers = either(f"{key}={index + 1}" for index in indices)
     raise Ambiguous(path, Text("{text}; say which: `columns` = {numbers}{period}", text, numbers, period), doubt)
 
 

@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 from levilab.formats.ranges import problem_of
 from levilab.formats.titles import UNITS, factor_of, plain_unit
 from levilab.settings import hint_about
-from levilab.texts.text import Text
+from levilab.texts.text import Text, either, verbatim
 
 
 def check_range(value: Any, info: ValidationInfo) -> Any:
@@ -94,11 +94,10 @@ def _words_for(unit: str, units: Mapping[str, float]) -> str:
     sizes = {units[plain_unit(unit)]: unit} if unit else {}
     for name, factor in units.items():
         sizes.setdefault(factor, name)
-    *some, last = list(sizes.values())[:_SHOWN]
-    if not last:
+    shown = list(sizes.values())[:_SHOWN]
+    if not shown[-1]:
         return "a plain number is expected"
-    said = "a number in {some:s} or {last:s} is expected" if some else "a number in {last:s} is expected"
-    return Text(said, some=", ".join(some), last=last)
+    return Text("a number in {units} is expected", units=either(map(verbatim, shown)))
 
 
 def _float(text: str, unit: str) -> float:

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from levilab.errors import DoesNotSuit, UsageError
+from levilab.errors import DoesNotSuit, check_ending
 from levilab.files import check_writable, replace_atomically, writing
 from levilab.pipelines.analyzed import A
 from levilab.pipelines.document import Analysis
@@ -28,14 +28,10 @@ from levilab.report.pdf.renderer import as_pdf, check_typst
 from levilab.report.reproduction import Asked, Heading
 from levilab.report.tables.values import Values, folder_of, of_analysis, write_tables
 from levilab.runs.find import find_runs
-from levilab.texts.text import Text, spoken
+from levilab.texts.text import spoken
 
 #: Each kind of input with those that were found.
 Found = Sequence[tuple[Kind, Sequence[Path]]]
-
-
-class UnknownFormat(UsageError):
-    """A report in a format that is not written."""
 
 
 @dataclass(frozen=True)
@@ -87,7 +83,7 @@ def write_report(
 
     Raises:
         DataError: nothing can be reported of.
-        UnknownFormat: of the output's name.
+        UsageError: of the output's name.
         NoTypst: PDF, and the extra `pdf` is not installed.
         CannotWrite: of the output.
     """
@@ -112,13 +108,12 @@ def format_of(output: Path) -> Format:
     """Return the format that a file's name asks for.
 
     Raises:
-        UnknownFormat: there is no such format.
+        UsageError: there is no such format.
         NoTypst: PDF, and the extra `pdf` is not installed.
         CannotWrite: of the file.
     """
-    form = FORMATS.get(output.suffix.lower())
-    if form is None:
-        raise UnknownFormat("out", Text("a name that ends in .html or .pdf is expected"), value=output)
+    check_ending(output, FORMATS)
+    form = FORMATS[output.suffix.lower()]
     form.check()
     with writing_report(output):
         check_writable(output)

@@ -9,7 +9,7 @@ from typing import Any
 from levilab.errors import LevilabError, RequestError
 from levilab.files import parse_toml, toml_value
 from levilab.formats.typed import read_number, unit_of_key
-from levilab.texts.text import Text
+from levilab.texts.text import Text, either, verbatim
 
 Table = dict[str, Any]
 
@@ -162,13 +162,11 @@ def _step(table: Table, at: Any, way: list[str], given: str) -> str | int:
 def _unknown_key(table: Table, at: Table, way: list[str]) -> str:
     """Return what to say about an unknown key: suggestions, and the keys that exist."""
     before = way[:-1]
-    similar = _suggestions(table, at, way)
-    *first, last = similar or [""]
-    either = Text("{first:s} or {last:s}" if first else "{last:s}", first=(*first,), last=last)
+    similar = [*map(verbatim, _suggestions(table, at, way))]
     where = Text(" in {name:s}", name=".".join(before)) if before else ""
     said = "there is no key {key:s}; known{where} are {names:s}"
     said = "there is no key {key:s}; did you mean {similar}? Known{where} are {names:s}" if similar else said
-    return Text(said, key=".".join(way), similar=either, where=where, names=", ".join(at))
+    return Text(said, key=".".join(way), similar=either(similar or [""]), where=where, names=", ".join(at))
 
 
 def _suggestions(table: Table, at: Table, way: list[str]) -> list[str]:

@@ -134,6 +134,16 @@ def how_many(n: int, noun: str) -> str:
     return Text("{n} {things}", n=n, things=noun if n == 1 else plural)
 
 
+def either(names: Iterable[str]) -> str:
+    """Return things of which one is expected, or meant.
+
+    >>> either(["a", "b", "c"]), either([".html"])
+    ('a, b or c', '.html')
+    """
+    *first, last = names
+    return Text("{first} or {last}", first=(*first,), last=last) if first else last
+
+
 def fields_of(template: str) -> list[tuple[str, str]]:
     """Return the names of the values in a template, and how each is written."""
     return _FIELD.findall(template)

@@ -15,7 +15,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Self
 
-from levilab.errors import DataError, UsageError
+from levilab.errors import DataError, UsageError, check_ending
 from levilab.files import locked, parse_json, replace_atomically, replacing, writing
 from levilab.pipelines.row import Cell, Column, text_of, value_of_text
 from levilab.present.units import split
@@ -30,10 +30,8 @@ _ELSEWHERE = "choose another place with `table`"
 
 def check_name(table: Path) -> None:
     """Raise UsageError for a table that cannot be written, before hours of work."""
-    kind = table.suffix.casefold()
-    if kind not in {CSV, PARQUET}:
-        raise UsageError("table", "a name that ends in .csv or .parquet is expected", value=table)
-    if kind == PARQUET and find_spec("pyarrow") is None:
+    check_ending(table, (CSV, PARQUET), "table")
+    if table.suffix.casefold() == PARQUET and find_spec("pyarrow") is None:
         what = "Parquet needs the extra parquet (pyarrow, which is not installed): {how}, or name a table in .csv"
         raise UsageError("table", what, how_to_install("parquet"), value=table)
     if table.is_dir():

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from levilab.errors import LevilabError, UsageError
+from levilab.errors import LevilabError, UsageError, check_ending
 from levilab.files import CannotWrite, check_writable, replace_atomically, writing
 from levilab.report.export.contents import Column, Contents, Table, attributes_of, variables_of
 from levilab.report.export.endings import ENDINGS
@@ -66,9 +66,8 @@ def export(
         MissingH5py: HDF5, and the extra `hdf5` is not installed.
         CannotWrite: a file is there already, or cannot be written.
     """
-    form = FORMATS.get(out.suffix.lower())
-    if form is None:
-        raise UsageError("out", f"a name that ends in {', '.join(ENDINGS)} is expected", value=out)
+    check_ending(out, ENDINGS)
+    form = FORMATS[out.suffix.lower()]
     form.check()
     _refuse_to_replace([out], force=force)
     with writing(out):

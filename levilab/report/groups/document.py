@@ -11,6 +11,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from levilab.errors import check_ending
 from levilab.files import check_writable
 from levilab.formats.texts import locate
 from levilab.pipelines.analyzed import A
@@ -60,7 +61,7 @@ from levilab.report.beside import (
 )
 from levilab.report.document import Results, banner_of, count_inputs, count_notes
 from levilab.report.groups.sheet import class_workbook
-from levilab.report.page import FORMATS, UnknownFormat, newest_of, write_content, writing_report
+from levilab.report.page import FORMATS, newest_of, write_content, writing_report
 from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
 from levilab.runs.find import RECORD
@@ -349,14 +350,12 @@ def write_class(
 
     Raises:
         DataError: there is no run.
-        UnknownFormat: of the output's name.
+        UsageError: of the output's name.
         NoTypst: PDF, and the extra `pdf` is not installed.
         CannotWrite: of the output.
     """
-    ending = output.suffix.lower()
-    form = FORMATS.get(ending)
-    if form is None and ending != SPREADSHEET:
-        raise UnknownFormat("out", Text("a name that ends in .html, .pdf or .xlsx is expected"), value=output)
+    check_ending(output, (*FORMATS, SPREADSHEET))
+    form = FORMATS.get(output.suffix.lower())
     if form:
         form.check()
     with writing_report(output):

@@ -184,7 +184,7 @@ def test_traces_of_unlike_lengths_are_one_behind_the_other_as_cf_has_it(tmp_path
 @pytest.mark.parametrize(
     ("source", "name", "said"),
     [
-        ("spin-down-1", "run.docx", "ends in .nc, .h5, .csv, .xlsx, .zip is expected"),
+        ("spin-down-1", "run.docx", "ends in .nc, .h5, .csv, .xlsx or .zip is expected"),
         ("spin-down-1", "there.zip", "is there already: give another name with `out`, or `force` to replace it"),
         ("README.md", "run.zip", "README.md"),
     ],

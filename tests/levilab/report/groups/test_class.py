@@ -277,7 +277,7 @@ def test_the_spreadsheet_has_numbers_texts_and_each_reading(of_three, tmp_path):
 
 
 def test_another_ending_is_refused_with_those_that_are_known(of_three, tmp_path):
-    with pytest.raises(UsageError, match=r"\.html, \.pdf or \.xlsx"):
+    with pytest.raises(UsageError, match=r"\.html, \.htm, \.pdf or \.xlsx"):
         write_class([of_three], tmp_path / "class.ods")
 
 
