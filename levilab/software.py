@@ -1,11 +1,13 @@
-"""The versions of what a result may depend on, and how an extra is installed."""
+"""The versions of what a result may depend on, how an extra is installed, and recorded commands."""
 
 import platform
+import shlex
 import sys
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
+from pathlib import Path, PurePath
 
 from levilab.texts.text import Text
 
@@ -43,3 +45,25 @@ def _versions() -> dict[str, str]:
         with suppress(PackageNotFoundError):  # numba is of an extra
             found[name] = version(name)
     return found
+
+
+def command_text(words: Sequence[str]) -> str:
+    """Return a recorded command as one types it.
+
+    >>> command_text(["/usr/lib/levilab/__main__.py", "acquire", "spin", "--note", "a b"])
+    "levilab acquire spin --note 'a b'"
+    """
+    name, *arguments = words
+    path = PurePath(name.replace("\\", "/"))
+    is_levilab = path.stem in {"levilab", "levilab-script"} or path.parts[-2:] == ("levilab", "__main__.py")
+    return " ".join(["levilab" if is_levilab else shlex.quote(name), *map(shlex.quote, arguments)])
+
+
+def versions_text(software: Mapping[str, str]) -> str:
+    """Return the versions, levilab's first.
+
+    >>> versions_text({"python": "3.11.7", "levilab": "0.1.0"})
+    'levilab 0.1.0, python 3.11.7'
+    """
+    names = sorted(software, key=lambda name: (name != "levilab", name))
+    return ", ".join(f"{name} {software[name]}" for name in names)

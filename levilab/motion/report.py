@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import math
-import shlex
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +16,7 @@ from levilab.errors import DataError, LevilabError, unquote
 from levilab.motion.effects import KINDS, field_kinds
 from levilab.motion.simulation import COLUMNS, FIGURE, SimulationRequest, run_simulation
 from levilab.motion.summary import Summary, as_document
+from levilab.present.clock import in_utc
 from levilab.present.document.blocks import (
     Banner,
     Block,
@@ -35,6 +35,7 @@ from levilab.present.numbers import plain, with_decimals
 from levilab.present.tables import table
 from levilab.runs.run import STATES, Run
 from levilab.simulator.scene import Scene, SceneError, changes, scene_of
+from levilab.software import command_text, versions_text
 from levilab.texts.text import Sentences, Text, in_language
 
 if TYPE_CHECKING:
@@ -47,8 +48,6 @@ if TYPE_CHECKING:
 LONGEST_S = 10.0
 NUMBERS = ("quantity", "value", "unit")
 SYNTHETIC = Banner("SYNTHETIC.", "This is a simulation: nothing of it was measured.")
-#: Programs by which a command line begins that is one of ours.
-_PROGRAMS = {"levilab", "levilab.exe", "__main__.py", "levilab-script.py"}
 
 
 def motion_section(run: Run) -> Section:
@@ -322,22 +321,11 @@ def _reproduction(run: Run) -> Iterator[Block]:
     if record.command_line:
         yield Code(command_text(record.command_line))
     facts = [
-        Fact("When", tuple(f"{utc[:19].replace('T', ' ')} UTC" for utc in (record.started_utc,) if utc)),
-        Fact("Software", (", ".join(f"{name} {version}" for name, version in record.software.items()),)),
+        Fact("When", (in_utc(record.started_utc),) if record.started_utc else ()),
+        Fact("Software", (versions_text(record.software),)),
         Fact("states.csv", tuple(f"sha256 {digest}" for digest in _hash_of(run.folder / STATES)), code=True),
     ]
     yield Facts(tuple(fact for fact in facts if any(fact.texts)))
-
-
-def command_text(words: Sequence[str]) -> str:
-    """Return a recorded command line as one types it: ours without the place of its program.
-
-    >>> command_text(["/opt/bin/levilab", "simulate", "my scene.toml"])
-    "levilab simulate 'my scene.toml'"
-    """
-    first, *others = words
-    name = first.replace("\\", "/").rpartition("/")[2]
-    return shlex.join(["levilab" if name in _PROGRAMS else first, *others])
 
 
 def _hash_of(path: Path) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """Times on the clock of the person who reads: local, with the offset from UTC."""
 
 from collections.abc import Sequence
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 
 from levilab.texts.text import Text
 
@@ -15,6 +15,12 @@ def local(utc: str | None) -> datetime | None:
         return datetime.fromisoformat(utc).astimezone() if utc else None
     except (ValueError, OverflowError):
         return None
+
+
+def in_utc(utc: str) -> str:
+    """Return a time of run.json to the second; what is no time stands as it is."""
+    found = local(utc)
+    return f"{found.astimezone(UTC):%Y-%m-%d %H:%M:%S UTC}" if found else utc
 
 
 def moment(when: datetime) -> str:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC
 from typing import Any, Literal
 
 from levilab.errors import unquote
 from levilab.pipelines.inputs.source import Source, mark_of
 from levilab.pipelines.part import InputPart, ReportPart
 from levilab.pipelines.tune.owner import washers_text
-from levilab.present.clock import local, moment
+from levilab.present.clock import in_utc, moment
 from levilab.present.document.blocks import Block, Details, Fact, Facts, Listing, Note, Section, Tabular, with_marks
 from levilab.present.tables import table
 from levilab.present.units import split
@@ -154,7 +153,7 @@ def _sentence(how: str, seed: int | None) -> str:
 
 def _when(record: RunRecord) -> tuple[str, ...]:
     """Begin and end, as far as they are known; a virtual clock may have made one of them."""
-    ends = [_time(utc) for utc in (record.started_utc, record.ended_utc) if utc]
+    ends = [in_utc(utc) for utc in (record.started_utc, record.ended_utc) if utc]
     first, *last = dict.fromkeys(ends) or ("",)
     return (Text("{first} to {last}", first=first, last=last[0]) if last else first,)
 
@@ -165,12 +164,6 @@ def _local_start(source: Source[Any]) -> tuple[str, ...]:
         return ()
     said = "time zero at {moment}, local time" if source.time_zero else "started at {moment}, local time"
     return (Text(said, moment=moment(source.start)),)
-
-
-def _time(utc: str) -> str:
-    """Return a time of run.json to the second; what is no time stands as it is."""
-    found = local(utc)
-    return f"{found.astimezone(UTC):%Y-%m-%d %H:%M:%S UTC}" if found else utc
 
 
 def _events(source: Source[Any]) -> tuple[Block, ...]:

@@ -3,7 +3,7 @@
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import Any
 
 from levilab.errors import LevilabError
@@ -24,7 +24,7 @@ from levilab.present.document.blocks import (
     Tabular,
 )
 from levilab.present.tables import table
-from levilab.software import software_versions
+from levilab.software import command_text, software_versions, versions_text
 from levilab.texts.text import ENGLISH, Text, how_many, spoken, verbatim
 
 
@@ -226,8 +226,8 @@ def _recording(sources: Sequence[Source[Any]]) -> tuple[Block, ...]:
     for source in sources:
         record = source.run.record if source.run else None
         texts = [
-            *([_as_typed(record.command_line)] if record and record.command_line else []),
-            *([_versions(record.software)] if record and record.software else []),
+            *([command_text(record.command_line)] if record and record.command_line else []),
+            *([versions_text(record.software)] if record and record.software else []),
         ]
         if texts:
             facts.append(Fact(source.name, tuple(texts), code=True))
@@ -241,26 +241,4 @@ def _versions_here(sources: Sequence[Source[Any]]) -> tuple[Facts, ...]:
     here = software_versions()
     if all(source.run and source.run.record.software == here for source in sources):
         return ()
-    return (Facts((Fact("Versions here", (_versions(here),)),)),)
-
-
-def _as_typed(words: Sequence[str]) -> str:
-    """Return a recorded command as one types it.
-
-    >>> _as_typed(["/usr/lib/levilab/__main__.py", "acquire", "spin", "--note", "a b"])
-    "levilab acquire spin --note 'a b'"
-    """
-    name, *arguments = words
-    path = PurePath(name.replace("\\", "/"))
-    is_levilab = path.stem in {"levilab", "levilab-script"} or path.parts[-2:] == ("levilab", "__main__.py")
-    return " ".join(["levilab" if is_levilab else shlex.quote(name), *map(shlex.quote, arguments)])
-
-
-def _versions(software: dict[str, str]) -> str:
-    """Return the versions, levilab's first.
-
-    >>> _versions({"python": "3.11.7", "levilab": "0.1.0"})
-    'levilab 0.1.0, python 3.11.7'
-    """
-    names = sorted(software, key=lambda name: (name != "levilab", name))
-    return ", ".join(f"{name} {software[name]}" for name in names)
+    return (Facts((Fact("Versions here", (versions_text(here),)),)),)

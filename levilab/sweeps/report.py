@@ -11,7 +11,8 @@ import numpy as np
 from analysis.numbers import digits
 from levilab.errors import as_typed
 from levilab.files import writing
-from levilab.motion.report import SYNTHETIC, command_text, scene_blocks
+from levilab.motion.report import SYNTHETIC, scene_blocks
+from levilab.present.clock import in_utc
 from levilab.present.document.blocks import (
     Block,
     Bullets,
@@ -25,6 +26,7 @@ from levilab.present.document.blocks import (
     Verdict,
     Warnings,
 )
+from levilab.software import command_text, versions_text
 from levilab.sweeps.adaptive import in_words, report_in
 from levilab.sweeps.axes import in_words as axis_in_words
 from levilab.sweeps.quantities import GROUPS, Observable, columns_of
@@ -145,11 +147,11 @@ def _reproduction(store: Store) -> Iterator[Block]:
     software, processor = store.attribute("software"), store.attribute("processor")
     facts = []
     if isinstance(software, dict):
-        facts.append(Fact("Software", (", ".join(f"{name} {version}" for name, version in software.items()),)))
+        facts.append(Fact("Software", (versions_text(software),)))
     if isinstance(processor, dict) and "name" in processor:
         facts.append(Fact("Processor", (str(processor["name"]),)))
-    begun = str(store.group.attrs.get("created_utc", "—"))[:19].replace("T", " ")
-    facts.append(Fact("When", (Text("begun {time:s} UTC", time=begun),)))
+    begun = in_utc(str(store.group.attrs.get("created_utc", "—")))
+    facts.append(Fact("When", (Text("begun {time:s}", time=begun),)))
     yield Facts(tuple(facts))
     yield Note("On a processor of the same kind the same command gives the same numbers to the last digit.")
 
