@@ -2,8 +2,6 @@
 
 from dataclasses import dataclass
 
-from levilab.present.units import split
-
 
 @dataclass(frozen=True)
 class View:
@@ -38,23 +36,3 @@ def view_of(experiment: str, columns: tuple[str, ...]) -> View | None:
         return view
     values = [name for name in columns[1:] if "_u_" not in name]
     return View(columns[0], values[0], columns[0], values[0]) if values else None
-
-
-def u_of(column: str) -> str:
-    """Return the name of the column with a column's standard uncertainty.
-
-    >>> u_of("spin_frequency_hz")
-    'spin_frequency_u_hz'
-    """
-    quantity, unit = split(column)
-    return f"{quantity}_u_{unit.ending if unit else ''}"
-
-
-def unit_of(column: str) -> tuple[str, float]:
-    """Return the unit in which a column is shown, and how many of it are one of the column's.
-
-    >>> [tuple(unit_of(column)) for column in ("height_m", "spin_frequency_hz", "record")]
-    [('cm', 100.0), ('Hz', 1.0), ('', 1.0)]
-    """
-    _, unit = split(column)
-    return unit.shown if unit else ("", 1.0)

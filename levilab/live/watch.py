@@ -14,7 +14,8 @@ import numpy as np
 from levilab.live.envelope import by_columns
 from levilab.live.follow import Followed
 from levilab.live.running import Running, fit_so_far
-from levilab.live.views import u_of, unit_of, view_of
+from levilab.live.views import view_of
+from levilab.present.units import shown_unit, u_of
 from levilab.telemetry.address import Address, read_address
 from levilab.telemetry.codec import pack
 from levilab.telemetry.messages import Message, Poses, Record, State
@@ -313,8 +314,8 @@ def _readings(followed: Followed, ask: dict[str, Any]) -> dict[str, Any]:
         "high": high,
         "u": groups.mean[place[u_of(view.y)]][kept] if single and u_of(view.y) in place else None,
         "single": single,
-        "x_axis": [view.x_label, *unit_of(view.x)],
-        "y_axis": [view.y_label, *unit_of(view.y)],
+        "x_axis": [view.x_label, *shown_unit(view.x)],
+        "y_axis": [view.y_label, *shown_unit(view.y)],
         "trend": _trend(groups, place),
     }
 

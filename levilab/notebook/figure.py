@@ -14,7 +14,7 @@ from levilab.notebook.fit import axes_of
 from levilab.present.drawing import headline, new_figure, panel, run_look, synthetic_mark
 from levilab.present.looks import BLACK
 from levilab.present.style import STYLE, WIDE, as_png, for_notebooks
-from levilab.present.units import split
+from levilab.present.units import shown_unit, split, u_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -57,14 +57,14 @@ def draw_fit(axes: Axes, kind: str, frame: pd.DataFrame, residual: str, curves: 
     for k, (name, curve) in enumerate(curves.items()):
         own, look = frame[frame["input"] == name], run_look(k, len(curves))
         style: Any = {"linestyle": "none", "marker": ".", "color": look.colour}
-        at, readings = (own[one].to_numpy(dtype=float) * _factor(one) for one in (x, column))
+        at, readings = (own[one].to_numpy(dtype=float) * shown_unit(one).factor for one in (x, column))
         if kind == "residuals":
             axes.errorbar(at, readings, yerr=_bars(own, y), elinewidth=0.8, **style)
             continue
         axes.plot(at, readings, **style)
         if curve and len(at):
             fine = np.linspace(own[x].min(), own[x].max(), _POINTS)
-            axes.plot(fine * _factor(x), curve(fine) * _factor(y), color=look.colour, linewidth=1.0)
+            axes.plot(fine * shown_unit(x).factor, curve(fine) * shown_unit(y).factor, color=look.colour, linewidth=1.0)
     if kind == "residuals":
         axes.axhline(0.0, color=BLACK, linewidth=0.7)
     axes.set(xlabel=_label(x), ylabel=_label(column))
@@ -76,7 +76,7 @@ def draw_column(axes: Axes, x: str, y: str, frame: pd.DataFrame, style: str = "-
     Of yes and no there is nothing in between, and no line.
     """
     style = "o" if frame[y].dtype == bool else style
-    at, values = (frame[one].to_numpy(dtype=float) * _factor(one) for one in (x, y))
+    at, values = (frame[one].to_numpy(dtype=float) * shown_unit(one).factor for one in (x, y))
     axes.errorbar(at, values, yerr=_bars(frame, y), fmt=style, elinewidth=0.8)
     axes.set(xlabel=_label(x), ylabel=_label(y))
     if frame[y].dtype == bool:
@@ -122,20 +122,14 @@ def drawn(
 
 def _bars(frame: pd.DataFrame, column: str) -> np.ndarray | None:
     """Return the standard uncertainties of a column, in the unit of its axis; None where they are not known."""
-    quantity, unit = split(column)
-    u = f"{quantity}_u_{unit.ending}" if unit else ""
+    u = u_of(column)
     known = u in frame and bool(frame[u].notna().any())
-    return frame[u].to_numpy(dtype=float) * _factor(column) if known else None
+    return frame[u].to_numpy(dtype=float) * shown_unit(column).factor if known else None
 
 
 def _label(column: str) -> str:
     quantity, unit = split(column)
     return f"{quantity.replace('_', ' ')}  [{unit.shown.unit}]" if unit else column
-
-
-def _factor(column: str) -> float:
-    unit = split(column)[1]
-    return unit.shown.factor if unit else 1.0
 
 
 def small_png(figure: Figure) -> bytes:

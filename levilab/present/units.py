@@ -137,6 +137,25 @@ def split(name: str) -> tuple[str, Unit | None]:
     return name, None
 
 
+def u_of(column: str) -> str:
+    """Return the name of the column with a column's standard uncertainty.
+
+    >>> u_of("spin_frequency_hz")
+    'spin_frequency_u_hz'
+    """
+    quantity, unit = split(column)
+    return f"{quantity}_u_{unit.ending if unit else ''}"
+
+
+def shown_unit(column: str) -> Scale:
+    """Return the unit in which a column is shown, and how many of it are one of the column's.
+
+    >>> [tuple(shown_unit(column)) for column in ("height_m", "spin_frequency_hz", "record")]
+    [('cm', 100.0), ('Hz', 1.0), ('', 1.0)]
+    """
+    return (split(column)[1] or _NUMBER).shown
+
+
 def is_unit(text: str) -> bool:
     """Return whether a text is a unit that people are shown, or such units with "per" between them or before one.
 

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from levilab.present.drawing import new_figure, panel
 from levilab.present.looks import LOOKS
 from levilab.present.style import without_formula
-from levilab.present.units import split
+from levilab.present.units import shown_unit, split, u_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -63,12 +63,10 @@ def _axis(column: str) -> str:
 
 def _in_axis_unit(frame: pd.DataFrame, name: str) -> pd.Series:
     """Return a column in the unit of its axis."""
-    _, unit = split(name)
-    return frame[name] * unit.shown.factor if unit else frame[name]
+    factor = shown_unit(name).factor
+    return frame[name] if factor == 1 else frame[name] * factor  # of texts, too
 
 
 def _uncertainty(frame: pd.DataFrame, name: str) -> pd.Series | None:
     """Return the column of its standard uncertainty, as spin_frequency_u_hz is of spin_frequency_hz."""
-    quantity, unit = split(name)
-    column = f"{quantity}_u_{unit.ending}" if unit else ""
-    return _in_axis_unit(frame, column) if column in frame else None
+    return _in_axis_unit(frame, u_of(name)) if u_of(name) in frame else None

@@ -20,7 +20,7 @@ from levilab.pipelines.inputs.unread import skipped_by_all, texts_of
 from levilab.pipelines.recall import recall_suiting
 from levilab.pipelines.result import Place, Result
 from levilab.pipelines.row import plain
-from levilab.present.units import UNITS, split
+from levilab.present.units import UNITS, split, u_of
 from levilab.present.words import free_name
 from levilab.runs.find import RECORD, find_run
 from levilab.runs.run import EVENTS, READINGS, STATES, Run
@@ -485,10 +485,8 @@ def _beside(column: str, names: Mapping[str, str], dimension: str) -> dict[str, 
     """Return the attributes that name a column's places, the first column and the time, and its u."""
     places = dict.fromkeys(names[name] for name in (next(iter(names)), "time_s") if name in names)
     places.pop(dimension, None)
-    quantity, unit = split(column)
-    of_u = names.get(f"{quantity}_u_{unit.ending}") if unit else None
     is_place = names[column] in {dimension, *places}
-    more = {"coordinates": "" if is_place else " ".join(places), "ancillary_variables": of_u}
+    more = {"coordinates": "" if is_place else " ".join(places), "ancillary_variables": names.get(u_of(column))}
     return {name: text for name, text in more.items() if text}
 
 
