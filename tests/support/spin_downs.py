@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 
 
-def spin_down_csv(path: Path, *, n: int = 20, noise: float = 0.03, u: bool = True, seed: int = 1) -> Path:
-    """A plain CSV of a spin-down by the disc law, a reading each 10 s."""
-    t = 10.0 * np.arange(n)
+def spin_down_csv(
+    path: Path, *, n: int = 20, step: float = 10.0, noise: float = 0.03, u: bool = True, seed: int = 1
+) -> Path:
+    """A plain CSV of a spin-down by the disc law, with a step of times [s]."""
+    t = step * np.arange(n)
     nu = 40 * (1 + 2.34e-4 * np.sqrt(2 * np.pi * 40) * t / 2) ** -2 + np.random.default_rng(seed).normal(0, noise, n)
     header, rows = "time_s,spin_frequency_hz", [f"{x!r},{y!r}" for x, y in zip(t.tolist(), nu.tolist(), strict=True)]
     if u:

@@ -17,7 +17,7 @@ from levilab.pipelines.field.device import THESIS, inertias
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.readings import SpinReadings
-from levilab.pipelines.spindown.words import TILT_ALLOWED, is_seen, remark, verdict_in_doubt, verdict_of_all
+from levilab.pipelines.spindown.words import TILT_ALLOWED, UNIT_FIRST, is_seen, remark, verdict_of_all
 from levilab.present.numbers import enumeration
 
 #: The experiment whose runs it takes, and whose settings say how the readings were counted.
@@ -30,7 +30,7 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
     @property
     def text(self) -> str:
         """What the data say, in a few sentences."""
-        return verdict_in_doubt(self.combined) if self.is_doubtful else verdict_of_all(self.combined, self.runs)
+        return UNIT_FIRST if self.is_doubtful else verdict_of_all(self.combined, self.runs)
 
     @property
     def is_doubtful(self) -> bool:

@@ -68,6 +68,8 @@ class _Unit:
 
 def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
     """Draw readings and best law, the other laws less the best one, residuals of each, and the straight lines."""
+    if analysis.is_doubtful:
+        return short_figure(analysis)
     straight = [law for law in laws_of(analysis) if law in STRAIGHT_LINES]
     height, made_up = _HEIGHT if straight else _LINES_TOP - 0.4, [one.synthetic for one in analysis.sources]
     with new_figure(height, _finding(analysis), made_up) as figure:
@@ -85,10 +87,12 @@ def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
 
 
 def short_figure(analysis: SpinDownAnalysis) -> Figure:
-    """Draw readings and best law, and below readings and laws less the best one."""
-    with new_figure(_SHORT_HEIGHT, _finding(analysis), [one.synthetic for one in analysis.sources]) as figure:
+    """Draw readings and best law, and below readings and laws less the best one; of a doubtful unit readings alone."""
+    height = _SHORT_HEIGHT - 1.65 * analysis.is_doubtful
+    with new_figure(height, _finding(analysis), [one.synthetic for one in analysis.sources]) as figure:
         _draw_spin(panel(figure, _LEFT, 0.62, 4.3, 1.35), analysis)
-        _draw_differences(panel(figure, _LEFT, 2.55, 4.3, 1.1), analysis, _unit(analysis))
+        if not analysis.is_doubtful:
+            _draw_differences(panel(figure, _LEFT, 2.55, 4.3, 1.1), analysis, _unit(analysis))
     return figure
 
 
@@ -124,7 +128,9 @@ def _draw_spin(axes: Axes, analysis: SpinDownAnalysis) -> None:
         width = 1.4 if several == 1 else 0.9 if several <= len(MARKERS) else 0.4
         said = "best law: {law}, {equation}" if is_best(analysis, best) else "{law}, {equation}"
         label = Text(said, law=short_law(best), equation=in_mathtext(LAWS[best].equation)) if k == 0 else None
-        axes.plot(t, run.fit(best).spin_frequency(t), linewidth=width, zorder=2.5, label=label, **LOOKS[best].as_line)
+        if not analysis.is_doubtful:
+            nu = run.fit(best).spin_frequency(t)
+            axes.plot(t, nu, linewidth=width, zorder=2.5, label=label, **LOOKS[best].as_line)
         name = _run_label(analysis, k)
         _draw_readings(axes, analysis, k, run.frequency, span=span, label=name, gid=f"readings-{k}")
         _draw_outliers(axes, analysis, k)

@@ -286,8 +286,8 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
         say = _say_unit(table, "f", {unit: Text("{spin:n} Hz", digits(spin, 3)) for unit, spin in spins})
         if not say and is_possible_spin(1e3 * middle):
             say = "; if its point stands behind the thousands, write the numbers without it"
-        text = "{name:s}: the spin is about {spin:.4g} Hz, a Levitron spins at 20 to 60 Hz{say}"
-        return [_doubt(Text(text, name=table.path.name, spin=middle, say=say))]
+        text = "{name:s}: the spin is about {spin:n} Hz, a Levitron spins at 20 to 60 Hz{say}"
+        return [_doubt(Text(text, name=table.path.name, spin=digits(middle, 4), say=say))]
     if step * middle < 1:  # nor does a counter give a reading in less
         doubt = Text(
             "{name:s}: the readings lie {step:.3g} ms apart, the top needs {turn:.3g} ms for a turn; if the times are "

@@ -39,6 +39,7 @@ from levilab.pipelines.spindown.words import (
     OF_RUN,
     STRAIGHT_LINES,
     SYMBOLS,
+    UNIT_FIRST,
     is_prior,
     is_seen,
     law_name,
@@ -234,7 +235,9 @@ _WITH_TENTHS = 100.0
 
 
 def spindown_tables(analysis: SpinDownAnalysis) -> tuple[Table, ...]:
-    """Return the runs, the laws, how well they fit, the straight lines.  Each fits a terminal of 80 columns."""
+    """Return the runs; the laws, how well they fit, the straight lines.  Each fits a terminal of 80 columns."""
+    if analysis.is_doubtful:
+        return (_runs_table(analysis),)
     quality = replace(quality_table(analysis, QUALITY), title=Sentences("How well they fit.", _QUALITY_SYMBOLS))
     count = count_table(analysis, symbols=True)
     best, *lines = _of_laws(analysis)
@@ -407,12 +410,12 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
     """Return verdict, laws, their meaning, how well they fit, the constants run by run, and the readings."""
     combined = analysis.combined
     n = combined.fit(combined.best).statistics.n
-    return ReportPart(
+    part = ReportPart(
         subject="spin-down",
         heading="Spin-down of a levitated top",
         lead=Text("{readings} used", readings=how_many(n, "reading")),
         result=(
-            *(() if analysis.is_doubtful else (Paragraph(Sentences(*meaning(analysis)), "What it means."),)),
+            Paragraph(Sentences(*meaning(analysis)), "What it means."),
             *_falls(analysis),
             *_laws(analysis),
         ),
@@ -439,6 +442,18 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
             lambda source, run, options: (_readings(source, run, options, combined.best),),
             verdict_of_run,
         ),
+    )
+    if not analysis.is_doubtful:
+        return part
+    return replace(
+        part,
+        result=(),
+        figure=FigureText("Spin-down.", "The readings as they were read.", _points(analysis)),
+        values=(),
+        short_figure=None,
+        compared=(),
+        runs=(),
+        inputs=input_parts(analysis, _in_words, lambda *_: (), lambda _: UNIT_FIRST),
     )
 
 

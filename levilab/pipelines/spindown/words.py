@@ -170,12 +170,6 @@ def verdict_of_all(found: Combined, runs: Sequence[SpinDown]) -> str:
     return _verdict(found, found.fits, {fit.name: fit.constants for fit in found.fits}, found.tilt, runs)
 
 
-def verdict_in_doubt(found: Combined) -> str:
-    """Return what all runs say about the laws where no unit is sure."""
-    said = "The unit comes first: as it was read the {law} law is nearest; do not use its constants."
-    return Text(said, law=law_name(found.best))
-
-
 def is_seen(tilt: Estimate | None) -> bool:
     """Return whether readings show a tilt of the moment, and not only what was known of it beforehand."""
     return tilt is not None and tilt.value is not None and bool(tilt.u) and tilt.value > SEEN * (tilt.u or 0.0)
@@ -327,6 +321,8 @@ def _value(estimate: Estimate) -> str:
 
 # --- remarks ------------------------------------------------------------------------------------------
 
+#: Instead of a verdict, where no unit is sure.
+UNIT_FIRST = "The unit comes first: laws are compared once it is known."
 #: What a tilt costs that the readings do not show: docs/crosscheck.md has the numbers.
 TILT_ALLOWED = (
     "u allows for a tilt of the moment, which these readings leave open; for a top that is known to have none: `tilt` "

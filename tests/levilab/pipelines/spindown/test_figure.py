@@ -215,7 +215,7 @@ def test_the_legend_shows_short_names_and_takes_them_literally(tmp_path):
 
 
 def test_many_readings_are_thinned_out_and_means_show_the_shape(tmp_path):
-    path = spin_down_csv(tmp_path / "a.csv", n=300, u=False)
+    path = spin_down_csv(tmp_path / "a.csv", n=300, step=0.6, u=False)
     residuals = panels(spindown_figure(analysis_of(path, u=0.03)))[1]
     for axes in residuals:
         points = [len(np.asarray(line.get_xdata())) for line in axes.get_lines()]
