@@ -95,7 +95,8 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
     """
     off = Event()
     try:
-        return _acquire(request, show, watch, off)
+        with watching_for_interruption() as stop:
+            return _acquire(request, show, stop, watch=watch, off=off)
     except OutputMayBeOn:  # which says it itself
         off.set()
         raise
@@ -104,9 +105,21 @@ def acquire(request: AcquisitionRequest, show: Display, watch: Watch = publishin
             show.message(_NOT_SEEN_OFF)
 
 
-def _acquire(request: AcquisitionRequest, show: Display, watch: Watch, off: Event) -> Run:
+def acquire_one_of_many(request: AcquisitionRequest) -> Run:
+    """Run a mock experiment, one of many.  Raises KeyboardInterrupt at any signal: it is meant for all of them."""
+    with watching_for_interruption() as stop:
+        run = _acquire(request, Display(), stop)
+    if stop.by:  # it may have come after the last reading
+        raise KeyboardInterrupt
+    return run
+
+
+def _acquire(
+    request: AcquisitionRequest, show: Display, stop: Stop, *, watch: Watch = publishing, off: Event | None = None
+) -> Run:
     """Acquire, and set `off` once the outputs are seen to be off."""
-    with watching_for_interruption() as stop, _writer(request, show) as writer, contextlib.closing(show):
+    off = off or Event()
+    with _writer(request, show) as writer, contextlib.closing(show):
         try:
             with stop.let_second_signal_through():
                 _at_the_bench(request, writer, show, stop, watch=watch, off=off.set)
@@ -117,7 +130,7 @@ def _acquire(request: AcquisitionRequest, show: Display, watch: Watch, off: Even
                 if off.is_set()
                 else "interrupted by {by} before the bench was open"
             )
-            text = Text(seen, by=interruption.by)
+            text = Text(seen, by=interruption.by.replace("SIGINT", "Ctrl-C"))
             writer.event(None, RunEvent.INTERRUPTED, text)
             show.close()  # its picture of the bench is from before the outputs went off
             show.message(text)

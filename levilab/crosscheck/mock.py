@@ -6,11 +6,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from levilab.acquisition.loop import acquire
+from levilab.acquisition.loop import acquire_one_of_many
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.table import settings_of, with_settings
 from levilab.crosscheck.subject import TrialFailed
-from levilab.present.progress import Display
 from levilab.runs.run import Run
 from levilab.simulator.scene import Scene
 from levilab.world.bench import virtual_wiring
@@ -40,7 +39,7 @@ def acquire_mock(
         counter: in place of the bench's.
         scope: in place of the bench's.
 
-    Raises TrialFailed; KeyboardInterrupt where Ctrl-C ended the run: it is meant for the whole cross-check.
+    Raises TrialFailed; KeyboardInterrupt where a signal asked for the end.
     """
     request = request_for(
         experiment, AcquisitionOptions(mock=True, counter=counter, scope=scope, out=folder, seed=seed)
@@ -52,9 +51,7 @@ def acquire_mock(
     if world is not None:
         limits, named = request.config.limits, request.named
         request = replace(request, wiring=lambda: virtual_wiring(world, limits, named))
-    run = acquire(request, Display())
-    if run.status == "interrupted":
-        raise KeyboardInterrupt
+    run = acquire_one_of_many(request)
     if run.status != "finished":
         raise TrialFailed(f"{run.folder.name}: the run is {run.status}")
     return run

@@ -120,7 +120,7 @@ function takeFit(about) {
 
 /** Draw the running fit, unless a task asks for its numbers. */
 function showFit() {
-  const hidden = Boolean(practice?.hidesFit?.()), said = practice?.verdict ?? [];
+  const hidden = Boolean(practice?.hidesFit?.(data.about?.experiment)), said = practice?.verdict ?? [];
   if (data.hidden === hidden && data.said.length === said.length) return;
   const about = data.shown = hidden ? {} : said.length ? {...data.found, lines: said} : data.found ?? {};
   Object.assign(data, {hidden, said});

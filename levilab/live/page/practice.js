@@ -316,8 +316,8 @@ export function openPractice(about, command, run, isOwn, allowed) {
   }
 
   const take = (verdict, name) => Object.assign(now, {analyzed: name, verdict: verdict.slice(0, 2)});
-  /** Whether the running fit would give away what the task under way asks for: until the run is analyzed. */
-  const hidesFit = () => now.analyzed !== run() && Object.keys(tasks[now.bench?.task]?.answers ?? {}).length > 0;
+  /** Whether the running fit of an experiment would give away what the task under way asks for: until it is analyzed. */
+  const hidesFit = (experiment) => now.analyzed !== run() && Boolean(experiment) && tasks[now.bench?.task]?.measures === experiment;
 
   return {
     show, step, hear, hidesFit, get ended() { return now.ended; },

@@ -28,6 +28,11 @@ class PracticeExperiment:
     length_s: float
     scene: str = ""
 
+    @property
+    def moves_probe(self) -> bool:
+        """Whether it moves the magnetometer's probe: its readings say where that stands, and the top is taken off."""
+        return self.experiment == "field"
+
 
 def _prefixed(table: str, *settings: str) -> tuple[str, ...]:
     return tuple(f"{table}.{one}" for one in settings)

@@ -37,7 +37,13 @@ def _why_not(found: Stability, *, hides: bool) -> str:
 
 
 def cause_of_fall(
-    scene: Scene, spin_hz: float | None, after_s: float | None, *, held: str = "", hides: bool = False
+    scene: Scene,
+    spin_hz: float | None,
+    after_s: float | None,
+    *,
+    changed_s: float = math.inf,
+    held: str = "",
+    hides: bool = False,
 ) -> str:
     """Return why a top fell.
 
@@ -45,10 +51,14 @@ def cause_of_fall(
         scene: as it was when it fell.
         spin_hz: with which it fell [Hz]; None: it was never counted.
         after_s: time since it was put there [s]; None: the run that is recorded says when it fell.
+        changed_s: time since top, base or air were changed [s].
         held: how a drive held it.
         hides: whether the masses that float are to be found.
     """
-    after = "" if after_s is None else Text(" after {seconds:.0f} s", seconds=after_s) if after_s >= 1.0 else " at once"
+    after = ""
+    if after_s is not None:
+        said = " {seconds:.1f} s after the change" if changed_s < after_s else " after {seconds:.0f} s"
+        after = Text(said, seconds=seconds) if (seconds := min(changed_s, after_s)) >= 1.0 else " at once"
     if base_deg := abs(math.degrees(scene.base.tilt_rad)):
         scene = scene.changed({"base.tilt_rad": 0.0})  # the theory is of an upright base
     found = _stability(scene.model_dump_json())

@@ -212,7 +212,8 @@ class PracticeProcess:
         seen = None if runs else after  # the run says in its own words when that was
         # of a top that swings too far the counter misses pulses
         spin = None if self.top.spin_hz is None else self.top.world.spin_of_fall()
-        why = cause_of_fall(self.top.scene, spin, seen, held=held, hides=hides)
+        changed = self.top.looked - self.top.changed
+        why = cause_of_fall(self.top.scene, spin, seen, changed_s=changed, held=held, hides=hides)
         if runs:
             self._fell = why
         else:
@@ -391,7 +392,7 @@ class PracticeProcess:
             mock=True,
             out=Path(self._options.out),
             seed=self.top.seed,
-            group=self.tasks.label(command.group.strip()) or None,
+            group=self.tasks.label(command.group.strip(), on_the_bench=not (plan.scene or plan.moves_probe)) or None,
             note=command.note,
             settings=settings_for(plan, scene),
         )

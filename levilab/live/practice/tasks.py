@@ -170,9 +170,12 @@ class Tasks:
         """What the task under way hides: keys of a scene."""
         return TASKS[self.name].hidden(self._chance) if self.name else {}
 
-    def label(self, group: str) -> str:
-        """Return the name of a group for its runs: those with a top that a task hides are none of its others'."""
-        return ": ".join(filter(None, (group, TASKS[self.name].title if self.hidden else "")))
+    def label(self, group: str, *, on_the_bench: bool) -> str:
+        """Return the name of a group for a run: one of a top that a task hides is none of its others'.
+
+        on_the_bench: whether the run is of the top on the bench.
+        """
+        return ": ".join(filter(None, (group, TASKS[self.name].title if self.hidden and on_the_bench else "")))
 
     def begin(self, name: str) -> None:
         """Begin a task in the place of the one under way; empty: none.  Raises CommandRefused."""

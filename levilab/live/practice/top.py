@@ -20,9 +20,6 @@ if TYPE_CHECKING:
     from levilab.live.practice.experiments import PracticeExperiment
     from levilab.world.motion_world import MotionWorld
 
-#: Experiments that move the magnetometer's probe: where it stands, their readings say.
-MOVE_THE_PROBE = frozenset({"field"})
-
 
 def _changeable(scene: Scene) -> dict[str, Any]:
     """Return the keys of a scene that a person or a task can change, with their values."""
@@ -43,7 +40,7 @@ class PracticeTop:
         seed: which drew top and base.
         up_since: when the top that floats was put there, bench time [s]; None: it is down.
         spin_hz: of that top, as it was counted last [Hz]; of one that leans the counter sees no light.
-        looked: when `look` was called last, bench time [s].
+        looked, changed: when `look` and `change` were called last, bench time [s].
         release: from which spin on a drive has held that top, and how long; None: none has.
 
     Args:
@@ -61,7 +58,7 @@ class PracticeTop:
         self._tops = 0
         self.up_since: float | None = 0.0
         self.spin_hz: float | None = None
-        self.looked = 0.0
+        self.looked = self.changed = 0.0
         self.release: Release | None = None
         world.place_probe(None)  # in the top's place it would be hit
 
@@ -95,7 +92,7 @@ class PracticeTop:
         keys = keys_of(self._usual, values)
         with announce_compilation(self._voice.message):
             self.world.change_scene({**_changeable(self._usual), **keys})
-        self.scene, self.what_if = self._usual.changed(keys), values
+        self.scene, self.what_if, self.changed = self._usual.changed(keys), values, self.world.clock.now()
 
     def hide(self, keys: Mapping[str, Any]) -> None:
         """Take another top for the usual one, as a task does: the usual one with these keys changed."""
@@ -123,8 +120,7 @@ class PracticeTop:
     @contextlib.contextmanager
     def lent_to(self, plan: PracticeExperiment) -> Iterator[None]:
         """Have the top of an experiment on the bench meanwhile, or none where its probe goes; then the usual one."""
-        takes_off = plan.experiment in MOVE_THE_PROBE
-        if takes_off:
+        if plan.moves_probe:
             self.world.take_top()
             self.up_since = self.release = None
             self._voice.message("the top is taken off: the probe goes where it floats")
@@ -140,7 +136,7 @@ class PracticeTop:
         finally:
             self.world, self.scene, self.wiring = usual
             self.world.place_probe(None)  # the run may have moved it
-            if plan.scene or takes_off:
+            if plan.scene or plan.moves_probe:
                 self.put_back()
             if plan.scene:
                 self._voice.message("the run had a top of its own; the usual one floats again")

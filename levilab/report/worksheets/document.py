@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from levilab.acquisition.loop import acquire
+from levilab.acquisition.loop import acquire_one_of_many
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.errors import UsageError, check_language
 from levilab.files import parse_toml, replace_atomically, writing
@@ -23,7 +23,6 @@ from levilab.present.document.blocks import (
     in_language_of_reader,
 )
 from levilab.present.numbers import column
-from levilab.present.progress import Display
 from levilab.present.tables import table
 from levilab.report.beside import Class, class_of
 from levilab.report.groups.document import truth_text
@@ -212,5 +211,5 @@ def measure(sheet: Sheet, seeds: Mapping[str, int]) -> Class:
         runs = []
         for group, seed in seeds.items():
             options = AcquisitionOptions(mock=True, seed=seed, group=group, out=Path(folder), settings=sheet.settings)
-            runs.append(acquire(request_for(sheet.experiment, options), Display()).folder)
+            runs.append(acquire_one_of_many(request_for(sheet.experiment, options)).folder)
         return class_of(analysis, analysis.analyze(runs), sheet.asked)

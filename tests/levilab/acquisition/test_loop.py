@@ -182,14 +182,14 @@ def test_a_scene_without_drag_is_named_as_the_reason(tmp_path):
     assert "the scene has no drag (drag.law); take one with drag" in seen["text"]
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_the_run_with_outputs_off_and_all_readings(tmp_path, outputs, number):
+@pytest.mark.parametrize(("number", "by"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")])
+def test_a_signal_ends_the_run_with_outputs_off_and_all_readings(tmp_path, outputs, number, by):
     show = Impatient(5, number)
     run = acquire(mock(tmp_path), show)
     assert run.status == "interrupted"
     assert len(run.readings().frame) == 5
     assert outputs[-1] is False
-    assert run.events()[-1]["text"] == f"interrupted by {number.name}, outputs are off"
+    assert run.events()[-1]["text"] == f"interrupted by {by}, outputs are off"
     assert show.after_close == [run.events()[-1]["text"]], "not above a bench whose drive was on"
 
 

@@ -102,13 +102,14 @@ def test_a_value_without_an_uncertainty_is_no_pull():
         pull_of("c32", Estimate(1.0, None, "1/s"), 1.0)
 
 
-def test_ctrl_c_in_a_trial_ends_the_cross_check():
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_in_a_trial_ends_the_cross_check(number):
     """It interrupts the run of the trial; the next trial would go on otherwise."""
     trials = []
 
     class Interrupting(SpinWorld):
         def motion(self, times):
-            signal.raise_signal(signal.SIGINT)
+            signal.raise_signal(number)
             return super().motion(times)
 
     def trial(seed, folder):

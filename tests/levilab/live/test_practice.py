@@ -326,6 +326,10 @@ def test_after_a_run_the_last_minutes_show_what_a_person_does(starting, page, tm
     publish(watch, off)
     until(page, "document.body.dataset.state === 'finished' && levilab.data.bench")
     assert page.inner_text("#readings-title") == "Readings"
+    publish(watch, replace(off, time_s=2.1, task="guess"))  # n is asked for
+    until(page, "document.getElementById('fit-head').textContent.startsWith('The fit is shown once')")
+    publish(watch, replace(off, time_s=2.2, task="stem"))  # of a precession
+    until(page, "!document.getElementById('fit-head').textContent.startsWith('The fit is shown once')")
     is_of_minutes = "document.getElementById('readings-title').textContent === 'The last minutes'"
     publish(watch, replace(off, time_s=3.0, drive=Drive("SQU", 30.0, 10.0, output=True)))
     until(page, f"{is_of_minutes} && document.body.dataset.state === 'idle'")

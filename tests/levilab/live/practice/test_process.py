@@ -442,6 +442,7 @@ def test_what_a_person_changes_has_immediate_effect(tmp_path):
     assert script.states[-1].what_if["washers_g"] == 0.2
     (heavy,) = [text for text in script.said("message") if text.startswith("the top is too heavy")]
     assert "25.10 g" in heavy  # of 24.3 g
+    assert 1.0 < float(re.search(r"it fell (\S+) s after the change$", heavy)[1]) < 4.0  # of 12 s that it was up
     assert script.spins(20.0, 25.0)[-1][2] == pytest.approx(29.4, abs=0.3)  # it floats again, in air
     assert script.process.top.scene.changed({}).as_table() == read_scene("practice").as_table()
 
@@ -505,9 +506,10 @@ def test_each_hidden_drag_slows_the_top_as_the_usual_one_at_first(chance, n):
 
 def test_a_run_with_a_hidden_top_is_none_of_its_groups_others():
     tasks = Tasks(0)
-    assert tasks.label("Group 7") == "Group 7"
+    assert tasks.label("Group 7", on_the_bench=True) == "Group 7"
     tasks.begin("guess")
-    assert [tasks.label("Group 7"), tasks.label("")] == ["Group 7: Find n", "Find n"]
+    assert [tasks.label(group, on_the_bench=True) for group in ("Group 7", "")] == ["Group 7: Find n", "Find n"]
+    assert tasks.label("Group 7", on_the_bench=False) == "Group 7"  # a scan of the field sees no top
 
 
 def test_a_goal_has_to_be_there_without_a_break():

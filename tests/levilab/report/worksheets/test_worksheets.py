@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+import signal
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from levilab.report.beside import class_of
 from levilab.report.worksheets.document import key as key_of
 from levilab.report.worksheets.document import measure, read_language, write_worksheets
 from levilab.report.worksheets.sheets import SHEETS
+from levilab.runs.writer import RunWriter
 from levilab.texts.text import languages
 from levilab.world.spin_world import random_scene
 from support.pages import Page
@@ -52,6 +54,22 @@ def test_every_text_is_used(code, tmp_path):
     assert missing == []
     assert f'lang="{code}"' in files[0].read_text(encoding="utf-8")
     assert (f"--seed 1 --language {code} --out class" in page) is (code != "en")  # as the program speaks by itself
+
+
+@pytest.mark.parametrize("moment", ["reading", "finish"])
+def test_ctrl_c_at_any_moment_of_a_run_ends_the_key(monkeypatch, moment):
+    """Also after its last reading: the other groups' runs would go on otherwise."""
+    usual, runs = getattr(RunWriter, moment), []
+
+    def interrupted(self, *given):
+        signal.raise_signal(signal.SIGINT)
+        runs.append(self.folder)
+        return usual(self, *given)
+
+    monkeypatch.setattr(RunWriter, moment, interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        measure(SHEETS["field"], {"A": 1, "B": 2})
+    assert len({*runs}) == 1
 
 
 #: Three tops in the place of ten, which take 2 s.
