@@ -30,6 +30,8 @@ from analysis.uncertainty import Estimate, curvature, propagate, student
 _GAP = 1.5
 #: No top is held below this spin [Hz].
 _LOWEST_HZ = 24.0
+#: Laws are compared where the exponent of the drag is known to this u: two of it are from Stokes's law to the disc's.
+_EXPONENT_U = 0.25
 
 
 @dataclass(frozen=True)
@@ -139,8 +141,11 @@ class HeldLaw:
         return self.reference_hz * LAWS[self.name].slowing(spin / self.reference_hz, self.solution)
 
 
-def fit_held(spin: Array, drag: Array, u: Array, common: Array | None = None) -> tuple[HeldLaw, ...]:
-    """Return each law that has no more constants than there are spins, fitted to the drag, the best law first.
+def fit_held(spin: Array, drag: Array, u: Array, common: Array | None = None) -> tuple[tuple[HeldLaw, ...], float]:
+    """Return each law fitted to the drag, the best law first, and the part of the drag by which tops differ.
+
+    u of the drag is widened by that part, which makes χ² about the law that fits best what is expected.  Where the
+    spins are too near each other to compare laws, there are only those with a single constant.
 
     Args:
         spin: shape (n,) [Hz].
@@ -149,21 +154,47 @@ def fit_held(spin: Array, drag: Array, u: Array, common: Array | None = None) ->
         common: u of an error that is common to all spins, shape (n,) [Hz/s]; None: there is none.
 
     >>> spins = np.array([25.0, 35.0, 45.0])
-    >>> found = fit_held(spins, 2e-4 * (2 * np.pi * spins) ** 1.5 / (2 * np.pi), 0.001 * np.ones(3))
+    >>> found, _ = fit_held(spins, 2e-4 * (2 * np.pi * spins) ** 1.5 / (2 * np.pi), 0.001 * np.ones(3))
     >>> found[0].name, round(found[0].constants["c32"].value, 7)
     ('disc', 0.0002)
     """
+    n, x = len(spin), np.log(spin)
+    usual = np.exp(EXPONENT * (x - x.mean()))
+    usual *= abs(float(drag.mean() / usual.mean()))
+    shared = np.zeros(n) if common is None else common
+
+    def whiten(part: float) -> Array:
+        return np.linalg.inv(np.linalg.cholesky(np.diag(u**2 + (part * usual) ** 2) + np.outer(shared, shared)))
+
+    def fits(part: float, most: int) -> list[HeldLaw]:
+        laws = (law for law in LAWS.values() if len(law.constants) <= most)
+        return [_fit(law, spin, drag, whiten(part), whiten(0.0)) for law in laws]
+
+    def between(most: int) -> float:
+        def excess(part: float) -> float:
+            return min(one.statistics.misfit - one.statistics.degrees_of_freedom for one in fits(part, most))
+
+        if most < 1 or excess(0.0) <= 0:
+            return 0.0
+        from scipy.optimize import brentq
+
+        return float(brentq(excess, 0.0, np.linalg.norm(drag / usual), xtol=1e-6))  # there a law without drag fits
+
+    most, part = 1, between(min(1, n - 1))
+    weights = (usual / np.hypot(u, part * usual)) ** 2
+    if weights @ (x - np.average(x, weights=weights)) ** 2 > _EXPONENT_U**-2:
+        most, part = n, between(n - 1)
+    by_name = {one.name: one for one in fits(part, most)}
+    weighed, _ = weigh({name: one.statistics for name, one in by_name.items()})
+    return tuple(replace(by_name[name], statistics=stats) for name, stats in weighed.items()), part
+
+
+def _fit(law: DragLaw, spin: Array, drag: Array, white: Array, stated: Array) -> HeldLaw:
+    """Fit a law; white, shape (n, n), makes errors of the drag independent, with a standard deviation of 1.
+
+    stated does it for the errors without what tops differ by.
+    """
     reference = float(np.exp(np.mean(np.log(spin))))
-    shared = np.zeros(len(spin)) if common is None else common
-    white = np.linalg.inv(np.linalg.cholesky(np.diag(u**2) + np.outer(shared, shared)))
-    fits = [_fit(law, spin, drag, white, reference) for law in LAWS.values() if len(law.constants) <= len(spin)]
-    weighed, _ = weigh({one.name: one.statistics for one in fits})
-    by_name = {one.name: one for one in fits}
-    return tuple(replace(by_name[name], statistics=stats) for name, stats in weighed.items())
-
-
-def _fit(law: DragLaw, spin: Array, drag: Array, white: Array, reference: float) -> HeldLaw:
-    """Fit a law; white, shape (n, n), makes errors of the drag independent, with a standard deviation of 1."""
     x, scale = spin / reference, float(np.mean(drag)) / reference
     p = len(law.constants)
 
@@ -181,9 +212,9 @@ def _fit(law: DragLaw, spin: Array, drag: Array, white: Array, reference: float)
     inverse = curvature(slopes(k)).covariance
     covariance, of_u = (None, np.full(p, np.nan)) if inverse is None else propagate(inverse, natural[1:, 1:])
     residuals = drag - model(k)
-    chi_square = float(np.sum((white @ residuals) ** 2))
+    misfit, chi_square = (float(np.sum((one @ residuals) ** 2)) for one in (white, stated))
     found = statistics(
-        n=len(x), n_parameters=p, rss=float(residuals @ residuals), chi_square=chi_square, misfit=chi_square,
+        n=len(x), n_parameters=p, rss=float(residuals @ residuals), chi_square=chi_square, misfit=misfit,
         durbin_watson=None, runs_test_p=None, runs=0,
     )  # fmt: skip
     constants = {

@@ -77,7 +77,7 @@ def test_the_drag_along_a_closed_form_gives_its_constants_back(law):
     time = np.linspace(0, 150, 7)
     spins = spin(law, time, 45.0, *constants)
     drag = (spin(law, time - 0.01, 45.0, *constants) - spin(law, time + 0.01, 45.0, *constants)) / 0.02
-    fits = {one.name: one for one in fit_held(spins, drag, 1e-3 * drag)}
+    fits = {one.name: one for one in fit_held(spins, drag, 1e-3 * drag)[0]}
     assert [one.value for one in fits[law].constants.values()] == pytest.approx(constants, rel=1e-4)  # differences
     assert fits[law].drag(spins) == pytest.approx(drag, rel=1e-5)
 
@@ -85,8 +85,22 @@ def test_the_drag_along_a_closed_form_gives_its_constants_back(law):
 def test_a_common_error_of_the_drag_does_not_average_out():
     spins = np.linspace(25, 45, 30)
     own, common = 0.001 * np.ones(30), 0.02 * drag_at(spins)
-    (alike,) = (one for one in fit_held(spins, drag_at(spins), own, common) if one.name == "disc")
+    (alike,) = (one for one in fit_held(spins, drag_at(spins), own, common)[0] if one.name == "disc")
     assert alike.constants["c32"].u == pytest.approx(0.02 * C, rel=0.02)  # own errors add 1e-3
+
+
+def test_laws_are_not_compared_at_one_spin_and_u_has_the_scatter_of_the_tops():
+    tops, random, pulls = 12, np.random.default_rng(3), []
+    for _ in range(100):
+        spins = 45 + 1e-3 * random.standard_normal(tops)
+        true = drag_at(spins)
+        drag = true * (1 + random.normal(0, 0.03, tops)) + random.normal(0, 0.01 * true)
+        laws, between = fit_held(spins, drag, 0.01 * true)
+        assert {law.name for law in laws} == {"stokes", "newton", "disc"}
+        assert 0.01 < between < 0.06
+        (c32,) = (law.constants["c32"] for law in laws if law.name == "disc")
+        pulls.append((c32.value - C) / c32.u)
+    assert np.std(pulls) == pytest.approx(1.03, abs=0.25)  # Student's 11 degrees of freedom and more; 3 standard errors
 
 
 def test_the_tilt_changes_the_drag_as_the_count_of_a_spin_down_does():

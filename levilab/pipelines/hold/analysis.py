@@ -8,6 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from analysis.held import HeldLaw, Hold, fit_held, hold_of
+from analysis.limits import AGREES_P
+from analysis.numbers import digits
+from analysis.spindown.drag import LAWS
 from analysis.spindown.tilt import slowing_by_tilt
 from analysis.uncertainty import Estimate
 from levilab.pipelines.analyzed import Analyzed
@@ -44,6 +47,7 @@ class HeldTogether:
 
     Attributes:
         laws: through the drag of an upright top, the best first.
+        between: part of the drag by which tops differ beyond their u.
         factors: of each input's drag over that of an upright top, by the spin-down's tilt; 1 where none is known.
         beside: law with a single constant → that of the spin-down, and the pull: their difference over its u.
     """
@@ -51,11 +55,19 @@ class HeldTogether:
     laws: tuple[HeldLaw, ...]
     factors: tuple[float, ...]
     beside: dict[str, tuple[Estimate, float]]
+    between: float = 0.0
 
     @property
     def best(self) -> HeldLaw | None:
-        """The best law; None of a single drag, through which each law goes."""
-        return self.laws[0] if self.laws and self.laws[0].statistics.n > 1 else None
+        """The best law; None where the spins are too near each other to compare laws."""
+        return self.laws[0] if len(self.laws) == len(LAWS) else None
+
+    @property
+    def drag(self) -> Estimate:
+        """The mean drag of an upright top, at the mean of the spins."""
+        law, (constant,) = self.laws[0], self.laws[0].constants.values()
+        drag = float(law.drag(np.array([law.reference_hz]))[0])
+        return Estimate(drag, constant.u and drag * constant.u / (constant.value or 1.0), "Hz/s")
 
 
 class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
@@ -65,11 +77,22 @@ class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
     def text(self) -> str:
         """What the data say, in a few sentences."""
         spins = [run.spin.value or 0.0 for run in self.runs]
-        several = Text(
-            "One top was held at {n} spins, {low:.1f} Hz to {high:.1f} Hz.", len(spins), min(spins), max(spins)
-        )
+        several = Text("{n} runs held a top, at {low:.1f} Hz to {high:.1f} Hz.", len(spins), min(spins), max(spins))
         last = (several,) if len(spins) > 1 else text_of(self.runs[0]).each
         return Sentences(*_of_laws(self.combined), *last)
+
+    def about_all(self) -> Iterable[str]:
+        """Return whether the tops differ."""
+        from scipy.special import chdtrc
+
+        found = self.combined
+        fits = [law.statistics for law in found.laws[:1]]
+        if found.between and any(chdtrc(one.degrees_of_freedom, one.chi_square or 0.0) < AGREES_P for one in fits):
+            said = (
+                "the drags differ by {percent:n} % beyond their u: the tops differ, or no law holds; u of the "
+                "constants includes this"
+            )
+            yield Text(said, percent=digits(100 * found.between, 2))
 
     def about_run(self, run: Hold) -> Iterable[str]:
         """Return what to know of one held spin."""
@@ -98,7 +121,8 @@ def _of_laws(found: HeldTogether) -> Iterable[str]:
         if (chi := best.statistics.reduced_chi_square) is not None:
             yield Text("The held spins scatter about it by {times:n} of their u.", times=plain(math.sqrt(chi), 2))
     elif found.laws:
-        yield "One held spin lies on the curve of each law: hold others, far from it, to see which law holds."
+        said = "The drag, {drag:n}, lies on the curve of each law: hold spins far from this one to see which holds."
+        yield Text(said, drag=with_uncertainty(found.drag))
     for law in found.laws[: 1 if best else None]:  # a single drag lies on each
         if law.name in found.beside:
             (name,) = law.constants
@@ -125,11 +149,11 @@ def combine(_: Sequence[Source[HoldReadings]], runs: Sequence[Hold], options: Ho
     spins = np.array([run.spin.value for run in runs])
     factors, u_factors = _tilt(beside, spins)
     known = [run.drag is not None for run in runs]
-    laws: tuple[HeldLaw, ...] = ()
+    laws, between = tuple[HeldLaw, ...](), 0.0
     if any(known):
         drag, u = np.array([(run.drag.value, run.drag.u) for run in runs if run.drag]).T / factors[known]
-        laws = fit_held(spins[known], drag, u, drag * u_factors[known])
-    return HeldTogether(laws, tuple(factors.tolist()), dict(_compare(laws, beside)) if beside else {})
+        laws, between = fit_held(spins[known], drag, u, drag * u_factors[known])
+    return HeldTogether(laws, tuple(factors.tolist()), dict(_compare(laws, beside)) if beside else {}, between)
 
 
 def _tilt(beside: SpinDownAnalysis | None, spins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

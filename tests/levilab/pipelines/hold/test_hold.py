@@ -105,6 +105,27 @@ def test_a_single_hold_and_one_without_a_gain(tmp_path):
     hold_figure(found)
 
 
+def test_tops_that_differ_at_one_spin_have_a_mean_drag_and_no_law(tmp_path):
+    for name, factor in (("a", 1.0), ("b", 1.1), ("c", 0.95)):
+        shutil.copytree(RUNS[3], tmp_path / name)
+        table = tmp_path / name / "readings.csv"
+        heads, *rows = table.read_text(encoding="utf-8").splitlines()
+        column = heads.split(",").index("drive_amplitude_v")
+        cells = [row.split(",") for row in rows]
+        scaled = [[*row[:column], str(factor * float(row[column])), *row[column + 1 :]] for row in cells]
+        table.write_text("\n".join([heads, *map(",".join, scaled), ""]), encoding="utf-8")
+    found = analyzed([tmp_path])
+    assert "lies on the curve of each law" in found.text
+    assert "best" not in found.text
+    (note,) = found.about_all()
+    assert "the tops differ, or no law holds" in note
+    drags = [run.drag.value for run in found.runs]
+    mean = HOLD.document(found, tmp_path)["values"]["drag"]
+    assert mean["value"] == pytest.approx(np.mean(drags), rel=0.01)
+    assert mean["u"] == pytest.approx(np.std(drags, ddof=1) / np.sqrt(3), rel=0.1)
+    assert len(hold_figure(found).axes) == 1
+
+
 @pytest.mark.parametrize(
     "spins", [None, 1.0, "40", [40], [40, 41], [40, 41, None], [40, 41, "x"], [[40], [41], [42]], {"a": 1}]
 )
