@@ -20,6 +20,7 @@ SpinDownKind = Literal[
     "no u",
     "understated",  # scatter in units of the stated u
     "overstated",  # the same
+    "few left",  # number of readings, the half of a 68 % interval in u
     "few readings",  # the laws that no AICc compares; number of readings, whether BIC compares them: 0 or 1
     "correlated",  # correlation, its u, number of readings
     # of several spin-downs

@@ -18,12 +18,13 @@ from analysis.spindown.readings import Readings, check_readings
 from analysis.spindown.selection import NO_FIT, Statistics, weigh
 from analysis.spindown.tilt import THESIS_TOP, Release, Top
 from analysis.spindown.verdict import Verdict, verdict
-from analysis.uncertainty import ROUNDING, Estimate
+from analysis.uncertainty import ROUNDING, Estimate, student
 
 __all__ = ["Estimate", "LawFit", "SpinDown", "Statistics", "Verdict", "fit_spin_down"]
 
 
 FEWEST_FOR_OUTLIERS = 7  # with three parameters and one reading doubted, three are left to judge it by
+FEW_LEFT = 2  # degrees of freedom: an interval of 68 % is 1.3 u or wider
 
 
 class UnknownName(AnalysisError):
@@ -334,6 +335,8 @@ def comparison_remarks(
     said, fit = [], fits[best]
     if not fit.sigma_known and not mixed:
         said.append(Remark("no u"))
+        if 0 < fit.degrees_of_freedom <= FEW_LEFT:
+            said.append(Remark("few left", values=(fit.n, student(fit.degrees_of_freedom))))
     if fit.chi_square is not None and fit.degrees_of_freedom > 0:
         from scipy.special import gammainc, gammaincc
 

@@ -395,6 +395,9 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Weighed] = MappingProxyTy
             "that does not fit shows only beside a better one",
             "advice",
         ),
+        "few left": (
+            "{n:.0f} readings hardly show their scatter: a 68 % interval is {width:.2g} u to each side (Student's t)"
+        ),
         "understated": lambda of: Text(
             "even the best law, {law}, misses the readings by {times:n} times their stated uncertainties, more than "
             "chance explains: all uncertainties are enlarged; check the readings' uncertainties",

@@ -202,8 +202,9 @@ def test_few_readings_are_compared_as_their_note_says(tmp_path, u, compared):
     np.savetxt(path, np.c_[t, 39.93 / (1 + 1.87e-3 * t) ** 2], fmt="%.3f", delimiter=",", header="t,f", comments="")
     found = SPINDOWN.analyze([path], SpinDownOptions(reading_u=u))
     assert ("exclude" in found.text) == (u is not None)
-    (note,) = (note for note in found.all_warnings if "4 readings" in note)
+    (note,) = (note for note in found.all_warnings if "4 readings are too few" in note)
     assert compared in note
+    assert any("1.3 u to each side (Student's t)" in note for note in found.all_warnings) == (u is None)
 
 
 def test_hertz_taken_for_another_unit_are_doubted(tmp_path):
