@@ -113,7 +113,8 @@ def acquire_experiment(
 ) -> None:
     """Carry out an experiment."""
     if not list_settings:
-        look_at_files(bench, resume, out, scene, virtual=mock, named=bool(counter or scope))
+        named = bool(counter or scope)
+        look_at_files(bench, resume, out, scene, virtual=mock, named=named, films=experiment == "sway")
     typed = {"drive": drive, "spin": spin, "upper": upper or None}
     given = (*(SHORT[name].format(value) for name, value in typed.items() if value is not None), *(settings or ()))
     with importing():
@@ -175,15 +176,27 @@ def acquire_experiment(
 
 
 def look_at_files(
-    bench: Path | None, resume: Path | None, out: Path, scene: str | None = None, *, virtual: bool, named: bool
+    bench: Path | None,
+    resume: Path | None,
+    out: Path,
+    scene: str | None = None,
+    *,
+    virtual: bool,
+    named: bool,
+    films: bool = False,
 ) -> None:
     """Refuse a bench file, a run or a scene that is not there, before what takes long is imported.
 
-    virtual: on the virtual bench; named: whether instruments are, so that bench.toml may be missing.
+    virtual: on the virtual bench; named: whether instruments are, so that bench.toml may be missing; films: whether a
+    camera is needed, which no bench has.
     """
     if bench or not (virtual or named or resume):
-        from levilab.bench.config import read_table
+        from levilab.bench.config import ConfigError, read_table
 
+        if films and not (bench or Path("bench.toml").exists()):
+            from levilab.acquisition.experiments.sway import NO_CAMERA
+
+            raise ConfigError(NO_CAMERA)
         read_table(bench or Path("bench.toml"), **({"instead": ""} if virtual else {}))
     if resume:
         from levilab.runs.find import run_to_resume

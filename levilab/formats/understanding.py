@@ -810,8 +810,11 @@ def no_column(path: Path, name: str, header: Sequence[str], doubt: Doubt | None 
     foreign = next((title for title in header if read_title(title).column == name), None)
     if foreign and dimension(name) == "frequency" and is_total(read_title(foreign).unit or ""):
         text = total_beside_others(foreign)
+    elif foreign and ((unit := read_title(foreign).unit) is None or unit_factor(unit, dimension(name))):
+        said = "column '{title:s}' is {name:s} by its title, and `columns` takes it for another quantity: correct that"
+        text = Said(said, shorten(foreign), name)
     elif foreign:
-        unit = shorten(read_title(foreign).unit or "")
+        unit = shorten(unit or "")
         said = "column '{title:s}' is in {unit:s}, which is no unit of {kind}: {do}"
         text = Said(said, shorten(foreign), unit, dimension(name), how_else(foreign, name))
         asks = "'{title:s}' is in {unit:s}, which is no unit of {kind}: {question}"

@@ -140,7 +140,7 @@ _RATE = _about(
 )  # fmt: skip
 _HEIGHT = _about(
     "Height at which the top floats; with a scan its moment follows, if its mass is known.  Of the rim, with --camera.",
-    kind=float, metavar="MM", typed="height", unit="mm", factor=1e-3,
+    kind=float, metavar="MM", typed="height", unit="mm", factor=1e-3, above=0.0,
 )  # fmt: skip
 _CLOCK_U = _about(
     "Relative standard uncertainty of the clock that counts or samples, as 2e-6, from its manual; the budgets show "

@@ -5,7 +5,7 @@ import os
 import re
 from pathlib import Path
 
-from levilab.errors import DataError
+from levilab.errors import DataError, as_typed
 from levilab.formats.texts import locate, name_files
 from levilab.texts.text import Text
 
@@ -112,6 +112,8 @@ def run_to_resume(name: Path, root: Path) -> Path:
 def run_or_folder(name: Path, root: Path = RUNS) -> Path:
     """Return the folder of a run, or one with runs, by its path or its name.  Raises DataError."""
     folder = find_run(name, root)
+    if folder.is_file():
+        raise DataError(Text("{name}: is a file: levilab open {typed:s} shows it", name=name, typed=as_typed(name)))
     if not folder.is_dir():
         raise DataError("{name}: there is no such run or folder; levilab runs lists the runs", name=name)
     return folder

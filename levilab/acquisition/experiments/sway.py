@@ -22,7 +22,7 @@ from levilab.runs.run import STATES
 
 #: Columns of the track.
 _TRACK = ("time_s", "x_m", "y_m", "height_m")
-_NO_CAMERA = (
+NO_CAMERA = (
     "a bench has no camera: film the top from above, follow it with `levilab analyze video FILE`, and give "
     "NAME.tracks.csv to `levilab analyze sway`; `levilab acquire sway --mock` has a virtual camera"
 )
@@ -38,7 +38,7 @@ class SwaySettings(CounterSettings):
     def for_bench(self, config: BenchConfig, model_of: ModelOf) -> Self:
         """See the base.  Raises ConfigError for a real bench."""
         if config.visa_library != "@levilab":
-            raise ConfigError(_NO_CAMERA)
+            raise ConfigError(NO_CAMERA)
         return super().for_bench(config, model_of)
 
 
@@ -82,7 +82,7 @@ def _film(session: Session[SwaySettings], first: int, until: float) -> int:
     """Keep the frames from a number on up to a time [s], at which the top was still up; return the next number."""
     camera, rate = session.bench.camera, session.settings.frames_hz
     if camera is None:
-        raise ConfigError(_NO_CAMERA)
+        raise ConfigError(NO_CAMERA)
     end = max(math.floor(until * rate) + 1, first)
     times = np.arange(first, end) / rate
     places = camera((session.zero or 0.0) + first / rate, 1 / rate, end - first)

@@ -89,6 +89,7 @@ WRONG_USAGE = {
     "stability undriven --map --duration -1": "--duration -1: a number of seconds above 0",
     "bench check --mock --bench bench.toml": "--bench: does not go with --mock",
     "bench serve --model nonsense": "--model",
+    "analyze field file --height -7": "--height -7: a number above 0 [mm] is expected",
     "bench serve --model counter=nonsense": "--model",
     "bench serve --speed 0": "--speed",
     "bench serve --scene spindown --speed 1e6": "--speed",
@@ -113,6 +114,7 @@ FAILURES = {
     "crosscheck spindown --out file": "choose another place with --out",
     "reproduce -o file/r.html": "choose another place with --out",
     "live nowhere": "nowhere: there is no such run or folder",
+    "live file": "file: is a file: levilab open file shows it",
     "open nowhere": "nowhere: there is no such file or folder",
     "crosscheck --like nowhere": "nowhere: there is no such file or folder",
     "analyze field file --device other.toml": "other.toml: there is no such file or folder",
@@ -179,6 +181,10 @@ def test_each_mistake_has_its_exit_status_and_one_line(place, words, status, say
         assert says in line
         assert "`" not in line
     assert {path.name for path in place.iterdir()} <= {"file", "bench.toml", "runs"}
+
+
+def test_a_film_is_no_acquisition_at_a_bench_whether_that_is_described_or_not(tmp_path):
+    assert "a bench has no camera: film the top from above" in command("acquire", "sway", cwd=tmp_path).err
 
 
 def test_only_titles_of_the_analysis_that_was_asked_for_are_named(tmp_path):

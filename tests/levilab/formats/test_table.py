@@ -381,6 +381,12 @@ def test_an_unreadable_file_is_reported(error, words, write, monkeypatch):
         ("t,T (°C)\n10,39\n20,38\n30,37\n", {"f": "2"}, "has the unit °C, which is none of frequency"),
         ("t,spin (ms)\n0,25\n1,26\n2,27\n", {}, "column 'spin (ms)' is in ms, which is no unit of frequency: correct"),
         ("t,spin (ms)\n0,25\n1,26\n2,27\n", {"f": "2"}, "times of a turn call the column period [ms]"),
+        (
+            "t,f / Hz\n0,25\n1,26\n2,27\n",
+            {"x": "2"},
+            "column 'f / Hz' is spin_frequency_hz by its title, and `columns`",
+        ),
+        ("t,f\n0,25\n1,26\n2,27\n", {"x": "2"}, "column 'f' is spin_frequency_hz by its title, and `columns` takes"),
         ("t [V],f\n0,25\n1,26\n2,27\n", {"t": "1"}, "V, which is none of time: say which unit it is, as NAME [s]"),
         (
             "t,f\n0,61.5?\n1,61.2\n2,ca. 61\n3,60\n4,59\n",
