@@ -85,15 +85,31 @@ def weighted_mean(x: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float
     return mean, float(u.min() / math.sqrt(weights.sum())), float((((x - mean) / u) ** 2).sum())
 
 
-def scatter_between(x: NDArray[np.float64], u: NDArray[np.float64]) -> float:
-    """Return τ, with which χ² is its expectation n − 1; zero where it is smaller without.  u may be zero."""
+def scatter_between(x: NDArray[np.float64], u: NDArray[np.float64], chi_square: float | None = None) -> float:
+    """Return τ, with which χ² is as given, or else its expectation n − 1; 0 where it is less without.  u may be 0."""
     from scipy.optimize import brentq
+
+    expected = len(x) - 1 if chi_square is None else chi_square
 
     def excess(tau: float) -> float:
         both = np.hypot(u, tau)
-        return weighted_mean(x, both)[2] - (len(x) - 1) if both.all() else math.inf
+        return weighted_mean(x, both)[2] - expected if both.all() else math.inf
 
     if len(x) < 2 or excess(0.0) <= 0:
         return 0.0
     widest = float(np.ptp(x))
-    return widest * float(brentq(lambda part: excess(part * widest), 0.0, 2.0))
+    return widest * float(brentq(lambda part: excess(part * widest), 0.0, max(2.0, math.sqrt(len(x) / expected))))
+
+
+def u_of_between(x: NDArray[np.float64], u: NDArray[np.float64]) -> float:
+    """Return the standard uncertainty of τ: to the farther end of its 68 % interval, which covers near zero, too.
+
+    The interval has the τ with which χ² is between its quantiles (W. Viechtbauer, Stat. Med. 26, 37 (2007)).  Values
+    that agree better than their u by chance do not give τ better than those that agree as expected.
+    """
+    from scipy.special import chdtri, ndtr
+
+    freedom = len(x) - 1
+    less = min(1.0, weighted_mean(x, u)[2] / freedom) if u.all() else 1.0
+    ends = (scatter_between(x, u, less * float(chdtri(freedom, ndtr(side)))) for side in (-1.0, 1.0))
+    return max(abs(end - scatter_between(x, u)) for end in ends)

@@ -16,7 +16,7 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.checks import check_finite, check_positive
-from analysis.comparison import scatter_between
+from analysis.comparison import scatter_between, u_of_between
 from analysis.errors import AnalysisError, TooFewReadings
 from analysis.uncertainty import ROUNDING, Estimate
 
@@ -249,7 +249,10 @@ def combine(runs: Sequence[Sample]) -> Statistics:
     means = np.array([one.mean() for one in limits])
     square = sum((one.size - 1) * _scatter(one) ** 2 for one in limits if one.size > 1) / within
     own = np.maximum(square / numbers, [run.least for run in runs])
-    between = scatter_between(means, np.sqrt(own)) ** 2 if _scatter(means) else 0.0
+    differ = Estimate(0.0, 0.0, "Hz")
+    if _scatter(means):
+        differ = Estimate(scatter_between(means, np.sqrt(own)), u_of_between(means, np.sqrt(own)), "Hz")
+    between = (differ.value or 0.0) ** 2
     weights = _weights(own + between)
     mean = float(weights @ means)
     by_scatter = float(weights**2 @ (own + between))
@@ -267,7 +270,7 @@ def combine(runs: Sequence[Sample]) -> Statistics:
         step=step,
         freedom=_freedom(variance, by_scatter, len(runs) - 1 if between > 0 else within),
         runs=len(runs),
-        between=_with_own_u(math.sqrt(between), len(runs) - 1),
+        between=differ,
         common=common,
     )
 

@@ -125,6 +125,21 @@ def test_a_mean_of_runs_holds_the_scatter_between_them():
     assert np.sqrt(np.mean(np.square(betweens))) == pytest.approx(0.5, abs=0.05)
 
 
+@pytest.mark.parametrize("runs", [4, 16])
+@pytest.mark.parametrize("between", [0.0, 0.05, 0.2])
+def test_u_of_the_scatter_between_runs_covers_it_where_it_is_zero_too(runs, between):
+    """Runs of ten tops with 0.25 Hz from top to top, which gives their means 0.08 Hz."""
+    random, near, within = np.random.default_rng(5), 0, 0
+    for _ in range(300):
+        means = 22.0 + between * random.standard_normal(runs)
+        found = combine([Sample(mean + 0.25 * random.standard_normal(10)) for mean in means]).between
+        assert found.u > 0.01
+        near += abs(found.value - between) <= found.u
+        within += abs(found.value - between) <= 2 * found.u
+    assert near >= 300 * 0.68 - 24  # 3 standard errors
+    assert within >= 300 * 0.87  # with u the farther side of a skewed interval
+
+
 def test_runs_that_agree_are_as_good_as_one():
     random = np.random.default_rng(4)
     ratios = []

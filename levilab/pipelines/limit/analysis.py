@@ -11,6 +11,7 @@ import numpy as np
 from analysis import stability
 from analysis.errors import AnalysisError
 from analysis.limits import Comparison, Sample, Statistics, combine, compare, nearest_edge, spins_of_window, summarize
+from analysis.locked import Cause
 from analysis.numbers import digits
 from analysis.spindown.fall import FALLS_BETWEEN_HZ, STOPPED_ABOVE_HZ
 from levilab.errors import DataError
@@ -78,16 +79,13 @@ _WAVEFORMS = {"SIN": "sine", "SQU": "square", "TRI": "triangle"}
 LOWER_EDGE, UPPER_EDGE = "lower edge of the linear window", "upper edge of the linear window"
 RESONANCE = "resonance of the wobble"
 #: Names of what other experiments reached.  Simon's top is another one: it is compared as a part of its own edge.
-THESIS_HIGHEST, THESIS_LOOSE = "thesis's highest spin", "the same with loose washers"
+THESIS_HIGHEST = "thesis's highest spin"
 SIMON = "Simon's top 3, as a part of its upper edge"
 #: From there on a simulated top is up or lost by its start; half-width of that spin [Hz], by which an error of the
 #: simulation that is a tenth moves it.
 ISLANDS, ISLANDS_WITHIN_HZ = "where the islands of simulated tops begin", 1.0
 #: Name → spin that the thesis's device reached, as printed.
-_REACHED = {
-    THESIS_HIGHEST: published("thesis")["measured.highest"],
-    THESIS_LOOSE: published("thesis")["measured.loose"],
-}
+_REACHED = {THESIS_HIGHEST: published("thesis")["measured.highest"]}
 
 
 @dataclass(frozen=True)
@@ -251,7 +249,8 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
                 yield Text(several, which=which, n=len(texts), conditions=tuple(texts))
         for group in self.groups:
             if len(group.runs) > 1:
-                yield from warnings_of(group.statistics)
+                of_runs = group.statistics.between is not None  # their own notes name outliers
+                yield from warnings_of(replace(group.statistics, outliers=()) if of_runs else group.statistics)
 
     def about_run(self, run: Limits) -> Iterable[str]:
         """Return what to know of one run."""
@@ -443,8 +442,8 @@ def _sentences(limits: Limits) -> Iterable[str]:
     )
     yield from () if levels_off else _beside_theory(limits)
     if found.between:
-        beyond = with_uncertainty(found.between) if found.between.value else "no more than their tops do"
-        yield Text("They are of {n} runs, which differ by {beyond:n}.", n=found.runs, beyond=beyond)
+        said = "They are of {n} runs, which differ by {beyond:n} more than their tops do."
+        yield Text(said, n=found.runs, beyond=with_uncertainty(found.between))
     if limits.ends and found.n > 1:
         ends = tuple(_times(ENDS[kind], n) for kind, n in limits.ends.items())
         yield Text("The top {ends}.", ends=ends)
@@ -475,12 +474,13 @@ def _beside_theory(limits: Limits) -> Iterable[str]:
     lower = limits.which == "lower"
     why, one = "", theory.get(RESONANCE)
     if (off > 0) == lower:
-        why = ": a real top is tilted and moves, and is lost sooner"
+        other = set(limits.causes) - {Cause.OUT_OF_WINDOW, Cause.NOT_KNOWN}
+        why = "" if other else ", likely because a tilted top moves, and is lost sooner"
         if lower and off > STOPPED_ABOVE_HZ - FALLS_BETWEEN_HZ[1]:
             why = ", more than a tilt explains: was the top stopped?"
         elif lower and one:
-            why = Text(": a real top is tilted, leans ever more towards {hz:.2f} Hz, the {name}, and falls sooner",
-                       hz=one.expected, name=one.name)  # fmt: skip
+            why = ", likely because a tilted top leans ever more towards {hz:.2f} Hz, the {name}, and falls sooner"
+            why = Text(why, hz=one.expected, name=one.name)
     yield Text(
         "In theory an upright top at rest floats {way} to {edge:.2f} Hz (the {name}); {mean} lies {off:.2f} Hz {side} "
         "it{why}.",

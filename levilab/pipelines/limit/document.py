@@ -82,18 +82,24 @@ def _rows(sources: Sequence[Source[LimitReadings]], limits: Limits) -> Iterator[
 
 def _more(limits: Limits) -> str:
     found = limits.statistics
-    if found.between and found.between.value:
+    if _differ(found):
         return Text("more runs: the {n} differ by more than their tops", n=found.runs)
     return Text("more tops: it takes {more} instead of {n} to halve it", more=_TO_HALVE * found.n, n=found.n)
+
+
+def _differ(found: Statistics) -> float:
+    """Return by how much runs differ beyond what their tops explain [Hz]; 0 where it is less than its u."""
+    between = found.between
+    return (between.value or 0.0) if between and (between.value or 0.0) > (between.u or 0.0) else 0.0
 
 
 def _about_scatter(limits: Limits) -> str:
     found = limits.statistics
     scatter = (found.scatter.value or 0.0) if found.scatter else 0.0
     text = Text("standard deviation of one top from another {s:n} Hz, of {n} tops", s=digits(scatter), n=found.n)
-    if found.between and found.between.value:
-        beyond = digits(found.between.value)
-        text = Text("{tops}; {n} runs differ by {hz:n} Hz beyond that, which is in it", text, found.runs, beyond)
+    if beyond := _differ(found):
+        said = "{tops}; {n} runs differ by {hz:n} Hz beyond that, which is in it"
+        text = Text(said, text, found.runs, digits(beyond))
     return Text("{tops}; what the counter and the moment of the fall leave to each limit is part of it", tops=text)
 
 
