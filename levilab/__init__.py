@@ -469,6 +469,11 @@ def report(
     tables: bool = False,
     crosscheck: bool = True,
     short: bool = False,
+    language: str = "en",
+    title: str = "",
+    course: str = "",
+    author: str = "",
+    date: str = "",
 ) -> Path:
     """Write the report of runs, data files, folders, results or motions.
 
@@ -478,6 +483,11 @@ def report(
         tables: write the tables of results, too, into a folder beside it.
         crosscheck: make a cross-check with the result's own parameters where none is stored and it takes seconds.
         short: answer, values, figure and notes alone.
+        language: of the report, "en" or "de".
+        title: in place of the report's own.
+        course: below the title, as "Physics lab 2".
+        author: names, below the title.
+        date: below the title, as it is to stand there.
 
     Returns:
         The file.
@@ -488,8 +498,10 @@ def report(
         CannotWrite: the file cannot be written.
     """
     from levilab.notebook.report import report_on
+    from levilab.report.reproduction import Heading
 
-    return report_on(data, output, tables=tables, crosscheck=crosscheck, short=short)
+    heading = Heading(title, course, author, date)
+    return report_on(data, output, language, tables=tables, crosscheck=crosscheck, short=short, heading=heading)
 
 
 @bare

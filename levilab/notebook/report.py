@@ -8,24 +8,28 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from levilab.errors import DataError, UsageError
+from levilab.errors import DataError, UsageError, check_language
 from levilab.notebook.motion import SimulatedMotion
 from levilab.notebook.result import AnalysisResult
 from levilab.notebook.sweep import SimulatedMap
 from levilab.report.page import write_report
 from levilab.runs.find import find_run
 from levilab.runs.run import Run
+from levilab.texts.text import speaking
 
 Reported = Run | AnalysisResult | SimulatedMotion | SimulatedMap | str | PathLike[str]
 
 
-def report_on(data: Any, output: str | PathLike[str], *, tables: bool, crosscheck: bool, short: bool) -> Path:
+def report_on(data: Any, output: str | PathLike[str], language: str, **how: Any) -> Path:
     """Write a report of runs, files, folders or results; see `levilab.report`.
+
+    how: as `write_report` takes it.
 
     Raises:
         UsageError: an argument is wrong, or results were made with unlike options.
         DataError: there is nothing to report.
     """
+    check_language(language)
     output = Path(output)
     several = isinstance(data, list | tuple | set)
     items = [*data] if several else [data]
@@ -36,11 +40,11 @@ def report_on(data: Any, output: str | PathLike[str], *, tables: bool, crosschec
         for name, value in _options(item).items():
             if given.setdefault(name, value) != value:
                 raise UsageError("data", f"results with unlike options ({name}) need a report each")
-    with tempfile.TemporaryDirectory(prefix="levilab-") as made:
+    with tempfile.TemporaryDirectory(prefix="levilab-") as made, speaking(language):
         paths = [path for item in items for path in _paths(item, Path(made))]
         folder = "" if output.parent.is_dir() else ", in a new folder"
         print(f"writing {output}{folder} …", file=sys.stderr)  # noqa: T201 - a cross-check takes seconds
-        return write_report(paths, output, given, tables=tables, crosscheck=crosscheck, short=short)
+        return write_report(paths, output, given, **how)
 
 
 def _paths(item: Reported, made: Path) -> list[Path]:

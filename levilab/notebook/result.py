@@ -265,8 +265,11 @@ class AnalysisResult(Exportable):
         values |= {name: fitted[name] for name, value in values.items() if fitted.get(name) == value}
         law = f" (its best law is {best})" if hasattr(part, "best_model") else ""
         elsewhere = {
-            name: f"{where}[{model!r}][{name!r}]" for model, of in reversed(models.items()) for name in of
-        }  # the first law that has it
+            key: f"{where}[{model!r}][{name!r}]"
+            for model, of in reversed(models.items())  # the first law that has it
+            for name in of
+            for key in (self.analysis.symbols.get(name, name), name)
+        }
         elsewhere |= {model: f"{where}[{model!r}]" for model in models}
         named = Named(values, f"{what}{law}", elsewhere)
         named.symbols = self.analysis.symbols

@@ -10,7 +10,7 @@ import levilab
 from levilab.errors import UsageError
 from levilab.notebook.analysis import analyze_data
 from levilab.notebook.labels import dataset_of_contents
-from levilab.notebook.names import Exportable, Helpful, bare, meant
+from levilab.notebook.names import Exportable, Helpful, NoSuchAttribute, bare, meant
 from levilab.notebook.quantity import NoSuchName
 from levilab.present.html import facts_as_html, table_as_html
 from levilab.report.export.contents import contents_of_results
@@ -19,15 +19,32 @@ from levilab.runs.run import Run
 from levilab.texts.text import how_many
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
     from os import PathLike
 
     import pandas as pd
     import xarray
 
+    from levilab.formats.table import Table
     from levilab.notebook.figure import Axes
     from levilab.notebook.result import AnalysisResult
     from levilab.present.style import Figure
+
+
+@dataclass(frozen=True)
+class _Readings:
+    """A run's `readings()`; taken for the readings themselves, it says how to have those."""
+
+    read: Callable[[], Table]
+
+    def __call__(self) -> Table:
+        return self.read()
+
+    @bare
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        raise NoSuchAttribute(f"readings has no {name!r}: take df.{name}")
 
 
 @dataclass(frozen=True, repr=False)
@@ -62,6 +79,11 @@ class RecordedRun(Exportable, Run):
     def path(self) -> Path:
         """Its folder."""
         return self.folder
+
+    @property
+    def readings(self) -> _Readings:
+        """Its readings, as `readings()` returns them; `df` is a DataFrame."""
+        return _Readings(super().readings)
 
     @property
     def df(self) -> pd.DataFrame:
@@ -164,6 +186,7 @@ class RunList(Helpful, list[RecordedRun]):
         self.listed = tuple(listed)
         super().__init__(RecordedRun.load(Path(one.path)) for one in listed if not one.problem)
 
+    also: ClassVar[Mapping[str, Any]] = {name: f"df.{name}" for name in ("head", "tail", "columns")}
     instead: ClassVar[Mapping[str, str]] = {
         **dict.fromkeys(("filter", "query", "sel"), "[run for run in runs if run.experiment == 'spin']"),
         **dict.fromkeys(("names", "paths", "index_of"), "[run.name for run in runs], or df"),

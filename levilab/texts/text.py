@@ -4,10 +4,11 @@ English stands in the program where it is used, and is the key: `in_language` lo
 and returns it as it is where it is not there.  A sentence with values is a `Text`.
 """
 
+import contextlib
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -200,6 +201,17 @@ def speak(code: str) -> None:
     """Let this process speak a language."""
     global _of_process  # noqa: PLW0603 - a process speaks to one person
     _of_process = code
+
+
+@contextlib.contextmanager
+def speaking(code: str) -> Iterator[None]:
+    """Let this process speak a language meanwhile."""
+    before = spoken()
+    speak(code)
+    try:
+        yield
+    finally:
+        speak(before)
 
 
 def spoken() -> str:

@@ -245,6 +245,10 @@ GUESSES = {
     "swept.sel(spin_hz=24, method='nearest')['start.spin_hz'].item()": lambda spin: spin == 20,
     "levilab.report([result, motion], new / 'r.html', crosscheck=False)": lambda p: "Simulated" in p.read_text("utf-8"),
     "levilab.report(result, new / 'r.html', crosscheck=False)": lambda path: path.stat().st_size > 20_000,
+    "levilab.report(result, new / 'r.html', short=True, language='de', title='Auslaufen', author='A. N.')": (
+        lambda path: all(text in path.read_text("utf-8") for text in ('lang="de"', "Auslaufen", "A. N.", "Messung"))
+    ),
+    "len(levilab.runs(folder).head(2))": lambda rows: rows == 2,
     "levilab.report(result, new / 'r.html', short=True)": lambda path: "reproduce" not in path.read_text("utf-8"),
 }
 #: Wrong guesses → what the error says instead.
@@ -260,6 +264,9 @@ REFUSED = {
     "levilab.sweep('undriven', spin_hz=['18 Hz', '19 kg'])": "a number in Hz, kHz",
     "levilab.sweep('undriven', spin_hz=30)": "one value is no axis: set it by `settings` = start.spin_hz=30",
     "levilab.sweep('undriven', mass_kg=[24.9, 25.0, 25.3])": "Were grams meant?",
+    "levilab.report(result, 'r.html', language='xx')": "language = xx: one of de, en is expected",
+    "result['n']": "take result.models['power']['exponent']",
+    "run.readings.head()": "readings has no 'head': take df.head",
     "levilab.report(5)": "runs, results, motions, maps or paths are expected",
     "levilab.report([swept])": "a report needs its store",
     "levilab.sweep('undriven', 1)": "as {'spin_hz': [20, 30]}",
