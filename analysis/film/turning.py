@@ -34,9 +34,9 @@ _NEARNESS, _NEARNESS_U = 2.16, 0.85
 _HARMONICS, _HARMONIC = 2, 0.003
 #: How far the turns swing with the sway of the top, as a standard deviation [turns], and how slowly at least and how
 #: fast at most [Hz].  Else they would be taken for rows that are late, since the rows of the mark sway, too; in a long
-#: film both average out.
-_SWING, _SWING_HZ, _MOST_SWINGS = 3e-4, (0.3, 3.0), 24
-#: Means of residuals that show what neighbouring pictures share.
+#: film both average out.  A tilt of 25 mrad turns the mark by half its square.
+_SWING, _SWING_HZ, _MOST_SWINGS = 5e-5, (0.3, 3.0), 24
+#: Means of residuals that show the noise, about.
 _BLOCKS = 72
 #: Highest order of the polynomial (Chebyshev's) for the turns of a film, and the number of orders that are free.  The
 #: others have a prior, as a fall has them beyond its third order, by the greatest relative slope of a free top's spin:
@@ -167,14 +167,14 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, aside: Array, 
     slower = chirp * min(chirp / start, 0.0)  # of the slope, a second; that of an even drive stays
     drag = slower * (half * late) ** 3 / 6
     more = np.column_stack([nuisance, EXPONENT_U * drag])
-    value, covariance, rest = _fit(basis, turns - EXPONENT * drag, u, more, widths)
+    value, covariance, rest, noise = _fit(basis, turns - EXPONENT * drag, u, more, widths)
     smooth, error = value[:count], covariance[:count, :count]
     power = EXPONENT + EXPONENT_U * float(value[-1])
     speed = chebval(late, chebder(smooth)) / half + power * slower * (half * late) ** 2 / 2
     speeds = np.concatenate([chebval(late, chebder(np.eye(count))).T / half, np.zeros(nuisance.shape)], axis=1)
     terms = np.stack([np.concatenate([basis, nuisance], axis=1), speeds])
     readings = np.array([
-        _reading(times[part], rest[part], u[part], terms[:, part], covariance[:-1, :-1])
+        _reading(times[part], rest[part], noise * u[part], terms[:, part], covariance[:-1, :-1])
         for part in windows_of(times)
     ]).reshape(-1, 3)  # fmt: skip
     return Turning(
@@ -214,13 +214,13 @@ def _follow(times: Array, phase: Array, turns: Array, frequency: float, start: f
 
 def _fit(
     basis: NDArray[np.floating], turns: Array, u: Array, nuisance: Array, widths: Array
-) -> tuple[Array, Array, Array]:
-    """Return coefficients of a basis, shape (n, m), and of the nuisance, their covariance, and residuals.
+) -> tuple[Array, Array, Array, float]:
+    """Return coefficients of a basis, shape (n, m), and of the nuisance, their covariance, residuals, and their noise.
 
     The last columns of the basis have the prior of a free top, of widths in the first row, or of a driven one, in the
     others, each as probable, shape (k, p), the widest last; the nuisance has one of 1.  All count by their evidence.
-    Uncertainties are those of the phases, or of their scatter about the widest where that is greater; slow residuals,
-    which many pictures share, count by the scatter of their means.
+    The noise is that about the widest, in units of u and 1 at least.  Means over whole turns show it: neighbouring
+    pictures share errors, and errors that come with each turn average out.
     """
     n, m = basis.shape
     design = np.concatenate([basis, nuisance], axis=1)
@@ -230,19 +230,18 @@ def _fit(
     prior = np.diag(np.arange(design.shape[1]) >= some.start).astype(float)
     value, spread, _ = _solution(triangle, scales[-1], prior)
     rest, fitted = (turns - design @ value) / u, m - float(np.sum(np.diag(spread)[some] / widths[-1] ** 2))
-    factor = max(float(np.sum(rest**2)) / max(n - fitted, 1), 1.0)
-    block = n // _BLOCKS
-    if block > 1:
-        means = rest[: n // block * block].reshape(-1, block).mean(axis=1)
-        factor = max(factor, block * float(np.sum(means**2)) / max(means.size - fitted, 1))
-    values, covariances, logs = zip(*(_solution(triangle / factor**0.5, scale, prior) for scale in scales), strict=True)
+    pictures = n / float(np.ptp(turns))  # of a turn
+    block = max(round(pictures * max(round(n / _BLOCKS / pictures), 1)), 1)
+    means = rest[: n // block * block].reshape(-1, block).mean(axis=1)
+    noise = max(block * float(np.sum(means**2)) / max(means.size - fitted, 1), 1.0) ** 0.5
+    values, covariances, logs = zip(*(_solution(triangle / noise, scale, prior) for scale in scales), strict=True)
     weight = np.exp(np.array(logs) - max(logs))
     weight[1:] *= _DRIVEN / len(widths)
     weight /= weight.sum()
     found = weight @ np.array(values)
     off = np.array(values) - found
     covariance = np.tensordot(weight, np.array(covariances), 1) + (off.T * weight) @ off
-    return found, covariance, turns - design @ found
+    return found, covariance, turns - design @ found, noise
 
 
 def _solution(triangle: Array, scale: Array, prior: Array) -> tuple[Array, Array, float]:
@@ -279,7 +278,6 @@ def _reading(times: Array, rest: Array, u: Array, terms: Array, covariance: Arra
         covariance: of their coefficients, shape (m, m).
     """
     at = float((times[0] + times[-1]) / 2)
-    line = np.vander(times - at, 2, increasing=True)
-    value, own, _ = _fit(line, rest, u, np.empty((times.size, 0)), np.ones((1, 0)))
+    line, own = np.polyfit(times - at, rest, 1, w=1 / u, cov="unscaled")
     shares = np.polyfit(times - at, terms[0], 1)[0] - [np.interp(at, times, speed) for speed in terms[1].T]
-    return at, float(value[1]), float(np.sqrt(own[1, 1] + shares @ covariance @ shares))
+    return at, float(line[0]), float(np.sqrt(own[0, 0] + shares @ covariance @ shares))

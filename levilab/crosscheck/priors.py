@@ -103,6 +103,7 @@ _ROWS: dict[str, tuple[Prior, ...]] = {
     ),
     "video": (
         Prior("start.spin_hz", "even", 26, 42, "Hz", "from above the fall to what a drive reaches"),
+        Prior("share of newton", "even", 0, 1, "1", "the drag of a real top is not known: any exponent from 1 to 2"),
         Prior("scale", "even", 4.6e-4, 5.4e-4, "m/pixel", "known to 10 %"),
         Prior("exposure", "even", 3e-4, 1.5e-3, "s", "of a phone's slow motion by a window and by a lamp"),
         Prior("line_time", "even", 5e-6, 25e-6, "s", "of the shutters of phones"),

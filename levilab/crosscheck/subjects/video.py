@@ -15,6 +15,7 @@ from levilab.crosscheck.subjects.sway import draw_scene
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.video.analysis import Video
 from levilab.pipelines.video.leaning import PRECESSION_HZ
+from levilab.simulator.laws import LAWS
 
 #: Height of the dot on the stem above the rim, and of the rim above the base [m].
 STEM_M, RIM_M = 0.02, 0.07
@@ -43,7 +44,7 @@ def trial(seed: int, folder: Path) -> list[Pull]:
     """Try one film of a drawn top; of its pictures one, since neighbours share their errors."""
     by = np.random.default_rng((seed, 25))
     draw = drawing("video", by)
-    scene = draw_scene(seed).changed({"start.spin_hz": draw("start.spin_hz")})
+    scene = draw_scene(seed).changed({"start.spin_hz": draw("start.spin_hz"), **_drag(draw("share of newton"))})
     camera = draw_camera(by)
     seconds = draw("length")
     flight = flight_of(scene, seconds + 2 * _AROUND_S)
@@ -66,6 +67,12 @@ def trial(seed: int, folder: Path) -> list[Pull]:
         *_precession(found, flight, late),
         *_beside(flight, seconds, by, seed, folder),
     ]
+
+
+def _drag(share: float) -> dict[str, object]:
+    """Return the keys of a scene for a drag in proportion to the spin to the power of 1 + share, near 30 Hz."""
+    (slow,), (fast,) = (LAWS[name].usual for name in ("stokes", "newton"))
+    return {"drag.law": "mixed", "drag.coefficient": [(1 - share) * slow, share * fast]}
 
 
 def _beside(flight: Flight, seconds: float, by: np.random.Generator, seed: int, folder: Path) -> Iterator[Pull]:

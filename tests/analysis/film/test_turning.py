@@ -168,6 +168,16 @@ def test_what_neighbouring_pictures_share_is_in_the_u_of_the_spin():
     assert np.std(pulls) < 1.6  # 1, and 6 of its standard errors; 2.3 to 2.7 if each picture counts alone
 
 
+def test_what_comes_with_each_turn_averages_out_of_the_u_of_the_spin():
+    random = np.random.default_rng(22)
+    times, pulls = phone_times(2.0), []
+    for _ in range(60):
+        beside = 5 * NOISE * np.cos(2 * np.pi * (31.7 * times + random.uniform()))  # the eccentricity sways
+        found = turning(times, seen(random, times, 31.0, more=beside))
+        pulls += [((found.frequency - 31.0) / found.u_frequency, (found.spin[0] - 31.0) / found.u[0])]
+    assert np.std(pulls, axis=0) == pytest.approx([1, 1], abs=0.37)  # 4 standard errors; 0.3 if each picture counts
+
+
 def test_a_mark_that_pulls_the_rim_is_taken_out_of_the_places():
     random = np.random.default_rng(18)
     times = phone_times(1.0)
