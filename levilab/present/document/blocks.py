@@ -15,10 +15,10 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar
 
 from levilab.present.tables import Table
-from levilab.texts.text import in_language, numbers_in_language
+from levilab.texts.text import Text, in_language, numbers_in_language
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterable
+    from collections.abc import Callable, Iterable, Iterator
     from datetime import datetime
 
     from levilab.present.style import Figure
@@ -390,3 +390,39 @@ def _with_mark(block: B, mark: str) -> B:
     if isinstance(block, Section | Details):
         return replace(block, blocks=tuple(with_marks(block.blocks, mark)))
     return block
+
+
+@dataclass(frozen=True)
+class InShort:
+    """What a chapter of several found, for the beginning of the document.
+
+    Attributes:
+        title, anchor: of the chapter.
+        verdict: empty for none.
+        notes: how many there are; empty for none.
+    """
+
+    title: str
+    anchor: str
+    verdict: str
+    notes: str
+
+
+def in_short(blocks: Iterable[Block]) -> list[InShort]:
+    """Return what each chapter found; empty where less than two of them found anything."""
+    found = []
+    for chapter in blocks:
+        if isinstance(chapter, Section):
+            inner = [*all_in(chapter)]
+            verdict = next((one.text for one in inner if isinstance(one, Verdict)), "")
+            count = sum(len(group) for one in inner if isinstance(one, Warnings) for group in one.groups)
+            notes = in_language(Text("{n} notes", n=count) if count > 1 else "1 note" if count else "")
+            found.append(InShort(chapter.title, chapter.anchor, verdict, notes))
+    return found if sum(bool(one.verdict) for one in found) > 1 else []
+
+
+def all_in(block: Block) -> Iterator[Block]:
+    """Yield a block, and those in it if it is a section."""
+    yield block
+    for inner in block.blocks if isinstance(block, Section) else ():
+        yield from all_in(inner)

@@ -7,8 +7,8 @@ from functools import cache
 from hashlib import sha256
 from importlib.resources import files
 
-from levilab.present.document.blocks import Block, Document, Section
-from levilab.report.html.blocks import Html, Writer, element, join, words
+from levilab.present.document.blocks import Block, Document, InShort, Section, in_short
+from levilab.report.html.blocks import Html, Writer, element, join, lines, words
 
 
 def page_of(document: Document) -> str:
@@ -48,13 +48,22 @@ def _head(document: Document, writer: Writer) -> list[Html]:
 
 
 def _contents(document: Document) -> Html:
-    """Return links to the sections of the first depth."""
+    """Return links to the sections of the first depth; of several chapters with what each found."""
     sections = [block for block in document.blocks if isinstance(block, Section) and block.anchor]
     if not document.contents or not sections:
         return join([])
     writer = Writer()
+    if chapters := in_short(sections):
+        return element("nav", [_chapter(one, writer.new_id(one.anchor)) for one in chapters], class_="chapters")
     links = [element("a", words(one.title), href=f"#{writer.new_id(one.anchor)}") for one in sections]
     return element("nav", links, aria_label="Contents")
+
+
+def _chapter(one: InShort, name: str) -> Html:
+    """Return a link to a chapter with the number of its notes, and its verdict."""
+    notes = element("small", words(one.notes)) if one.notes else join([])
+    verdict = element("p", lines(one.verdict), class_="verdict") if one.verdict else join([])
+    return join([element("p", element("a", words(one.title), href=f"#{name}"), notes), verdict])
 
 
 def _island(writer: Writer) -> Html:

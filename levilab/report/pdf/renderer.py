@@ -5,7 +5,7 @@ Texts reach typst as strings of a JSON file and never as markup, so nothing in t
 
 import json
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from importlib import resources
@@ -35,6 +35,8 @@ from levilab.present.document.blocks import (
     Tabular,
     Verdict,
     Warnings,
+    all_in,
+    in_short,
     with_options,
 )
 from levilab.present.document.typesetting import typeset
@@ -195,7 +197,9 @@ def _content(document: Document, drawing: _Drawing) -> Drawn:
         "banner": None if document.banner is None else _banner(document.banner, drawing),
         "mark": _text(document.banner.lead.rstrip(".")) if document.banner else "",
         "before": drawing.blocks(first),
-        "chapters": [*_in_short(rest)],
+        "chapters": [
+            {"title": _text(one.title), "verdict": _text(one.verdict), "notes": one.notes} for one in in_short(rest)
+        ],
         "outline": _outline_depth(document),
         "blocks": drawing.blocks(rest),
     }
@@ -208,23 +212,6 @@ def _outline_depth(document: Document) -> int:
         return 0
     inner = sum(isinstance(block, Section) for section in sections for block in section.blocks)
     return 2 if len(sections) + inner <= MOST_ENTRIES else 1
-
-
-def _in_short(blocks: Iterable[Block]) -> Iterator[Drawn]:
-    """Return each chapter of a report of several for the first page: its verdict and the number of notes."""
-    chapters = [(block, [*_all_in(block)]) for block in blocks if isinstance(block, Section)]
-    verdicts = [next((one.text for one in inner if isinstance(one, Verdict)), "") for _, inner in chapters]
-    several = sum(map(bool, verdicts)) > 1
-    for (chapter, inner), verdict in zip(chapters, verdicts, strict=True) if several else ():
-        count = sum(len(group) for one in inner if isinstance(one, Warnings) for group in one.groups)
-        notes = in_language(Said("{n} notes", n=count) if count > 1 else "1 note" if count else "")
-        yield {"title": _text(chapter.title), "verdict": _text(verdict), "notes": notes}
-
-
-def _all_in(block: Block) -> Iterator[Block]:
-    yield block
-    for inner in block.blocks if isinstance(block, Section) else ():
-        yield from _all_in(inner)
 
 
 def _date(date: datetime) -> dict[str, int]:
@@ -335,7 +322,7 @@ def _section(block: Section, drawing: _Drawing) -> Drawn | None:
         "title": _text(block.title),
         "lead": _text(block.lead),
         "page": block.new_page,
-        "figures": any(isinstance(one, Picture) for one in _all_in(block)),
+        "figures": any(isinstance(one, Picture) for one in all_in(block)),
         "blocks": drawing.blocks(block.blocks),
     }
 

@@ -152,7 +152,7 @@ def test_a_column_of_long_sentences_is_wider_than_one_of_short_words():
 
 def test_a_first_page_of_several_chapters_says_what_each_found(monkeypatch):
     chapters = tuple(
-        Section(name, (Warnings((("mind",),)), Section("Result", (Verdict(f"{name} holds"),))), new_page=new)
+        Section(name, (Warnings((("mind",),)), Section("Result", (Verdict(f"{name} holds"),))), name, new_page=new)
         for name, new in (("one", False), ("two", True))  # the first one of a report follows its title where it can
     )
     last = Section("How to reproduce this", (Paragraph("x"),))
@@ -163,6 +163,9 @@ def test_a_first_page_of_several_chapters_says_what_each_found(monkeypatch):
         ("How to reproduce this", "", ""),
     ]
     assert data_of(Document("t", "", (chapters[0], last)))["chapters"] == []
+    head = page_of(Document("t", "", (*chapters, last), contents=True)).partition("<section")[0]
+    assert "two holds" in head
+    assert "two holds" not in page_of(Document("t", "", (chapters[1],), contents=True)).partition("<section")[0]
     monkeypatch.setattr("levilab.texts.text._of_process", "de")
     assert data_of(Document("t", "", (*chapters, last)))["chapters"][0]["notes"] == "1 Hinweis"
     assert pages_of(Document("t", "", (*chapters, last))) == 1
