@@ -18,8 +18,8 @@ from levilab.texts.text import ENGLISH, Text, text_from
 #: Figures that stand beside an input, and its report.
 FIGURES = re.compile(r"[a-z][a-z-]{0,30}\.(png|svg)")
 REPORT = "report.html"
-#: The analysis of a film's pictures, whose result does not have the name of the first: that would be of its sound.
-_OF_FILM = "video"
+#: Results beside an input: of the analysis that is first there, and of others, as of a film beside that of its sound.
+_RESULTS = re.compile(r"result(\.[a-z]+)?\.json")
 #: An analysis that takes longer than this is given up [s].
 _LONGEST_S = 600.0
 #: An analysis that is given up ends at once; the longest wait for that [s].
@@ -30,6 +30,8 @@ _APART: dict[str, Any] = {
 }  # fmt: skip
 #: What a page shows of a result at most: texts of a kind, and characters of each.
 _MOST_TEXTS, _LONGEST_TEXT = 12, 2000
+#: Texts of a result on a page.
+TEXTS = ("verdict", "doubts", "warnings")
 
 
 class Analyses:
@@ -67,7 +69,8 @@ class Analyses:
         self.running[path] = "analyze"
         self.failed.pop(path, None)
         place = beside(path)
-        files = (*place.results(_OF_FILM), place.file(REPORT), *(place.file(name) for name in _figures(place)))
+        names = (REPORT, *_names(place, _RESULTS), *_names(place, FIGURES))
+        files = [place.file(name) for name in names]
         self._before |= {file: stamp(file) for file in files}
         self._threads = {thread for thread in self._threads if thread.is_alive()}
         thread = threading.Thread(
@@ -137,14 +140,15 @@ class Analyses:
         Results of an earlier analysis are not shown for one that is under way or has failed.
         """
         place = beside(path)
-        result = next(filter(self._is_new, place.results(_OF_FILM)), None)
+        results = [_result(file) for name in _names(place, _RESULTS) if self._is_new(file := place.file(name))]
+        said = {key: [*dict.fromkeys(text for one in results for text in one.get(key, ()))] for key in TEXTS}
         return {
             "step": self.running.get(path, ""),
             "failed": self.failed.get(path, ""),
-            "figures": [name for name in _figures(place) if self._is_new(place.file(name))],
+            "figures": [name for name in _names(place, FIGURES) if self._is_new(place.file(name))],
             "report": REPORT if self._is_new(place.file(REPORT)) else "",
-            "analysis": "",
-        } | (_result(result) if result else {})
+            "analysis": next((one["analysis"] for one in results if one), ""),
+        } | (said if results else {})
 
     def _is_new(self, path: Path) -> bool:
         """Return whether a file is there, and was not before the analysis that was asked for last."""
@@ -158,11 +162,11 @@ def is_shown(place: Place, name: str) -> bool:
     return bool(name == REPORT or FIGURES.fullmatch(name)) and path.is_file() and not path.is_symlink()
 
 
-def _figures(place: Place) -> list[str]:
-    """Return the names of the figures of an input, sorted."""
+def _names(place: Place, pattern: re.Pattern[str]) -> list[str]:
+    """Return the names of the files of an input that a pattern fits, the shorter ones first."""
     head = f"{place.name}." if place.name else ""
     names = (path.name.removeprefix(head) for path in place.folder.glob(f"{glob.escape(head)}*"))
-    return sorted(name for name in names if FIGURES.fullmatch(name))
+    return sorted(filter(pattern.fullmatch, names), key=lambda name: (len(name), name))
 
 
 def _result(path: Path) -> dict[str, Any]:

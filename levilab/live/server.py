@@ -27,7 +27,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from levilab.animation.three import three_js
 from levilab.errors import LevilabError, UsageError
 from levilab.errors import unquote as unquote_names
-from levilab.live.analyzed import Analyses, is_shown
+from levilab.live.analyzed import TEXTS, Analyses, is_shown
 from levilab.live.choice import Choice, choices, newest, running_run
 from levilab.live.desk import Desk, parts_for, scene_of_run
 from levilab.live.doors import PAGE_POLICY, REPORT_POLICY, Doors, Guard
@@ -295,7 +295,7 @@ class Pages:
         path = self._input(request)
         about: dict[str, Any] = self.hall.analyses.about(path) if path else {"failed": ""}
         language = _language(request, self.hall)
-        for what in ("verdict", "doubts", "warnings"):
+        for what in TEXTS:
             about[what] = [unquote_names(in_language(text, language)) for text in about.get(what, ())]
         return self._json(about | {"failed": in_language(about["failed"], language)})
 

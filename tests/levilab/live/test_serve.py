@@ -13,7 +13,7 @@ import pytest
 
 from levilab.animation.three import MissingThree, three_js
 from levilab.interruption import End
-from levilab.live.analyzed import Analyses
+from levilab.live.analyzed import TEXTS, Analyses
 from levilab.live.practice.bench import PracticeBench
 from levilab.live.serve import LiveOptions, ViewServer, farewell, serve_live
 from support.commands import command
@@ -82,6 +82,19 @@ def test_what_is_damaged_of_a_result_is_not_shown(tmp_path):
         (tmp_path / "result.json").write_text(json.dumps(result), encoding="utf-8")
         about = Analyses().about(tmp_path)
         assert (about["verdict"], about["doubts"]) == (said, [])
+
+
+def test_a_page_shows_what_each_analysis_of_a_file_says(tmp_path):
+    """A phone's magnetic field is a spin, and where the top coasts a spin-down."""
+    file = tmp_path / "phone.csv"
+    spin = {"analysis": "spin", "sentences": ["36.86 Hz."], "doubts": ["folded"], "notes": ["steps"]}
+    (tmp_path / "phone.csv.result.spin.json").write_text(json.dumps(spin), encoding="utf-8")
+    about = Analyses().about(file)
+    assert [about[key] for key in ("analysis", *TEXTS)] == ["spin", ["36.86 Hz."], ["folded"], ["steps"]]
+    spindown = {"analysis": "spindown", "sentences": ["The disc law."], "doubts": ["folded"]}
+    (tmp_path / "phone.csv.result.json").write_text(json.dumps(spindown), encoding="utf-8")
+    about = Analyses().about(file)
+    assert [about[key] for key in TEXTS] == [["The disc law.", "36.86 Hz."], ["folded"], ["steps"]]
 
 
 @pytest.fixture
