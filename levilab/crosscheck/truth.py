@@ -1,12 +1,14 @@
 """The truth of a run of the virtual bench: what its seed drew, in the names of the analyses' results."""
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from levilab.runs.events import RunEvent
-from levilab.runs.run import Run, RunRecord
+from levilab.runs.run import Run
 from levilab.simulator.laws import LAWS
+from levilab.simulator.spin import DECAYS
 from levilab.world.spin_world import SpinScene, random_scene
 
 
@@ -30,16 +32,15 @@ def truth_of(run: Run | None, analysis: str) -> Truth:
 
     The mean of limits is that of the law which the seed draws each of them from.
     """
-    record = run.record if run else None
-    if record is None or not record.synthetic or record.seed is None:
+    if run is None or not (record := run.record).synthetic or record.seed is None:
         return Truth()
     scene = record.table("scene")
     if analysis == "precession":
-        lost = any(event["kind"] == RunEvent.LOCK_LOST for event in run.events()) if run else False
+        lost = any(event["kind"] == RunEvent.LOCK_LOST for event in run.events())
         return Truth() if lost or _is_loose(scene) else Truth({"slope": 1.0, "intercept": 0.0})
     if record.world == "spin":
         known = _OF_SPIN_WORLD.get(analysis)
-        return known(random_scene(record.seed), record) if known else Truth()
+        return known(random_scene(record.seed), run) if known else Truth()
     return _of_scene(scene.get("drag")) if analysis == "spindown" else Truth()
 
 
@@ -57,21 +58,27 @@ def _of_scene(drag: Any) -> Truth:
     return Truth({LAWS[law].names[0]: drag["coefficient"]}, law)
 
 
-def _drag(scene: SpinScene, _: RunRecord) -> Truth:
+def _drag(scene: SpinScene, _: Run) -> Truth:
     return Truth(dict(zip(LAWS[scene.drag].names, scene.constants, strict=True)), scene.drag)
 
 
-def _base(scene: SpinScene, _: RunRecord) -> Truth:
+def _base(scene: SpinScene, _: Run) -> Truth:
     names = {"strength": "strength_t_m", "origin": "origin_m", "thickness": "thickness_m"}
     return Truth({name: getattr(scene.base, of_base) for name, of_base in names.items()})
 
 
-def _lower_limit(_: SpinScene, record: RunRecord) -> Truth:
-    return Truth({"mean": SpinScene().fall_hz} if record.table("limit").get("which") == "lower" else {})
+def _held(scene: SpinScene, run: Run) -> Truth:
+    held = float(run.readings().column("spin_frequency_hz").mean())
+    return Truth({"drag": held * DECAYS[scene.drag].damping(2 * math.pi * held, *scene.constants)})
 
 
-_OF_SPIN_WORLD: Mapping[str, Callable[[SpinScene, RunRecord], Truth]] = {
+def _lower_limit(_: SpinScene, run: Run) -> Truth:
+    return Truth({"mean": SpinScene().fall_hz} if run.record.table("limit").get("which") == "lower" else {})
+
+
+_OF_SPIN_WORLD: Mapping[str, Callable[[SpinScene, Run], Truth]] = {
     "spindown": _drag,
     "field": _base,
+    "hold": _held,
     "limit": _lower_limit,
 }

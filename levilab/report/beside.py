@@ -161,8 +161,9 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
     document = analysis.document(found, Path())
     truths = [truth_of(source.run, analysis.name) for source in found.sources]
     laws = Counter(one.model for one in truths if one.model)
-    model = max(laws, key=lambda law: laws[law], default="") or document.get("best_model", "")
     parts = document["runs"]
+    best = document.get("best_model", "") if parts[0]["models"] else ""
+    model = max(laws, key=lambda law: laws[law], default=best)
     said = [
         [
             text

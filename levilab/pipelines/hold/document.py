@@ -97,4 +97,5 @@ HOLD = Analysis(
     columns=hold_columns,
     row=HOLD_ROW,
     symbols=symbols_of(QUANTITIES),
+    compared=("drag",),
 )

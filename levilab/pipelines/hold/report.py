@@ -69,13 +69,13 @@ _MEANING = (
 def hold_part(analysis: HoldAnalysis) -> ReportPart:
     """Return what the held spins say."""
     laws = (Tabular("hold-laws", laws_table(analysis)),) if analysis.combined.laws else ()
+    values = Paragraph(_MEANING, "What it means."), Tabular("hold-spins", spins_table(analysis), VALUE_U)
     return ReportPart(
         subject="held spin",
         heading="Held spins: the drag by the amplitude that balances it",
         lead=how_many(len(analysis.runs), "held spin"),
-        result=(
-            Paragraph(_MEANING, "What it means."), Tabular("hold-spins", spins_table(analysis), VALUE_U), *laws,
-        ),
+        values=values,
+        result=(*values, *laws),
         figure=FigureText(
             title="Drag at held spins.",
             caption=Sentences(

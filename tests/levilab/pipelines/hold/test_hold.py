@@ -11,6 +11,7 @@ from analysis.spindown.tilt import count_of, slowing_by_tilt
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.hold.figure import hold_figure
+from levilab.present.document.blocks import Paragraph
 from support.paths import SAMPLE_DATA
 
 HOLD = ANALYSES["hold"]
@@ -86,6 +87,7 @@ def test_tables_figure_and_report_have_each_spin_and_law():
     assert len(spins.rows) == 4
     assert {row.cells[0] for row in laws.rows} == {"stokes", "newton", "disc", "mixed", "power"}
     assert hold_figure(found).axes[-1].get_xlabel() == "spin  [Hz]"
+    assert any(isinstance(block, Paragraph) for block in HOLD.part(found).values)  # a short report explains s, g, d
 
 
 def test_a_single_hold_and_one_without_a_gain(tmp_path):

@@ -156,6 +156,15 @@ def test_other_experiments_have_their_truths_too(experiment, names, tmp_path):
         assert [mark.word for mark in of.marks] == [GOOD, GOOD]
 
 
+def test_held_spins_are_compared_by_their_drag_and_no_residuals_are_spoken_of(tmp_path):
+    root = measured(tmp_path, ["A", "B"], "hold", "hold.longest_s=100")
+    (drag,) = compared(root, "hold").quantities
+    assert drag.symbol == "d"
+    assert drag.truths[0] != drag.truths[1]
+    assert all(abs(one) < 3.5 for one in drag.from_truth)
+    assert "Residuals" not in write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")
+
+
 def test_page_and_pdf_begin_with_the_result(of_three, tmp_path):
     page = write_class([of_three], tmp_path / "new" / "class.html").read_text(encoding="utf-8")
     places = [page.index(f">{title}<") for title in ("Result", "Figure", "Runs")]
