@@ -84,11 +84,14 @@ def headline(figure: Figure, text: str, synthetic: str = "") -> None:
 
 
 def _in_two_lines(text: str, most: int) -> list[str]:
-    """Return a text in one line of at most `most` letters, or in two lines of about the same length.
+    r"""Return a text in one line of at most `most` letters, or in two lines of about the same length.
 
     >>> _in_two_lines("Spin-down: the mixed law is the best; Newton is excluded", 50)
     ['Spin-down: the mixed law is', 'the best; Newton is excluded']
+    >>> _in_two_lines("Held at 45.0005(10) Hz, it floats", 25)  # no number without its unit
+    ['Held at 45.0005(10)\xa0Hz,', 'it floats']
     """
+    text = re.sub(r"(?<=[\d)=]) |(?<=\bmT) ", "\N{NO-BREAK SPACE}", text)
     widths = range(len(text) // 2, most) if len(text) > most else ()
     halves = (textwrap.wrap(text, width) for width in widths)
     return next((two for two in halves if len(two) == 2), textwrap.wrap(text, most, max_lines=2, placeholder=" …"))

@@ -453,7 +453,7 @@ def in_a_sentence(run: SpinRun) -> str:
         at=at,
         which=run.which,
     )
-    said = "Its slope through all {of} is {slope:n}."
+    said = "In the middle of all {of} its slope is {slope:n}."
     trend = Text(said, f"{series.of}s", with_uncertainty(run.trend)) if run.trend else ""
     return Sentences(way, trend, drive)
 

@@ -296,7 +296,7 @@ _FREQUENCIES = Sentences(
     VALUE_U,
     "The spin is that at the time given, its slope the change of the spin in a second. bound: no method does better "
     "with this noise (Cramér–Rao). Of several records or windows this table, that of the pulses and the budgets are of "
-    "the one in the middle; the text gives the slope through all.",
+    "the one in the middle; the text gives the slope in the middle of all.",
 )
 _QUALITY = {
     "spin-pulses": (
