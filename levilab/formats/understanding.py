@@ -851,6 +851,13 @@ def _with_time(wanted: Mapping[str, str], filled: Sequence[str]) -> Mapping[str,
     return {"t": left[0], **wanted} if alone and left else wanted
 
 
+def _spin_comes_first(layout: Layout, filled: Sequence[str]) -> bool:
+    """Return whether the first column falls beside a second that rises from where no top spins: times."""
+    first, second = ([*pairwise(_numbers(layout, int(number) - 1))] for number in [*filled, "1", "1"][:2])
+    falls, rises = (all(before >= after for before, after in first), all(before < after for before, after in second))
+    return bool(first and second) and falls and rises and second[0][0] < SLOWEST_SPIN_HZ
+
+
 def _titles(
     path: Path, layout: Layout, wanted: Mapping[str, str], *, guess: bool
 ) -> tuple[tuple[str, ...], Mapping[str, str], list[str]]:
@@ -867,6 +874,8 @@ def _titles(
     if len(filled) > len(TITLES_WITHOUT_HEADER) or not guess:
         what = '{width} columns and no header; add one, or say `columns` = "t=1,f=2"'
         raise NoSuchColumn(path, what, layout.width, line=layout.first_line)
-    taken = dict(zip(TITLES_WITHOUT_HEADER, filled, strict=False))
+    time, spin, u = TITLES_WITHOUT_HEADER
+    names = (spin, time, u) if _spin_comes_first(layout, filled) else TITLES_WITHOUT_HEADER
+    taken = dict(zip(names, filled, strict=False))
     said = "{path:s}: no header; the columns are taken as {names:s}"
     return numbers, taken, [of_file("no header", Said(said, shorten(str(path), 200), ", ".join(taken)))]

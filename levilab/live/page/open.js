@@ -209,8 +209,9 @@ by("analyze").addEventListener("click", async () => {
   const {file} = look;
   by("result").hidden = false;
   by("result").focus();
-  await showResult(
+  const isThere = await showResult(
     async () => (await ask({do: "analyze a file", file}, token)).error || "", `file/${file}`, () => look.file === file, () => {});
+  by("command").parentElement.hidden ||= !isThere && look.file === file;  // it fails there, too
 });
 
 by("language").addEventListener("change", turnLanguage);

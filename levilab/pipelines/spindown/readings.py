@@ -351,7 +351,7 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
             "sort the rows by time, the latest comes first; or, if the columns are exchanged, name them the other way "
             "round with `columns`"
             if turned
-            else "a second run seems to begin here; save each as a file or sheet of its own"
+            else "a second run seems to begin here: repeat the titles above it, or save each as a file of its own"
             if restarts
             else "sort the readings, or correct one"
         )

@@ -252,6 +252,14 @@ def test_numbers_without_header_are_time_frequency_and_uncertainty_with_a_warnin
     assert f"no header; the columns are taken as {T}, {F}, {U}" in table.warnings[0]
 
 
+def test_a_first_column_that_falls_beside_times_from_0_is_the_spin(write):
+    table = read_table(write("61.5,0,.25\n61.25,0.5,.5\n61,1,.125\n"))
+    assert {name: table.column(name).tolist() for name in table.frame} == WITH_U
+    assert f"no header; the columns are taken as {F}, {T}, {U}" in table.warnings[0]
+    table = read_table(write("1,61\n0.5,61.25\n0,61.5\n"))  # the latest row first
+    assert f"no header; the columns are taken as {T}, {F}" in table.warnings[0]
+
+
 @pytest.mark.parametrize(
     ("text", "columns", "expected"),
     [

@@ -142,6 +142,18 @@ def test_an_answer_is_shown_in_one_order_and_nothing_before_it_is_whole(hall, wa
     assert not page.locator("#progress").is_visible()
 
 
+def test_where_an_analysis_fails_the_page_offers_no_command_that_does_so_too(hall, watched, monkeypatch):
+    page, file = watched(), hall.root.parent / "steps.csv"
+    file.write_text("t [s],f [Hz]\n" + "".join(f"{t},{f}\n" for t, f in zip(TIME, SPIN, strict=True)))
+    monkeypatch.setattr(hall.analyses, "carry_out", lambda _: (1, "levilab: say it with --columns"))
+    page.goto(f"{address(hall)}open?file={hall.opened.add(file)}#{hall.doors.token}")
+    until(page, "window.levilab?.look")
+    assert page.is_visible("#command")
+    page.click("#analyze")
+    until(page, "document.getElementById('verdict').innerText === 'say it with columns'")
+    until(page, "document.getElementById('command').parentElement.hidden")
+
+
 def test_a_choice_in_the_table_changes_how_it_is_read(hall, watched):
     page = watched(viewport=PHONE, color_scheme="dark")
     file = hall.root.parent / "three.csv"

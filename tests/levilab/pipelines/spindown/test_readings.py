@@ -38,7 +38,7 @@ def test_readings_are_arrays_with_the_tables_warnings(tmp_path):
     [
         ("0,61,.1\n1,60,.1\n\n1,59,.1\n", 5, ["the time 1 s is repeated", "in line 3"]),
         ("0,61,.1\n2,60,.1\n# x\n1,59,.1\n", 5, ["the time 1 s comes after 2 s in line 3"]),
-        ("0,61,.1\n1,60,.1\n2,59,.1\n" * 2, 5, ["a second run seems to begin here; save each as a file"]),
+        ("0,61,.1\n1,60,.1\n2,59,.1\n" * 2, 5, ["a second run seems to begin here: repeat the titles above it"]),
         ("9,61,.1\n10,60,.1\n11,59,.1\n0,64,.1\n1,63,.1\n2,62,.1\n", 5, ["sort the readings"]),
         ("0,61,.1\n1,0,.1\n2,59,.1\n", 3, ["the frequency is 0 Hz", "delete such rows"]),
         ("0,61,.1\n1,60,.1\n2,-59,.1\n", 4, ["the frequency is -59 Hz", "magnitude"]),
