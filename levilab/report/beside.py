@@ -25,7 +25,7 @@ from levilab.texts.note import is_doubt, weight_of
 from levilab.texts.text import Sentences, Text, how_many, in_language
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from levilab.pipelines.document import Analysis
     from levilab.pipelines.inputs.source import Source
@@ -64,12 +64,13 @@ class Compared:
         name: as in result.json.
         symbol: for people.
         unit: of results.
-        estimates: of each group; None where it has no value with u.
+        estimates: of each group, whose u is widened where it is known from few repetitions alone; None where it has no
+            value with u.
         truths: of each group; None where it is not known.
         mean: of those that are used, by the rule of several runs in a report; None where there are none.
         together: whether those agree; None where there are none.
         used: whether a group has a value that is neither doubtful nor far from its truth, or no group has.
-        widths: by which u of each group grows in comparisons, as it is known from few repetitions alone.
+        widened: whether u of any group is.
     """
 
     name: str
@@ -80,7 +81,7 @@ class Compared:
     mean: Estimate | None
     together: Comparison | None
     used: tuple[bool, ...]
-    widths: tuple[float, ...]
+    widened: bool
 
     @property
     def shown_unit(self) -> str:
@@ -98,17 +99,18 @@ class Compared:
         return None if value is None else Estimate(value * factor, None if u is None else u * factor, text)
 
     @property
-    def truth(self) -> tuple[float, float] | None:
-        """The mean of the truths, and that of the distances from them in its u; None where one is not known.
+    def truth(self) -> tuple[float, float, float] | None:
+        """The mean of the truths, the distance of the mean from it in u, and this u; None where a truth is not known.
 
-        How one top differs from another is in no distance.
+        How one top differs from another is in neither.
         """
-        rows = zip(self.estimates, self.truths, self.widths, self.used, strict=True)
-        used = [(one, truth, width) for one, truth, width, use in rows if use and one]
-        if self.mean is None or any(truth is None for _, truth, _ in used):
+        rows = zip(self.estimates, self.truths, self.used, strict=True)
+        used = [(one, truth) for one, truth, use in rows if use and one]
+        if self.mean is None or any(truth is None for _, truth in used):
             return None
-        values, truths, u = np.array([(one.value, truth, (one.u or 0.0) * width) for one, truth, width in used]).T
-        return float(truths.mean()), float((values - truths).sum() / np.linalg.norm(u))
+        values, truths, u = np.array([(one.value, truth, one.u) for one, truth in used], float).T
+        of_mean = np.linalg.norm(u) / len(used)
+        return float(truths.mean()), float((values - truths).mean() / of_mean), float(of_mean)
 
     @cached_property
     def from_class(self) -> tuple[float | None, ...]:
@@ -120,8 +122,8 @@ class Compared:
     def from_truth(self) -> tuple[float | None, ...]:
         """The distance of each group from its truth, in its u."""
         return tuple(
-            None if one is None or truth is None else (one.value - truth) / one.u / width  # type: ignore[operator]
-            for one, truth, width in zip(self.estimates, self.truths, self.widths, strict=True)
+            None if one is None or truth is None else (one.value - truth) / one.u  # type: ignore[operator]
+            for one, truth in zip(self.estimates, self.truths, strict=True)
         )
 
 
@@ -245,21 +247,20 @@ def _quantity(
         name,
         analysis.symbols.get(name, name.replace("_", " ")),
         next((one["unit"] for one in good if one), "1"),
-        tuple(Estimate(one["value"], one["u"], one["unit"]) if one else None for one in good),
+        tuple(
+            Estimate(one["value"], one["u"] * width, one["unit"]) if one else None
+            for one, width in zip(good, widths, strict=True)
+        ),
         tuple(truth.values.get(name) if truth.model in {"", model} else None for truth in truths),
         None,
         None,
         tuple(one is not None for one in good),
-        widths,
+        max(widths) > 1,
     )
     far = [distance is not None and abs(distance) > FAR for distance in of.from_truth]
     used = tuple(bool(one) and not (doubt or off) for one, doubt, off in zip(good, doubts, far, strict=True))
     used = used if any(used) else of.used
-    known = [
-        Estimate(one["value"], one["u"] * width, of.unit)
-        for one, width, use in zip(good, widths, used, strict=True)
-        if one and use
-    ]
+    known = [one for one, use in zip(of.estimates, used, strict=True) if one and use]
     if not known:
         return replace(of, used=used)
     together = compare(*np.array([(one.value, one.u) for one in known], float).T)
@@ -433,10 +434,10 @@ def _count(of: Class, one: Compared) -> str:
     return Text("{runs} of {groups}", runs=runs, groups=groups) if several else groups
 
 
-def count_sources(sources: Sequence[Source[Any]]) -> str:
-    """Return the number of groups, or of runs where no run names its group."""
+def count_sources(sources: Sequence[Source[Any]], more: Iterable[str] = ()) -> str:
+    """Return the number of groups, or of runs where no run names its group; more: names that were not read."""
     named = any(source.group for source in sources)
-    return how_many(len({source.group or source.name for source in sources}), "group" if named else "run")
+    return how_many(len({*more, *(source.group or source.name for source in sources)}), "group" if named else "run")
 
 
 def _agreement(of: Compared) -> str:

@@ -306,7 +306,7 @@ def banner_of(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner 
     )
     if not mixed and files:
         said = Text(
-            "Of {inputs} {some} did not come from a real bench ({names}).",
+            "Of {inputs}, {some} did not come from a real bench ({names}).",
             inputs=count_inputs(sources),
             some=len(made_up),
             names=list_in_words(made_up),

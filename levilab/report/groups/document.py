@@ -11,7 +11,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import check_ending
+from levilab.errors import DataError, check_ending
 from levilab.files import check_writable
 from levilab.formats.texts import locate
 from levilab.pipelines.analyzed import A
@@ -65,6 +65,7 @@ from levilab.report.page import FORMATS, newest_of, write_content, writing_repor
 from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
 from levilab.runs.find import RECORD
+from levilab.runs.run import read_record
 from levilab.texts.note import of_file
 from levilab.texts.text import Sentences, Text, spoken, verbatim
 
@@ -92,15 +93,15 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str, o
     """
     sources = list({source.path.resolve(): source for of in classes for source in of.found.sources}.values())
     alone = len(classes) == 1
-    texts = [*(text for of in classes for text in of.found.warnings), others]
-    warnings = dict.fromkeys(plain_text(text) for text in texts if text)
+    unread = {name.partition(", ")[0] for of in classes for name in of.unread}  # their groups
+    warnings = dict.fromkeys(plain_text(text) for text in (*_notes_of(classes), others) if text)
     notes = [Section("Notes", (Warnings(tuple((text,) for text in warnings)),), anchor="notes")] if warnings else []
     chapters: list[Block] = []
     for k, of in enumerate(classes):
         own = tuple(_blocks(of, deeper=not alone))
         chapters += own if alone else [Section(_subject(of), own, anchor=of.analysis.name, new_page=k > 0)]
     return Document(
-        title=Text("Class of {groups}", groups=count_sources(sources)),
+        title=Text("Class of {groups}", groups=count_sources(sources, unread)),
         lead=Text(
             "{inputs}: {subjects}, {notes}",
             count_inputs(sources),
@@ -149,13 +150,22 @@ def _with_folders_as_groups(results: Results, folder_of: Callable[[Path], str]) 
 
 
 def _folders_of_groups(results: Results, unread: Iterable[Path]) -> Callable[[Path], str]:
-    """Return the function file → its folder below the deepest one that holds all files; empty where it lies in that."""
+    """Return the function file → its folder below the deepest one of all files, empty there; run → its group."""
     used = (one.path for _, found in results for one in found.sources if not one.run)
     files = {path: locate(path)[0].resolve() for path in (*used, *unread)}
     folders = {path: file.parent.parts for path, file in files.items() if not (file / RECORD).exists()}
     common = takewhile(lambda parts: len({*parts}) == 1, zip(*folders.values(), strict=False))
     depth = len([*common])
-    return lambda path: "".join(folders.get(path, ())[depth : depth + 1])
+    groups = {path: _group_in(file) for path, file in files.items() if path not in folders}
+    return lambda path: groups.get(path) or "".join(folders.get(path, ())[depth : depth + 1])
+
+
+def _group_in(run: Path) -> str:
+    """Return the group of a run; empty where its record cannot be read."""
+    try:
+        return read_record(run).group
+    except DataError:
+        return ""
 
 
 def _names_of_unread(paths: Sequence[Path], results: Results, folder_of: Callable[[Path], str]) -> list[str]:
@@ -198,6 +208,17 @@ def _with_other_readings(analysis: Analysis[A], first: A, found: A) -> A:
 
 def _subject(of: Class) -> str:
     return of.analysis.part(of.found).subject
+
+
+def _notes_of(classes: Sequence[Class]) -> list[str]:
+    """Return what to know of the inputs, with the analysis where there are several and the text names no input."""
+    return [
+        text
+        if len(classes) == 1 or getattr(text, "names_input", False)
+        else Text("{subject}: {text}", subject=_subject(of), text=text)
+        for of in classes
+        for text in of.found.warnings
+    ]
 
 
 def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
@@ -247,7 +268,7 @@ def _values(of: Class, quantity: Compared) -> Tabular:
     columns = [column([*estimates, mean]), [*map(_distance, quantity.from_class), ""]]
     heads = ["group", quantity.head, _FROM_CLASS]
     if of.knows_truth:
-        truth, distance = quantity.truth or (None, None)
+        truth, distance, _ = quantity.truth or (None, None, None)
         columns += [
             [*map(truth_text, map(quantity.show, (*quantity.truths, truth)), (*estimates, mean))],
             [*map(_distance, (*quantity.from_truth, distance))],
@@ -259,6 +280,12 @@ def _values(of: Class, quantity: Compared) -> Tabular:
     rows = [Row(cells, kind) for kind, cells in zip(kinds, zip(names, *columns, strict=True), strict=True)]
     rows = rows if len(of.groups) > 1 else rows[:1]
     note = "value(u): the digits in parentheses are u of the last digits."
+    if quantity.widened:
+        note = Sentences(note, "u is larger than in levilab report, as few repetitions give it (Student's t).")
+    if quantity.truth and len(of.groups) > 1:
+        note = Sentences(
+            note, "The distance of the mean from the truth is in its u without the differences of the tops."
+        )
     if any(one and not use for one, use in zip(quantity.estimates, quantity.used, strict=True)):
         note = Sentences(note, "The mean is without results to repeat.")
     name = f"{of.analysis.name}-{quantity.name.replace('_', '-')}"
@@ -378,9 +405,8 @@ def write_class(
         content = class_workbook(classes, date)
     write_content(output, content)
     if tell:
-        kept = (text for of in classes for text in of.found.warnings)
         unusable = (Text("not read: {problem}", why) for why in unread.values())
-        for text in dict.fromkeys([*kept, *unusable, *([others] if others else [])]):
+        for text in dict.fromkeys([*_notes_of(classes), *unusable, *([others] if others else [])]):
             tell(text)
         found = tuple(Text("{subject} ({n})", subject=_subject(one), n=len(one.groups)) for one in classes)
         tell(Text("groups or runs side by side: {found}", found=found))

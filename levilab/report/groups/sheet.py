@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from levilab.present.units import name_with_unit
-from levilab.report.beside import REPEAT, Class
+from levilab.report.beside import REPEAT, Class, count_readings
 from levilab.texts.text import in_language
 
 Cell = str | float | int | None
@@ -87,7 +87,8 @@ def _groups(of: Class) -> tuple[list[str], list[list[Cell]]]:
         if of.knows_truth:
             heads += [truth, f"{one.name}_from_the_truth_in_u"]
             columns += [[*one.truths], [*one.from_truth]]
-    heads += ["readings", "rms_residual", "reduced_chi_square", "best_model"]
+    names = "rms_residual", "reduced_chi_square"
+    heads += ["readings", *names, "best_model"]
     rows = []
     for k, (group, mark) in enumerate(zip(of.groups, of.marks, strict=True)):
         source, record = group.source, group.source.run.record if group.source.run else None
@@ -101,7 +102,7 @@ def _groups(of: Class) -> tuple[list[str], list[list[Cell]]]:
             record.seed if record else None,
             "yes" if source.synthetic else "",
         ]
-        fit = [group.statistics.get(name) for name in ("n", "rms_residual", "reduced_chi_square")]
+        fit = [count_readings(group), *map(group.statistics.get, names)]
         own = [column[k] for column in columns]
         rows.append([*about, *own, *fit, group.best_model])
     rows += [[name, in_language(REPEAT), in_language(why)] for name, why in of.unread.items()]
@@ -111,7 +112,7 @@ def _groups(of: Class) -> tuple[list[str], list[list[Cell]]]:
 def _means(of: Class) -> tuple[list[str], list[list[Cell]]]:
     """Return a row for each quantity of the whole class."""
     heads = ["quantity", "unit", "mean", "u", "scatter", "groups", "chi_square", "degrees_of_freedom", "p"]
-    heads += ["mean_of_truths", "from_the_truth_in_u"]
+    heads += ["mean_of_truths", "from_the_truth_in_u", "u_without_tops"]
     rows: list[list[Cell]] = []
     for one in of.quantities:
         if (found := one.together) is not None and one.mean is not None:

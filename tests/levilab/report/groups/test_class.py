@@ -106,7 +106,7 @@ def test_a_folder_is_the_group_of_its_files(tmp_path):
     (folders[2] / "readings.csv").write_text("t [s],f [Hz]\n0,38\n10,37.2\n20,3x.5\n30,35\n", encoding="utf-8")
     for paths in ([tmp_path], [tmp_path / "class"], folders):
         page = Page(write_class(paths, tmp_path / "class.html").read_text(encoding="utf-8")).text
-        assert re.search(r"Class of 3 groups.*To repeat: Carl", page, re.DOTALL)
+        assert re.search(r"Class of 4 groups.*To repeat: Carl", page, re.DOTALL)
         assert all(name in page for name in ("Anna", "Ben, ", "Dora"))
         assert "readings.csv," not in page.split("Made by")[0].replace("readings.csv, line", "")
 
@@ -247,6 +247,32 @@ def test_a_table_that_was_analyzed_without_doubtful_rows_is_not_called_unusable(
     save(row := ANALYSES["spindown"], row.analyze([table], row.options_from({"skip_doubtful": True})))
     write_class([tmp_path], tmp_path / "class.html", tell=(told := []).append)
     assert told == ["groups or runs side by side: spin-down (1)"]
+
+
+def test_page_and_spreadsheet_of_a_mixed_class_have_the_same_groups_and_numbers(of_three, tmp_path):
+    """Three groups with spin-downs, one with a damaged run, one with limits alone, and a data file."""
+    root = with_changes(of_three, tmp_path / "class", "", {})
+    measured(root, ["Group 4"], "limit", "limit.repetitions=8", "limit.hold_s=0")
+    damaged = root / "d"
+    shutil.copytree(next(one for one in root.glob("2*-spin-*")), damaged)
+    record = json.loads((damaged / RECORD).read_text(encoding="utf-8"))
+    (damaged / RECORD).write_text(json.dumps(record | {"group": "Group 5"}), encoding="utf-8")
+    (damaged / "readings.csv").write_text("xx,yy\n", encoding="utf-8")
+    spin_down_csv(root / "a.csv")
+    page = Page(write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")).text
+    assert "Class of 6 groups" in page
+    assert "4 of 5 results are good. To repeat: Group 5." in page
+    assert "Of 4 runs and 1 data file, 4 did not come from a real bench" in page
+    assert "spin-down: 3 of 4 inputs are SYNTHETIC" in page
+    book = CalamineWorkbook.from_path(write_class([root], tmp_path / "class.xlsx"))
+    (heads, own), (of_class, together) = (
+        book.get_sheet_by_name(f"limit {name}").to_python() for name in ("groups", "class")
+    )
+    row, mean = dict(zip(heads, own, strict=True)), dict(zip(of_class, together, strict=True))
+    assert (row["mean_hz"], row["mean_u_hz"], row["readings"]) == (mean["mean"], mean["u"], 8)
+    expected = (row["mean_hz"] - row["mean_truth_hz"]) / row["mean_u_hz"]
+    assert row["mean_from_the_truth_in_u"] == pytest.approx(expected)
+    assert mean["from_the_truth_in_u"] == pytest.approx(expected)
 
 
 def test_a_run_of_few_readings_is_named_before_what_the_analysis_says(of_three, tmp_path):
