@@ -39,6 +39,8 @@ HOLD_ROW = tuple(columns_of(QUANTITIES))
 
 #: A constant that is more standard uncertainties from the spin-down's disagrees.
 _ENOUGH = 3.0
+#: Held spins that differ by less are said to be one [Hz].
+_ONE_SPIN_HZ = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +79,10 @@ class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
     def text(self) -> str:
         """What the data say, in a few sentences."""
         spins = [run.spin.value or 0.0 for run in self.runs]
-        several = Text("{n} runs held a top, at {low:.1f} Hz to {high:.1f} Hz.", len(spins), min(spins), max(spins))
+        said = "{n} runs held a top, at {low:.1f} Hz to {high:.1f} Hz."
+        if np.ptp(spins) < _ONE_SPIN_HZ:
+            said = "{n} runs held a top, at {low:.1f} Hz."
+        several = Text(said, n=len(spins), low=min(spins), high=max(spins))
         last = (several,) if len(spins) > 1 else text_of(self.runs[0]).each
         return Sentences(*_of_laws(self.combined), *last)
 

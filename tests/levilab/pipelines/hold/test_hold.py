@@ -118,6 +118,7 @@ def test_tops_that_differ_at_one_spin_have_a_mean_drag_and_no_law(tmp_path):
         table.write_text("\n".join([heads, *map(",".join, scaled), ""]), encoding="utf-8")
     found = analyzed([tmp_path])
     assert "lies on the curve of each law" in found.text
+    assert "runs held a top, at 45.0 Hz." in found.text
     assert "best" not in found.text
     (note,) = found.about_all()
     assert "the tops differ, or no law holds" in note
