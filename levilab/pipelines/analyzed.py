@@ -66,6 +66,11 @@ class Analyzed(Generic[S, R, T, Opt]):
     budget: tuple[Budget, ...] = ()
 
     @property
+    def each(self) -> tuple[tuple[Source[S], R], ...]:
+        """Each input with what was found of it."""
+        return tuple(zip(self.sources, self.runs, strict=True))
+
+    @property
     def output_folder(self) -> Path:
         """The folder that the result belongs to."""
         return self.place.folder
@@ -102,8 +107,7 @@ class Analyzed(Generic[S, R, T, Opt]):
         """Every warning once, doubts first; an input's with its name, unless it says it or is of every input."""
         texts = [*(one.note for one in self.skipped if noted(one)), *self.warnings, *self.about_all()]
         of_runs = [
-            [*source.warnings, *(() if source.readings.doubtful else self.about_run(run))]
-            for source, run in zip(self.sources, self.runs, strict=True)
+            [*source.warnings, *(() if source.readings.doubtful else self.about_run(run))] for source, run in self.each
         ]
         of_every = set.intersection(*map(set, of_runs))
         for source, said in zip(self.sources, of_runs, strict=True):
@@ -142,7 +146,7 @@ class EachAlone(Analyzed[S, D, None, Opt]):
         """Findings in a few sentences, for each input in a line of its own."""
         if len(self.runs) == 1:
             return self.runs[0].text
-        named = (_named(source, run.text) for source, run in zip(self.sources, self.runs, strict=True))
+        named = (_named(source, run.text) for source, run in self.each)
         return Sentences(*named, between="\n")
 
     def about_run(self, run: D) -> Iterable[str]:

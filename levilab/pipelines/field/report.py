@@ -34,7 +34,7 @@ def field_tables(analysis: FieldAnalysis) -> tuple[Table, ...]:
 def scans_table(analysis: FieldAnalysis) -> Table:
     """Return what was measured, and how well the model fits."""
     rows = []
-    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+    for source, run in analysis.each:
         scan, statistics = run.scan, run.scan.statistics
         rows.append(
             (
@@ -89,10 +89,7 @@ def follows_table(values: Mapping[str, Estimate]) -> Table:
 def by_run_table(analysis: FieldAnalysis) -> Table:
     """Return the main results, scan by scan, and their means."""
     heads = ["scan", *(QUANTITIES[name].head.replace(" [", "\n[") for name in _BY_RUN)]
-    rows = [
-        Row((short_name(source.name), *_cells(run.values)))
-        for source, run in zip(analysis.sources, analysis.runs, strict=True)
-    ]
+    rows = [Row((short_name(source.name), *_cells(run.values))) for source, run in analysis.each]
     if len(analysis.runs) > 1:
         rows.append(Row(("mean", *_cells(analysis.values)), "together"))
     return table("Scan by scan", heads, rows)
@@ -171,7 +168,7 @@ def _bases(analysis: FieldAnalysis) -> tuple[Block, ...]:
         return (Tabular("field-base", replace(base_table(analysis.runs[0].scan), title=""), _BASE),)
     bases = (
         Section(source.name, (Tabular("field-base", replace(base_table(run.scan), title="")),))
-        for source, run in zip(analysis.sources, analysis.runs, strict=True)
+        for source, run in analysis.each
     )
     by_run = Tabular("field-runs", replace(by_run_table(analysis), title=""), first_column_wraps=True)
     return by_run, *bases, Note(_BASE)

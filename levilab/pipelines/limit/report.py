@@ -41,7 +41,7 @@ def runs_table(analysis: LimitAnalysis) -> Table:
     """Return the statistics, run by run and of each kind together."""
     rows = [
         Row((Text("{name:s} ({group})", name=short_name(source.name), group=_group(analysis, k)), *_cells(run)))
-        for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
+        for k, (source, run) in enumerate(analysis.each)
     ]
     rows += [
         Row(
@@ -104,7 +104,7 @@ def _group(analysis: LimitAnalysis, run: int) -> str:
 
 def limit_columns(analysis: LimitAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
     """Yield the tops of each run; residual_hz: limit less the mean of the run, which includes outliers."""
-    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+    for source, run in analysis.each:
         limit, n = source.readings.limit, len(source.readings)
         given, found = analysis.options.reading_u, run.statistics
         u = np.full(n, np.nan) if source.readings.u is None else source.readings.u

@@ -51,7 +51,7 @@ class _Excerpt:
 
 def spin_figure(analysis: SpinAnalysis) -> Figure:
     """Draw for each input its trace with the turns, all turns over each other, residuals, and frequency."""
-    shown = list(zip(analysis.sources, analysis.runs, strict=True))[:MOST_DRAWN]
+    shown = analysis.each[:MOST_DRAWN]
     several = len(analysis.runs) > 1
     head = _HEAD if several else _HEAD - 0.2
     high = min(max(((TALLEST - head) / len(shown) - _NAME) / 2 - _AROUND, _LOWEST), _PANEL)

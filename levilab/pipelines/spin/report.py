@@ -31,10 +31,7 @@ _MOST = 4
 def meaning(analysis: SpinAnalysis) -> tuple[str, ...]:
     """Return the sentences, of each input."""
     several = len(analysis.runs) > 1
-    made = (
-        (source.name, Sentences(*_sentences(run)))
-        for source, run in zip(analysis.sources[:_MOST], analysis.runs[:_MOST], strict=True)
-    )
+    made = ((source.name, Sentences(*_sentences(run))) for source, run in analysis.each[:_MOST])
     return tuple(Text("{name:s}: {text}", name=name, text=text) if several else text for name, text in made if text)
 
 
@@ -178,7 +175,7 @@ def quality_tables(analysis: SpinAnalysis) -> dict[str, Table]:
 
 def line_table(analysis: SpinAnalysis) -> Table:
     """Return a table of the lines of magnetometers: amplitude and noise of each axis, and the moment that turns."""
-    of_lines = [(source, run) for source, run in zip(analysis.sources, analysis.runs, strict=True) if run.line]
+    of_lines = [(source, run) for source, run in analysis.each if run.line]
     several = any(run.which for _, run in of_lines)
     quantities = [one for one in OF_A_RUN if any(one.find(run) for _, run in of_lines)]
     cells = zip(*cells_of(quantities, [run for _, run in of_lines]), strict=True)
@@ -211,7 +208,7 @@ def pulse_table(analysis: SpinAnalysis) -> Table:
             plain(1e6 * run.spin.scatter),
             plain(run.spin.snr_db),
         )
-        for source, run in zip(analysis.sources, analysis.runs, strict=True)
+        for source, run in analysis.each
         if not run.line
     ]
     numbers = ("pulses", "missing", "doubled", "scatter\n[µs]", "S/N\n[dB]")

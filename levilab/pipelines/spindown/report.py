@@ -316,7 +316,7 @@ def count_table(analysis: SpinDownAnalysis, *, symbols: bool = False) -> Table |
         return None
     heads = ("run", "δ [rad]", "ν_r [Hz]", "adds at the end [Hz]", "correlation", "count as")
     rows = []
-    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+    for source, run in analysis.each:
         fit = run.fit(run.best)
         tilt, resonance = (fit.parameters.get(name) for name in ("moment_tilt", "resonance"))
         added = tilt_part(fit, run.time)
@@ -354,7 +354,7 @@ def tilt_part(fit: LawFit, time: Array) -> Array:
 
 def spindown_columns(analysis: SpinDownAnalysis) -> Iterator[Mapping[str, np.ndarray]]:
     """Yield the readings of each run; residual_hz: reading less the best law of all runs, NaN for unused readings."""
-    for source, run in zip(analysis.sources, analysis.runs, strict=True):
+    for source, run in analysis.each:
         readings, n = source.readings, len(source.readings)
         used = np.isin(readings.time, run.time)
         residual = np.full(n, np.nan)
@@ -459,11 +459,7 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
 
 def _falls(analysis: SpinDownAnalysis) -> tuple[Paragraph, ...]:
     """Return the facts of the falls; of many their range."""
-    falls = [
-        (short_name(source.name), fall)
-        for source, run in zip(analysis.sources, analysis.runs, strict=True)
-        if (fall := _fall(source, run))
-    ]
+    falls = [(short_name(source.name), fall) for source, run in analysis.each if (fall := _fall(source, run))]
     if len(falls) > MOST_FALLS:
         return (Paragraph(_falls_in_short(analysis, len(falls)), "The falls."),)
     several = len(analysis.runs) > 1

@@ -37,7 +37,7 @@ def _finding(analysis: SwayAnalysis) -> str:
 
 def _draw_splits(axes: Axes, analysis: SwayAnalysis) -> None:
     count = len(analysis.runs)
-    for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True)):
+    for k, (source, run) in enumerate(analysis.each):
         found, order = run.geometry, np.argsort(run.spin)
         u = 1e3 * found.u_shares * found.splits / found.shares
         look = run_look(k, count) if count > 1 else LOOKS["readings"]

@@ -21,8 +21,7 @@ from levilab.texts.text import Sentences, Text, how_many
 
 def sway_tables(analysis: SwayAnalysis) -> tuple[Table, ...]:
     """Return the quantities, a column a track, and of each track the windows.  Each fits a terminal of 80 columns."""
-    each = zip(analysis.sources, analysis.runs, strict=True)
-    return quantities_table(analysis), *(windows_table(run, short_name(source.name)) for source, run in each)
+    return quantities_table(analysis), *(windows_table(run, short_name(source.name)) for source, run in analysis.each)
 
 
 def quantities_table(analysis: SwayAnalysis) -> Table:
@@ -113,7 +112,7 @@ def sway_part(analysis: SwayAnalysis) -> ReportPart:
         runs_title="Window by window",
         runs=tuple(
             Tabular(f"sway-windows-{k}", windows_table(run, source.name))
-            for k, (source, run) in enumerate(zip(analysis.sources, analysis.runs, strict=True))
+            for k, (source, run) in enumerate(analysis.each)
         ),
         inputs=input_parts(analysis, _in_words, _readings),
     )

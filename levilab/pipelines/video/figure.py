@@ -19,7 +19,7 @@ _WIDTH, _ROOM, _MOST = 5.0, 0.5, 4
 
 def video_figure(analysis: VideoAnalysis) -> Figure:
     """Draw the still of each of the first films."""
-    shown = list(zip(analysis.sources, analysis.runs, strict=True))[:_MOST]
+    shown = analysis.each[:_MOST]
     heights = [_WIDTH * source.readings.film.height / source.readings.film.width for source, _ in shown]
     spin = analysis.runs[0].spin
     turns = Text("Its mark turns at {spin}", with_uncertainty(spin)) if spin else "The top in the first picture"
