@@ -19,7 +19,7 @@ from levilab.acquisition.experiment import CounterSettings, ModelOf
 from levilab.acquisition.grip import COUNTS, GRIP_GATE_S, Grip
 from levilab.acquisition.session import DidNotFollow, NoLight, NotHeld, Session
 from levilab.acquisition.triggering import CYCLE, Motor, spin_up
-from levilab.bench.config import BenchConfig, ConfigError, Limits
+from levilab.bench.config import BenchConfig, ConfigError, Limits, SettingRefused
 from levilab.bench.person import FloatTop
 from levilab.present.numbers import with_sign
 from levilab.present.panel import clock
@@ -93,54 +93,42 @@ class DriveSettings(CounterSettings):
         """Raise ConfigError for a drive that the bench does not allow."""
         if self.drive_waveform == "NONE":
             if not self.by_hand:
-                raise ConfigError(
-                    "{table:s}.drive_waveform = NONE: this experiment needs a drive, SIN, SQU or TRI", table=table
-                )
+                said = "{table:s}.drive_waveform = NONE: this experiment needs a drive, SIN, SQU or TRI"
+                raise self.refusal(table, said, "drive_waveform")
             if self.drive == "triggered":
-                raise ConfigError(
-                    "{table:s}.drive_waveform = NONE: a triggered drive has cycles of SIN, SQU or TRI", table=table
-                )
+                said = "{table:s}.drive_waveform = NONE: a triggered drive has cycles of SIN, SQU or TRI"
+                raise self.refusal(table, said, "drive_waveform", "drive")
             return
         if self.drive == "triggered":
             self._check_triggered(table, limits)
         check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
         lowest, highest = _USUAL_WINDOW_HZ
         if not lowest / 2 <= self.drive_frequency_hz <= 2 * highest:  # a slip of the unit would cost the top
-            raise ConfigError(
+            said = (
                 "{table:s}.drive_frequency_hz = {drive_frequency_hz:g} Hz: no top floats there; a Levitron of the"
-                " usual kind does between {lowest:.2f} and {highest:.2f} Hz",
-                table=table,
-                drive_frequency_hz=self.drive_frequency_hz,
-                lowest=lowest,
-                highest=highest,
+                " usual kind does between {lowest:.2f} and {highest:.2f} Hz"
             )
+            raise self.refusal(table, said, "drive_frequency_hz", lowest=lowest, highest=highest)
         slowest = self.drive_frequency_hz / _LONGEST_RAMP_S
         if self.ramp_hz_per_s < slowest:
-            raise ConfigError(
+            said = (
                 "{table:s}.ramp_hz_per_s = {ramp_hz_per_s:g} would raise the top for hours to "
-                "{table:s}.drive_frequency_hz = {drive_frequency_hz:g}: at least {slowest:.2g} is expected",
-                table=table,
-                ramp_hz_per_s=self.ramp_hz_per_s,
-                drive_frequency_hz=self.drive_frequency_hz,
-                slowest=slowest,
+                "{table:s}.drive_frequency_hz = {drive_frequency_hz:g}: at least {slowest:.2g} is expected"
             )
+            raise self.refusal(table, said, "ramp_hz_per_s", "drive_frequency_hz", slowest=slowest)
 
     def _check_triggered(self, table: str, limits: Limits) -> None:
         if not self.by_trigger:
-            raise ConfigError(
-                "{table:s}.drive = triggered: the drive sets the frequency here, so ramp is expected", table=table
-            )
+            said = "{table:s}.drive = triggered: the drive sets the frequency here, so ramp is expected"
+            raise self.refusal(table, said, "drive")
         fastest = limits.of_the_drive().beyond(frequency_hz=CYCLE * self.drive_frequency_hz)
         if fastest and fastest.is_highest:
-            raise ConfigError(
+            said = (
                 "{table:s}.drive_frequency_hz = {drive_frequency_hz:g}: the cycles of a triggered drive are"
-                " {cycle:g} times as fast, more than this bench allows, limits.{name:s} = {limit:g}",
-                table=table,
-                drive_frequency_hz=self.drive_frequency_hz,
-                cycle=CYCLE,
-                name=fastest.name,
-                limit=fastest.limit,
+                " {cycle:g} times as fast, more than this bench allows, limits.{name:s} = {limit:g}"
             )
+            names = ("drive_frequency_hz", "drive")
+            raise self.refusal(table, said, *names, cycle=CYCLE, name=fastest.name, limit=fastest.limit)
 
 
 def drives(settings: DriveSettings) -> tuple[str, ...]:
@@ -162,8 +150,9 @@ def check_drive(table: str, limits: Limits, amplitude_vpp: float, frequencies: I
     asked += [(name, frequency, drive.beyond(frequency_hz=frequency)) for name, frequency in frequencies]
     for name, wanted, found in asked:
         if found:
-            raise ConfigError(
+            raise SettingRefused(
                 "{table:s}.{name:s} = {wanted:g} is {more} than this bench allows, limits.{limit_name:s} = {limit:g}",
+                name,
                 table=table,
                 name=name,
                 wanted=wanted,

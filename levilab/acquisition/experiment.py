@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar
 
 from pydantic import Field, PositiveFloat, field_validator, model_validator
 
+from levilab.bench.config import SettingRefused
 from levilab.formats.typed import check_range
 from levilab.runs.channel import Channel
 from levilab.settings import Settings
@@ -39,6 +40,11 @@ class ExperimentSettings(Settings):
             table: the name of these settings in the bench file.
             limits: of the bench.
         """
+
+    def refusal(self, table: str, text: str, *names: str, **values: object) -> SettingRefused:
+        """Return the error for settings of these names, whose values the text has beside other ones."""
+        own = {name: getattr(self, name) for name in names}
+        return SettingRefused(text, *names, table=table, **own, **values)
 
     def for_bench(self, config: BenchConfig, model_of: ModelOf) -> Self:
         """Return these settings for a bench; defaults may change to suit its instruments.

@@ -15,7 +15,7 @@ from levilab.acquisition.experiment import CounterSettings, ExperimentSettings
 from levilab.acquisition.given import read_conditions, with_given_settings
 from levilab.acquisition.loop import AcquisitionRequest
 from levilab.acquisition.table import EXPERIMENTS, Configuration, settings_of, with_settings
-from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, read_bench
+from levilab.bench.config import BenchConfig, ConfigError, InstrumentSettings, SettingRefused, read_bench
 from levilab.bench.kinds import COUNTER, KINDS, estimates_u
 from levilab.bench.person import Person, ask_no_person
 from levilab.bench.wiring import Wiring, described_wiring
@@ -280,11 +280,9 @@ def _check_given(config: BenchConfig, without: BenchConfig, experiment: str, giv
         _check_settings(config, experiment)
     except ConfigError as refused:
         _check_settings(without, experiment)
-        said = text_of(refused)
-        about = said.values if isinstance(said, Text) else {}
-        keys = {*about, about.get("name")}
-        own = (one for one in reversed(given) if one.removeprefix(f"{experiment}.").partition("=")[0].strip() in keys)
-        raise UsageError("settings", said, value=next(own, None)) from refused
+        names = refused.names if isinstance(refused, SettingRefused) else ()
+        own = (one for one in reversed(given) if one.removeprefix(f"{experiment}.").partition("=")[0].strip() in names)
+        raise UsageError("settings", text_of(refused), value=next(own, None)) from refused
 
 
 def _check_settings(config: BenchConfig, experiment: str) -> None:

@@ -42,6 +42,18 @@ class ConfigError(LevilabError):
     """A configuration that cannot be used."""
 
 
+class SettingRefused(ConfigError):
+    """A setting that the bench does not allow.
+
+    Attributes:
+        names: of the settings in the text.
+    """
+
+    def __init__(self, text: str, *names: str, **values: object) -> None:
+        self.names = names
+        super().__init__(text, **values)
+
+
 class InstrumentSettings(Settings):
     """Address and model of an instrument.
 

@@ -255,9 +255,9 @@ def _named_as_typed(experiment: str, given: Mapping[str, Any]) -> Iterator[None]
     except UsageError as error:
         refused = (error.value or "").removeprefix(f"{experiment}.")
         for name, setting in SHORT.items():
-            typed = setting.format(given.get(name))
-            if error.name == "settings" and given.get(name) and refused in {typed, typed.partition("=")[0]}:
-                raise UsageError(name, error.text, value=given[name]) from error
+            typed = setting.format(value := given.get(name)).removeprefix(f"{experiment}.")
+            if error.name == "settings" and value and refused in {typed, typed.partition("=")[0]}:
+                raise UsageError(name, error.text, value=None if value is True else value) from error
         raise
 
 

@@ -9,7 +9,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt, model_
 
 from levilab.acquisition.experiment import Experiment, ExperimentSettings
 from levilab.acquisition.session import ExperimentFailed, Row, Session
-from levilab.bench.config import ConfigError, Limits
+from levilab.bench.config import Limits
 from levilab.bench.person import PlaceProbe, ShieldProbe
 from levilab.formats.ranges import problem_of
 from levilab.runs.channel import Channel
@@ -91,13 +91,11 @@ class FieldSettings(ExperimentSettings):
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for radii that no ring has."""
         if self.base_inner_radius_m >= self.base_outer_radius_m:
-            raise ConfigError(
+            said = (
                 "{table:s}.base_inner_radius_m = {base_inner_radius_m:g} must be less than "
-                "{table:s}.base_outer_radius_m = {base_outer_radius_m:g}",
-                table=table,
-                base_inner_radius_m=self.base_inner_radius_m,
-                base_outer_radius_m=self.base_outer_radius_m,
+                "{table:s}.base_outer_radius_m = {base_outer_radius_m:g}"
             )
+            raise self.refusal(table, said, "base_inner_radius_m", "base_outer_radius_m")
 
 
 def channels(settings: FieldSettings) -> tuple[Channel, ...]:

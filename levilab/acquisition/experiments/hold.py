@@ -15,7 +15,7 @@ from levilab.acquisition.driving import DriveSettings, drive_off, drive_up, reac
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import NotHeld, Row, Session
 from levilab.acquisition.triggering import Motor
-from levilab.bench.config import ConfigError, Limits
+from levilab.bench.config import Limits
 from levilab.formats.table import FEWEST
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.channel import Channel
@@ -41,11 +41,8 @@ class HoldSettings(DriveSettings):
     def check(self, table: str, limits: Limits) -> None:
         """Raise ConfigError for a drive that the bench does not allow."""
         if self.drive != "triggered":
-            raise ConfigError(
-                "{table:s}.drive = {drive}: triggered is expected, no other drive has a loop",
-                table=table,
-                drive=self.drive,
-            )
+            said = "{table:s}.drive = {drive}: triggered is expected, no other drive has a loop"
+            raise self.refusal(table, said, "drive")
         super().check(table, limits)
 
 

@@ -28,7 +28,7 @@ from levilab.acquisition.driving import (
 from levilab.acquisition.experiment import Experiment
 from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NotHeld, Row, Session
 from levilab.acquisition.triggering import CYCLE, Motor
-from levilab.bench.config import ConfigError, Limits
+from levilab.bench.config import Limits
 from levilab.present.numbers import with_uncertainty
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
@@ -68,19 +68,16 @@ class LimitSettings(DriveSettings):
         """Raise ConfigError for a drive that the bench does not allow."""
         super().check(table, limits)
         if self.which == "upper" and self.drive_waveform == "NONE":
-            raise ConfigError(
-                "{table:s}.drive_waveform = NONE: the upper limit needs a drive, SIN, SQU or TRI", table=table
-            )
+            said = "{table:s}.drive_waveform = NONE: the upper limit needs a drive, SIN, SQU or TRI"
+            raise self.refusal(table, said, "drive_waveform", "which")
         if self.which == "upper":
             check_drive(table, limits, self.drive_amplitude_vpp, [("highest_hz", self.highest_hz)])
         if self.which == "upper" and self.highest_hz <= self.drive_frequency_hz:
-            raise ConfigError(
+            said = (
                 "{table:s}.highest_hz = {highest_hz:g}: more than {table:s}.drive_frequency_hz = "
-                "{drive_frequency_hz:g} is expected, from where the drive creeps up",
-                table=table,
-                highest_hz=self.highest_hz,
-                drive_frequency_hz=self.drive_frequency_hz,
+                "{drive_frequency_hz:g} is expected, from where the drive creeps up"
             )
+            raise self.refusal(table, said, "highest_hz", "drive_frequency_hz")
 
 
 def channels(settings: LimitSettings) -> tuple[Channel, ...]:

@@ -15,7 +15,7 @@ from instruments.errors import CommandRefused, InstrumentError, OutOfRange
 from levilab.acquisition.driving import HELD_WITHIN_HZ, check_drive
 from levilab.acquisition.experiment import Experiment, ExperimentSettings, ModelOf
 from levilab.acquisition.session import ExperimentFailed, Row, Session
-from levilab.bench.config import BenchConfig, ConfigError, Limits
+from levilab.bench.config import BenchConfig, Limits
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.runs.traces import INDEX, described_times, undescribed_codes
@@ -90,14 +90,11 @@ class TraceSettings(ExperimentSettings):
         """Raise ConfigError for a trigger beyond the screen, and for a drive that the bench does not allow."""
         low, high = (self.offset_v + k * self.volts_per_division for k in (-_HALF_SCREEN, _HALF_SCREEN))
         if self.trigger_source in self.channels and not low <= self.trigger_level_v <= high:
-            raise ConfigError(
+            said = (
                 "{table:s}.trigger_level_v = {trigger_level_v:g} is beyond what the oscilloscope records, "
-                "{low:g} to {high:g} V: change it, {table:s}.offset_v or {table:s}.volts_per_division",
-                table=table,
-                trigger_level_v=self.trigger_level_v,
-                low=low,
-                high=high,
+                "{low:g} to {high:g} V: change it, {table:s}.offset_v or {table:s}.volts_per_division"
             )
+            raise self.refusal(table, said, "trigger_level_v", "offset_v", "volts_per_division", low=low, high=high)
         if self.drive_frequency_hz is not None:
             check_drive(table, limits, self.drive_amplitude_vpp, [("drive_frequency_hz", self.drive_frequency_hz)])
 

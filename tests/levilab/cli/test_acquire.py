@@ -62,10 +62,8 @@ def test_the_command_hands_the_person_over(monkeypatch, tmp_path, words, person)
         raise Stopped
 
     bench = tmp_path / "bench.toml"
-    bench.write_text(
-        "[counter]\nmodel = '53230A'\naddress = 'A::1'\n[generator]\nmodel = '33500B'\naddress = 'A::2'\n",
-        encoding="utf-8",
-    )
+    described = "[counter]\nmodel = '53230A'\naddress = 'A::1'\n[generator]\nmodel = '33500B'\naddress = 'A::2'\n"
+    bench.write_text(described, encoding="utf-8")
     monkeypatch.setattr(loop, "acquire", acquire)
     with pytest.raises(Stopped):
         CliRunner().invoke(
@@ -105,6 +103,7 @@ def test_a_wrong_condition_is_refused_before_a_run_is_made(tmp_path, words, says
     (("spin", "--spin", "40", "--set", "drive_frequency_hz=500"),
      "--set drive_frequency_hz=500: spin.drive_frequency_hz = "),
     (("spin", "--spin", "500", "--language", "de"), "--spin 500: spin.drive_frequency_hz = 500 ist mehr, als dieser"),
+    (("precession", "--drive", "triggered"), "--drive triggered: precession.drive = triggered: the drive sets"),
     (("field", "--set", "drive=ramp"), "--set field.drive: there is no such setting; levilab acquire field --settings"),
 ])  # fmt: skip
 def test_a_refused_setting_is_called_as_it_was_typed(tmp_path, words, says):
