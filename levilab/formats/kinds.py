@@ -112,8 +112,9 @@ KINDS = (
 )
 OTHER = Kind("a file of another kind", plural="other files", may_hold_readings=False)
 REPORT = Kind("a report of levilab", plural="reports of levilab", may_hold_readings=False)
-#: What stands in a page and in a PDF that levilab wrote.
-_OF_LEVILAB = (b"<title>levilab: ", b"/Keywords(levilab)")
+#: How the title of a page begins that levilab writes; and what stands in such a page and in a PDF of it.
+TITLE = "levilab: "
+_OF_LEVILAB = (f"<title>{TITLE}".encode(), b"/Keywords(levilab)")
 EMPTY = Kind("an empty file", "record again")
 #: Bytes at the beginning that tell the kind.
 _BYTES = 64

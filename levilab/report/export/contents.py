@@ -227,12 +227,9 @@ def _of_several(name: str, results: Results) -> Contents:
     runs = {source.name: source.run for _, found in results for source in found.sources if source.run}
     for k, run in enumerate(runs.values(), 1):
         files[f"run-{k:03d}.json"] = (run.folder / RECORD).read_bytes()
-    about = {
-        "source": "; ".join(names),
-        "synthetic": str(any(source.synthetic for _, found in results for source in found.sources)).lower(),
-        "warnings": "; ".join(dict.fromkeys(unquote(text) for _, found in results for text in found.all_warnings)),
-        "history": f"analyzed by levilab {version('levilab')}",
-    }
+    synthetic = any(source.synthetic for _, found in results for source in found.sources)
+    made = {"synthetic": str(synthetic).lower(), "history": f"analyzed by levilab {version('levilab')}"}
+    about = facts_of(None, Path(), results) | made
     title = f"{' and '.join(analysis.name for analysis, _ in results)} of {len(names)} inputs"
     return Contents(name or "inputs", title, tuple(tables), about, values=tuple(values), files=files)
 

@@ -7,6 +7,7 @@ from functools import cache
 from hashlib import sha256
 from importlib.resources import files
 
+from levilab.formats.kinds import TITLE
 from levilab.present.document.blocks import Block, Document, InShort, Section, in_short
 from levilab.report.html.blocks import Html, Writer, element, join, lines, words
 
@@ -19,7 +20,7 @@ def page_of(document: Document) -> str:
         element("meta", charset="utf-8"),
         element("meta", name="viewport", content="width=device-width, initial-scale=1"),
         element("meta", http_equiv="Content-Security-Policy", content=_policy()),
-        element("title", f"levilab: {document.subject or document.title}"),
+        element("title", f"{TITLE}{document.subject or document.title}"),
         element("style", Html(style())),
     ])  # fmt: skip
     scripts = (_island(writer), element("script", Html(script()))) if writer.is_alive else ()
