@@ -12,6 +12,7 @@ from levilab.acquisition.session import ExperimentFailed, Row, Session
 from levilab.bench.config import Limits
 from levilab.bench.person import PlaceProbe, ShieldProbe
 from levilab.formats.ranges import problem_of
+from levilab.present.numbers import with_sign
 from levilab.runs.channel import Channel
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
@@ -140,7 +141,9 @@ def _read_again(session: Session[FieldSettings]) -> None:
     row = _measure(session, height)
     drift = row["flux_density_t"] - before["flux_density_t"] - _slope(session, k) * (height - before["height_m"])
     u = math.hypot(row["flux_density_mean_u_t"], _u_of_setting(session, k))
-    size = Text("{drift:+.1f} µT at the end of the scan, {in_u:.1f} u", drift=1e6 * drift, in_u=abs(drift) / u)
+    size = Text(
+        "{drift:n} µT at the end of the scan, {in_u:.2g} u", drift=with_sign(1e6 * drift, 1), in_u=abs(drift) / u
+    )
     text = Text("the field at {height:.1f} mm changed by {size}", height=1e3 * height, size=size)
     session.event(RunEvent.HEIGHT_READ_AGAIN, text, drift_t=drift, u_t=u)
     if abs(drift) > _MOST_DRIFT_U * u:

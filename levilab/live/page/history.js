@@ -170,7 +170,8 @@ export function drawHistory(paper, {drives, counts, marks, latest, rests}) {
     c.textAlign = "right";
     for (const mark of [-reach, 0, reach]) c.fillText(fixed(0.8 * mark, 2), LEFT - 7, toOff(0.8 * mark));
     c.textAlign = "left";
-    c.fillText(phrase("top − drive [Hz]"), LEFT, bottom - below - 11);
+    const off = latest ? latest[1] - latest[2] : NaN;  // beyond the strip it is a number
+    c.fillText(`${phrase("top − drive [Hz]")}${Math.abs(off) > reach ? `: ${fixed(off, 2)}` : ""}`, LEFT, bottom - below - 11);
   }
 
   c.save();
@@ -179,7 +180,7 @@ export function drawHistory(paper, {drives, counts, marks, latest, rests}) {
   c.clip();
   course(c, drives, (row) => row[1], toX, toY, paint.newton, 3.5);
   course(c, counts, (row) => row[1], toX, toY, paint.reading, 1.8);
-  if (driven) course(c, counts, (row) => Math.max(-reach, Math.min(reach, row[1] - row[2])), toX, toOff, paint.stokes, 1.6);
+  if (driven) course(c, counts, (row) => Math.abs(row[1] - row[2]) > reach ? NaN : row[1] - row[2], toX, toOff, paint.stokes, 1.6);
   c.strokeStyle = c.fillStyle = paint.bad;
   c.lineWidth = 1;
   c.setLineDash([3, 3]);

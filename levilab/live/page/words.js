@@ -27,9 +27,9 @@ export function put(element, properties) {
 /** Write a text into an element. */
 export const write = (id, text) => put(by(id), {textContent: text});
 
-/** Return a number with these decimals; a dash where there is none. */
+/** Return a number with these decimals, a zero without a sign; a dash where there is none. */
 export const fixed = (value, decimals) =>
-  Number.isFinite(value) ? local(value.toFixed(decimals)).replace("-", "−") : "–";
+  Number.isFinite(value) ? local(value.toFixed(decimals)).replace(/^-(?=[0.,]+$)/, "").replace("-", "−") : "–";
 
 /** Return a number to these digits, without zeros at the end. */
 export const short = (value, digits = 4) =>

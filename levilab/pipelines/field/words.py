@@ -106,7 +106,7 @@ def _learned(scan: FieldScan) -> Iterator[str]:
         if name in _OF_CALLIPER and (scan.learned(name) or 0.0) > LEARNS_NOTHING
     ]
     if of_calliper:
-        yield Text("The scan does not tell {sizes} better than the calliper.", sizes=enumeration(of_calliper))
+        yield Text("Known no better from the scan than from the calliper: {sizes}.", sizes=enumeration(of_calliper))
     pairs = [
         (one, other)
         for k, one in enumerate(scan.fitted)

@@ -145,7 +145,7 @@ def _numbers(sheet: Sheet, language: Language, seeds: Mapping[str, int], found: 
                 heads.append(words["truth"])
         if part:
             if part is known:  # written by hand
-                columns.append([_BLANK] * len(seeds))
+                columns.append([_BLANK[:6]] * len(seeds))
                 heads.append(words["grade"])
             rows = [tuple(row) for row in zip(*columns, strict=True)]
             shown = table("", heads, rows, numbers=[head for head in heads[1:] if head != words["grade"]])

@@ -509,6 +509,23 @@ def test_a_count_is_compared_with_the_drive_of_its_own_time(shown):
     assert [low[:2], high[:2]] == [[20.5, 28.3], [21.5, 29.95]]
 
 
+#: What stands on the chart of the last minutes: of a top that spins by 3.5 Hz less than its drive.
+STRIP = """async () => {
+  const {drawHistory} = await import("/page/history.js"), {fixed} = await import("/page/words.js"), said = [];
+  const draw = (name) => (text) => { if (name === "fillText") said.push(text); return {width: 40}; };
+  const context = new Proxy({}, {get: (_, name) => draw(name), set: () => true});
+  const counts = [0, 1, 2].map((time) => [time, 30, 33.5, time]), drives = counts.map(([time]) => [time, 33.5]);
+  drawHistory({context, fit: () => [600, 300]}, {drives, counts, marks: [], latest: counts[2], rests: false});
+  return [said, fixed(-0.0001, 3), fixed(-0.01, 3)];
+}"""
+
+
+def test_a_difference_beyond_its_strip_is_a_number_and_a_zero_has_no_sign(shown):
+    said, *numbers = shown.evaluate(STRIP)
+    assert "top − drive [Hz]: −3.50" in said
+    assert numbers == ["0.000", "−0.010"]
+
+
 #: When a pulse that passes half of its height at t triggers the page, from records that began at other times.
 TRIGGERED = """async (source) => {
   const {triggerOf, drawRecords, sheet} = await import("/page/plot.js");

@@ -85,6 +85,7 @@ def test_a_drift_shows_at_the_height_that_is_read_again(tmp_path, lost, warned):
     true = weaker.flux_density(0.05) - BASE.flux_density(0.05)
     assert event["drift_t"] == pytest.approx(true, abs=3e-6)  # the last digit, twice, and noise
     assert any(one["kind"] == "warning" for one in run.events()) is warned
+    assert [text for text in ("-", ", 0.0 u") if text in event["text"]] == []
 
 
 def test_a_height_that_is_typed_is_the_one_that_is_kept(tmp_path):

@@ -20,6 +20,7 @@ from levilab.report.worksheets.sheets import SHEETS
 from levilab.runs.writer import RunWriter
 from levilab.texts.text import languages
 from levilab.world.spin_world import random_scene
+from support.browser import watch
 from support.pages import Page
 
 LANGUAGES = languages()
@@ -70,6 +71,15 @@ def test_ctrl_c_at_any_moment_of_a_run_ends_the_key(monkeypatch, moment):
     with pytest.raises(KeyboardInterrupt):
         measure(SHEETS["field"], {"A": 1, "B": 2})
     assert len({*runs}) == 1
+
+
+@pytest.mark.parametrize("code", LANGUAGES)
+def test_a_key_is_whole_on_a_narrow_screen(code, tmp_path, browser):
+    _, file = write_worksheets(["field"], tmp_path, {"Group 1": 100, "Group 2": 101}, language=code)
+    with watch(browser, viewport={"width": 900, "height": 900}) as page:
+        page.goto(file.as_uri())
+        wide = "[...document.querySelectorAll('.scroll')].map((one) => one.scrollWidth - one.clientWidth)"
+        assert page.evaluate(wide) == [0, 0]
 
 
 #: Three tops in the place of ten, which take 2 s.
