@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import sys
+from importlib import metadata
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 project = "levilab"
+release = metadata.version("levilab")
 author = "the authors of levilab"
 language = "en"
-html_title = "levilab"
+html_title = f"levilab {release}"
 copyright = "the authors of levilab, MIT licence"  # noqa: A001 - Sphinx's name
 
 extensions = [
