@@ -78,9 +78,10 @@ class Input:
 
 
 def in_common(inputs: Sequence[Input]) -> tuple[Fact, ...]:
-    """Return the facts that all inputs share."""
+    """Return the facts that all inputs share, if they are several: one alone needs no table."""
     first, *others = inputs
-    return tuple(fact for fact in first.facts if all(fact in other.facts for other in others))
+    shared = tuple(fact for fact in first.facts if all(fact in other.facts for other in others))
+    return shared if len(shared) > 1 else ()
 
 
 def describe(parts: Sequence[About]) -> Input:

@@ -9,8 +9,10 @@ from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.inputs.unread import NoneUsable
 from levilab.pipelines.limit.figure import limit_figure
 from levilab.pipelines.suits import save
+from levilab.present.document.blocks import Fact
 from levilab.report.document import MOST_IN_FULL
 from levilab.report.groups.document import write_class
+from levilab.report.inputs import Input, in_common
 from levilab.report.page import write_report
 from many_runs import make_runs
 from support.pages import Page
@@ -36,6 +38,13 @@ def test_facts_that_many_runs_share_stand_there_once(page):
     assert page.count("/run.json: is cut off") == 1, "a broken run is named once, not once by each analysis"
     assert "data:image/png;base64," in page
     assert all(f'id="{target}"' in page for target in re.findall(r'href="#([^"]+)"', page))
+
+
+def test_a_single_fact_that_inputs_share_has_no_table_of_its_own():
+    status, note, other = (Fact(name, ("text",)) for name in ("Status", "Note", "Other"))
+    inputs = [Input(name, (status, note, last), ()) for name, last in (("a", other), ("b", note))]
+    assert in_common(inputs) == (status, note)
+    assert in_common([inputs[0], Input("c", (status,), ())]) == ()
 
 
 def test_warnings_that_are_alike_stand_together(tmp_path):
