@@ -152,7 +152,7 @@ def test_figure_and_page_show_what_was_found(tmp_path):
     assert "left out" in page
     figure = precession_figure(found)
     leverage = figure.axes[2]
-    assert re.fullmatch(r"The precession follows the drive one to one \(p = 0\.\d+\)", figure.texts[0].get_text())
+    assert re.fullmatch(r"The precession follows the drive one to one \(p =\s0\.\d+\)", figure.texts[0].get_text())
     assert faults(figure) == []
     assert leverage.get_title("left") == "Leverage; dotted: the mean, 0.67"  # of the shortest sweep, 2 of 3 points
 
