@@ -247,7 +247,7 @@ def _cells(run: Listed, above: str, room: int, *, groups: bool) -> list[str]:
     when = (run.started_utc or "—")[:16].replace("T", " ")
     scene = f" {run.scene}" if run.scene not in {"", run.experiment} else ""
     what = run.experiment + scene + (in_language(", synthetic") if run.synthetic else "")
-    length = "—" if run.length_s is None else f"{run.length_s:.0f} s"
+    length = "—" if run.length_s is None else "< 1 s" if run.length_s < 1 else f"{run.length_s:.0f} s"
     cells = [when, _below(run.path, above), what, in_language(run.status), run.size, length]
     if groups:
         cells.append(run.group)

@@ -38,6 +38,11 @@ def test_the_list_stays_a_table_on_a_narrow_terminal(tmp_path, monkeypatch, widt
     assert any("spin-7f3a" in line and "interrupted" in line for line in lines)
 
 
+def test_a_run_of_one_record_does_not_last_0_s(tmp_path, monkeypatch):
+    runs = [replace(RUN, path=str(tmp_path / RUN.path), length_s=0.3)]
+    assert any("< 1 s" in line for line in shown(monkeypatch, tmp_path, runs, 130))
+
+
 def test_of_many_broken_runs_the_first_are_explained(tmp_path, monkeypatch):
     runs = [replace(RUN, path=str(tmp_path / RUN.path), problem=f"problem {k}") for k in range(MOST_PROBLEMS + 3)]
     notes = [line for line in shown(monkeypatch, tmp_path, runs, 120) if line.startswith("note:")]
