@@ -13,7 +13,7 @@ from analysis.arrays import Array
 from analysis.rotation.line import LineFit, fit_line
 from analysis.rotation.record import Record
 
-#: A free spin falls.  One record in a hundred rises, since a drive speeds the top up.
+#: A free spin falls.  In one record of a hundred a drive changes the spin, upwards or downwards, each as probable.
 RISING = 0.01
 #: One of the folds is certain from this probability on.
 CERTAIN = 0.95
@@ -44,11 +44,13 @@ class Evidence:
     Attributes:
         fits: the line itself, then its images.
         log: natural logarithms of the likelihoods at the times given, shape (h,).
+        ramped: likewise of an even slope, as that of a drive.
         even: that at even times, where all are alike; −∞: the times have no one distance.
     """
 
     fits: tuple[LineFit, ...]
     log: Array
+    ramped: Array
     even: float
 
 
@@ -96,11 +98,13 @@ def evidence_of(record: Record, fit: LineFit, images: list[Image], rate: float) 
     """
     fits = [fit, *(fit_line(record, one.of(fit.frequency, rate), one.sign * fit.chirp) for one in images[1:])]
     log = np.array([one.likelihood for one in fits])
+    even_slopes = [fit_line(record, one.frequency, one.chirp, drags=False) if one.chirp < 0 else one for one in fits]
+    ramped = np.array([one.likelihood for one in even_slopes])
     times = _even_times(record) if len(fits) > 1 else None
     even = -math.inf
     if times is not None:
         even = fit_line(record.at(times + record.middle), fit.frequency, fit.chirp).likelihood
-    return Evidence(tuple(fits), log, even)
+    return Evidence(tuple(fits), log, ramped, even)
 
 
 def weigh(seen: list[Evidence], signs: list[int], slope: float, u: float) -> Weighed:
@@ -112,10 +116,13 @@ def weigh(seen: list[Evidence], signs: list[int], slope: float, u: float) -> Wei
         slope: of the line itself [Hz/s].
         u: its standard uncertainty [Hz/s].
     """
-    log = np.sum([one.log for one in seen], axis=0)
+    from scipy.special import log_ndtr
+
+    log, ramped = (np.sum([getattr(one, name) for one in seen], axis=0) for name in ("log", "ramped"))
     even = sum(one.even for one in seen)
     by_times = np.logaddexp(log, even)
-    posterior = by_times + np.log([_sense(sign * slope / u) for sign in signs])
+    falls = log_ndtr([-sign * slope / u for sign in signs])
+    posterior = np.logaddexp(by_times + falls, np.logaddexp(ramped, even) + math.log(RISING))
     order = np.argsort(-posterior, kind="stable")
     first = int(order[0])
     shares = np.exp(posterior - np.logaddexp.reduce(posterior))
@@ -140,11 +147,3 @@ def _even_times(record: Record) -> Array | None:
     slope, offset = np.polyfit(number, record.late, 1)
     even: Array = slope * number + offset
     return even if float(np.std(even - record.late)) < _MOST_JITTER * usual else None
-
-
-def _sense(slope: float) -> float:
-    """Return the prior probability of a slope over its u: that of a spin that falls is 1."""
-    from scipy.special import ndtr
-
-    falls = float(ndtr(-slope))
-    return falls + RISING * (1 - falls)

@@ -46,13 +46,16 @@ class LineFit:
     shift: float
 
 
-def fit_line(record: Record, frequency: float, chirp: float) -> LineFit:
-    """Return the line of greatest likelihood near a frequency [Hz] and a slope [Hz/s] at the record's middle."""
+def fit_line(record: Record, frequency: float, chirp: float, *, drags: bool = True) -> LineFit:
+    """Return the line of greatest likelihood near a frequency [Hz] and a slope [Hz/s] at the record's middle.
+
+    drags: whether a slope downwards has the bend of a drag; else it is even, as that of a drive.
+    """
     x, half = record.late_of_half, record.half
     n = x.size
     freedom = max(n - record.parameters - 2.0, 1.0)
     for _ in range(_STEPS):
-        bend_unit = chirp * abs(chirp) / frequency if chirp < 0 else 0.0  # of an even drive there is none
+        bend_unit = chirp * abs(chirp) / frequency if drags and chirp < 0 else 0.0  # of an even drive there is none
         bend = EXPONENT * abs(bend_unit)
         turns = half * x * (frequency + half * x * (chirp / 2 + half * x * bend / 6))
         angle = 2 * np.pi * turns

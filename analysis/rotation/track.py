@@ -279,7 +279,7 @@ def _unfold(windows: list[_Window], rate: float, low: float, high: float) -> lis
             if best:
                 image = images[best]
                 fits[best] = fit_line(one.record, image.of(one.fit.frequency, rate), image.sign * one.fit.chirp)
-            seen[k] = Evidence(tuple(fits), np.zeros(len(images)), -math.inf)
+            seen[k] = Evidence(tuple(fits), np.zeros(len(images)), np.zeros(len(images)), -math.inf)
         spins.append(result_of(one.record, seen[k], weighed))
     return spins
 

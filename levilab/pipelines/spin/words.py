@@ -100,8 +100,8 @@ def _choices(folds: tuple[float, ...]) -> str:
 
 def _fold_doubt(rate: float, *folds: float) -> str:
     return Text(
-        "at {rate:.4g} samples/s the spin may be {choices:n} Hz: the times are too even and the slope too small to "
-        "know; choose with `near` = {first:.0f} or {other:.0f}",
+        "at {rate:.4g} samples/s the spin may be {choices:n} Hz: the times are too even, and the slope "
+        "tells too little; choose with `near` = {first:.0f} or {other:.0f}",
         rate=rate, choices=_choices(folds), first=folds[0], other=folds[1],
     )  # fmt: skip
 

@@ -73,6 +73,16 @@ def test_at_even_times_the_fall_of_the_spin_tells_the_folds_of_a_slow_phone(fres
     assert set(track.kinds) == {"folded", "fold-by-slope"}
 
 
+def test_an_even_slope_as_that_of_a_drive_tells_no_folds_at_even_times(fresh):
+    times, random = np.arange(0, 20, 0.01), fresh
+    turns = 30 * times - 0.04 * times**2
+    waves = 20e-6 * np.stack([part(2 * np.pi * turns) for part in (np.cos, np.sin)], axis=1)
+    track = track_of_field(times, waves + random.normal(0, 0.2e-6, waves.shape))
+    assert track.frequency[0] == pytest.approx(29.58, abs=1e-2)
+    assert [fold.frequency for fold in track.spins[0].folds] == pytest.approx([29.58, 70.42], abs=1e-2)
+    assert track.spins[0].doubtful  # with the bend of a drag alone 70 Hz was certain, as a drag does not fall evenly
+
+
 def test_two_tops_are_two_flights(fresh):
     first, second = (synthetic_flight(fresh, duration=60.0, up=(0, 48.0), start_hz=hz) for hz in (28.0, 36.0))
     times = np.concatenate([first[0], first[0][-1] + 0.01 + second[0] - second[0][0]])
