@@ -53,11 +53,12 @@ def _entries(analysis: HoldAnalysis) -> dict[str, Any]:
         }
         for law in found.laws
     ]
-    values = values_of({"drag": found.drag}) if found.laws else {}
     if len(analysis.runs) == 1:
         values = values_of(find_all(QUANTITIES, analysis.runs[0]))
     elif found.best:
         values = values_of(found.best.constants)
+    else:
+        values = values_of({"drag": found.drag} if found.laws else {})
     pulls = {
         f"{name}_pull": number(found.beside[law.name][1], "1")
         for law in found.laws if law.name in found.beside for name in law.constants

@@ -107,15 +107,30 @@ def test_a_single_hold_and_one_without_a_gain(tmp_path):
     hold_figure(found)
 
 
+def with_amplitude(run, folder, factor):
+    """Copy a run with another amplitude, of which the drag is a function."""
+    shutil.copytree(run, folder)
+    table = folder / "readings.csv"
+    heads, *rows = table.read_text(encoding="utf-8").splitlines()
+    column = heads.split(",").index("drive_amplitude_v")
+    cells = [row.split(",") for row in rows]
+    scaled = [[*row[:column], str(factor * float(row[column])), *row[column + 1 :]] for row in cells]
+    table.write_text("\n".join([heads, *map(",".join, scaled), ""]), encoding="utf-8")
+
+
+def test_a_best_law_of_two_constants_has_both_in_its_result(tmp_path):
+    for run, original in zip(RUNS, analyzed().runs, strict=True):
+        with_amplitude(run, tmp_path / "runs" / run.name, (original.spin.value / 45) ** 0.2)
+    found = analyzed([tmp_path / "runs"])
+    values = HOLD.document(found, tmp_path)["values"]
+    assert len(found.combined.best.constants) == 2
+    assert set(values) == set(found.combined.best.constants)
+    assert len(HOLD.tables(found)) == 2
+
+
 def test_tops_that_differ_at_one_spin_have_a_mean_drag_and_no_law(tmp_path):
     for name, factor in (("a", 1.0), ("b", 1.1), ("c", 0.95)):
-        shutil.copytree(RUNS[3], tmp_path / name)
-        table = tmp_path / name / "readings.csv"
-        heads, *rows = table.read_text(encoding="utf-8").splitlines()
-        column = heads.split(",").index("drive_amplitude_v")
-        cells = [row.split(",") for row in rows]
-        scaled = [[*row[:column], str(factor * float(row[column])), *row[column + 1 :]] for row in cells]
-        table.write_text("\n".join([heads, *map(",".join, scaled), ""]), encoding="utf-8")
+        with_amplitude(RUNS[3], tmp_path / name, factor)
     found = analyzed([tmp_path])
     assert "lies on the curve of each law" in found.text
     assert "runs held a top, at 45.0 Hz." in found.text
