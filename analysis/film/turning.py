@@ -3,6 +3,7 @@
 Times at even distances fold it: the spins that describe the phases as well are choices, which the result names.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from analysis.arrays import Array
 from analysis.drag import EXPONENT, EXPONENT_U
 from analysis.errors import TooFewReadings
 from analysis.film.errors import NoMark
+from analysis.uncertainty import student
 
 #: Spins with which a top floats, or is lost at, with room for a driven one [Hz].
 LOW, HIGH = 14.0, 75.0
@@ -36,8 +38,6 @@ _HARMONICS, _HARMONIC = 2, 0.003
 #: fast at most [Hz].  Else they would be taken for rows that are late, since the rows of the mark sway, too; in a long
 #: film both average out.  A tilt of 25 mrad turns the mark by half its square.
 _SWING, _SWING_HZ, _MOST_SWINGS = 5e-5, (0.3, 3.0), 24
-#: Means of residuals that show the noise, about.
-_BLOCKS = 72
 #: Highest order of the polynomial (Chebyshev's) for the turns of a film, and the number of orders that are free.  The
 #: others have a prior, as a fall has them beyond its third order, by the greatest relative slope of a free top's spin:
 #: 0.1 Hz/s of 14 Hz [1/s].
@@ -219,10 +219,9 @@ def _fit(
 
     The last columns of the basis have the prior of a free top, of widths in the first row, or of a driven one, in the
     others, each as probable, shape (k, p), the widest last; the nuisance has one of 1.  All count by their evidence.
-    The noise is that about the widest, in units of u and 1 at least.  Means over whole turns show it: neighbouring
-    pictures share errors, and errors that come with each turn average out.
+    The noise is that of the residuals from the widest prior, in units of u, and 1 at least: see `_slow_noise`.
     """
-    n, m = basis.shape
+    m = basis.shape[1]
     design = np.concatenate([basis, nuisance], axis=1)
     triangle = np.linalg.qr(np.column_stack([design, turns]) / u[:, None])[1]
     scales, some = np.ones((len(widths), design.shape[1])), slice(m - widths.shape[1], m)
@@ -230,10 +229,7 @@ def _fit(
     prior = np.diag(np.arange(design.shape[1]) >= some.start).astype(float)
     value, spread, _ = _solution(triangle, scales[-1], prior)
     rest, fitted = (turns - design @ value) / u, m - float(np.sum(np.diag(spread)[some] / widths[-1] ** 2))
-    pictures = n / float(np.ptp(turns))  # of a turn
-    block = max(round(pictures * max(round(n / _BLOCKS / pictures), 1)), 1)
-    means = rest[: n // block * block].reshape(-1, block).mean(axis=1)
-    noise = max(block * float(np.sum(means**2)) / max(means.size - fitted, 1), 1.0) ** 0.5
+    noise = max(_slow_noise(rest, float(np.ptp(turns)), fitted), 1.0)
     values, covariances, logs = zip(*(_solution(triangle / noise, scale, prior) for scale in scales), strict=True)
     weight = np.exp(np.array(logs) - max(logs))
     weight[1:] *= _DRIVEN / len(widths)
@@ -242,6 +238,27 @@ def _fit(
     off = np.array(values) - found
     covariance = np.tensordot(weight, np.array(covariances), 1) + (off.T * weight) @ off
     return found, covariance, turns - design @ found, noise
+
+
+def _slow_noise(rest: Array, turns: float, fitted: float) -> float:
+    """Return the noise of residuals that is slower than the spin, widened as few means show it.
+
+    Errors that neighbouring pictures share count in the spin, errors that come with each turn average out.  The means
+    are weighted by a raised cosine of two turns, so that they change evenly with the spin.
+
+    Args:
+        rest: residuals in units of u, shape (n,).
+        turns: of the top, in the film.
+        fitted: number of parameters that the residuals determined.
+    """
+    length = rest.size * min(2 / turns, 1 / 3)
+    late = np.arange(-int(length / 2), int(length / 2) + 1)
+    weights = np.cos(np.pi * late / length) ** 2
+    weights /= weights.sum()
+    means = np.convolve(rest, weights, "valid")
+    freedom = max(rest.size * float(weights @ weights) - fitted, 1.0)
+    worth = freedom * means.size / rest.size
+    return student(freedom) * math.sqrt(float(means @ means) / worth)
 
 
 def _solution(triangle: Array, scale: Array, prior: Array) -> tuple[Array, Array, float]:

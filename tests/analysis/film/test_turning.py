@@ -69,7 +69,7 @@ def switched(t):
         (20, *swing(0.3, 0.1), 4, 0.48e-3),
         (20, *swing(0.02, 0.1), 4, 0.14e-3),
         (20, *swing(0.3, 0.33), 4, 1.5e-3),
-        (10, switched, lambda t: 31 - 0.1 * np.maximum(t - 5, 0), 10, 1.5e-3),  # a bend just there: 4 mHz
+        (10, switched, lambda t: 31 - 0.1 * np.maximum(t - 5, 0), 10, 1.6e-3),  # a bend just there: 7 mHz
     ],
 )
 def test_u_of_a_driven_top_holds_its_swing(length, turns, spin, most, most_u):
@@ -176,6 +176,22 @@ def test_what_comes_with_each_turn_averages_out_of_the_u_of_the_spin():
         found = turning(times, seen(random, times, 31.0, more=beside))
         pulls += [((found.frequency - 31.0) / found.u_frequency, (found.spin[0] - 31.0) / found.u[0])]
     assert np.std(pulls, axis=0) == pytest.approx([1, 1], abs=0.37)  # 4 standard errors; 0.3 if each picture counts
+
+
+def test_u_changes_evenly_with_the_spin_and_holds_the_scatter_of_short_films():
+    random, none, u = np.random.default_rng(23), np.zeros(180), []
+    noise, start = random.normal(0, NOISE, 180), random.uniform()
+    for spin in (34.3, 34.4, 34.5, 34.6):  # 3.5 pictures in a turn
+        times = np.arange(180) / 120
+        turns = spin * times + 5 * NOISE * np.cos(2 * np.pi * ((spin + 0.7) * times + start)) + noise
+        u.append(turning_of(times, turns % 1, none + NOISE, none, none, start=spin).u_frequency)
+    assert u == pytest.approx([u[0]] * 4, rel=0.1)  # blocks of whole pictures jump by 0.4
+    pulls, none = [], np.zeros(120)
+    for _ in range(150):
+        turns = 20 * np.arange(120) / 240 + random.normal(0, 3 * NOISE, 120)
+        found = turning_of(np.arange(120) / 240, turns % 1, none + NOISE, none, none, start=20.0)
+        pulls.append((found.frequency - 20) / found.u_frequency)
+    assert np.mean(np.abs(pulls) < 2) > 0.92  # 0.95 less two standard errors
 
 
 def test_a_mark_that_pulls_the_rim_is_taken_out_of_the_places():
