@@ -12,9 +12,10 @@ the same everywhere.
 Source: PHYSICS.md §7.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import hypot, sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -141,11 +142,25 @@ class HeldLaw:
         return self.reference_hz * LAWS[self.name].slowing(spin / self.reference_hz, self.solution)
 
 
-def fit_held(spin: Array, drag: Array, u: Array, common: Array | None = None) -> tuple[tuple[HeldLaw, ...], float]:
-    """Return each law fitted to the drag, the best law first, and the part of the drag by which tops differ.
+class HeldLaws(NamedTuple):
+    """The drag laws through the drag at several held spins.
 
-    u of the drag is widened by that part, which makes χ² about the law that fits best what is expected.  Where the
-    spins are too near each other to compare laws, there are only those with a single constant.
+    Attributes:
+        laws: the best first; those with a single constant where they are not compared, each as with the others.
+        between: part of the drag by which tops differ.
+        compared: whether the exponent of the drag is known well enough to name a best law.
+    """
+
+    laws: tuple[HeldLaw, ...]
+    between: float
+    compared: bool
+
+
+def fit_held(spin: Array, drag: Array, u: Array, common: Array | None = None) -> HeldLaws:
+    """Fit each law to the drag at held spins.
+
+    Tops differ by a part τ of the drag, with which χ² about a power law, whose exponent has a prior, is what is
+    expected.  u of the drag has this part, widened by Student's factor, as few tops tell it.
 
     Args:
         spin: shape (n,) [Hz].
@@ -154,10 +169,12 @@ def fit_held(spin: Array, drag: Array, u: Array, common: Array | None = None) ->
         common: u of an error that is common to all spins, shape (n,) [Hz/s]; None: there is none.
 
     >>> spins = np.array([25.0, 35.0, 45.0])
-    >>> found, _ = fit_held(spins, 2e-4 * (2 * np.pi * spins) ** 1.5 / (2 * np.pi), 0.001 * np.ones(3))
-    >>> found[0].name, round(found[0].constants["c32"].value, 7)
+    >>> found = fit_held(spins, 2e-4 * (2 * np.pi * spins) ** 1.5 / (2 * np.pi), 0.001 * np.ones(3))
+    >>> found.laws[0].name, round(found.laws[0].constants["c32"].value, 7)
     ('disc', 0.0002)
     """
+    from scipy.special import chdtri, ndtr
+
     n, x = len(spin), np.log(spin)
     usual = np.exp(EXPONENT * (x - x.mean()))
     usual *= abs(float(drag.mean() / usual.mean()))
@@ -166,33 +183,61 @@ def fit_held(spin: Array, drag: Array, u: Array, common: Array | None = None) ->
     def whiten(part: float) -> Array:
         return np.linalg.inv(np.linalg.cholesky(np.diag(u**2 + (part * usual) ** 2) + np.outer(shared, shared)))
 
-    def fits(part: float, most: int) -> list[HeldLaw]:
-        laws = (law for law in LAWS.values() if len(law.constants) <= most)
-        return [_fit(law, spin, drag, whiten(part), whiten(0.0)) for law in laws]
-
-    def between(most: int) -> float:
-        def excess(part: float) -> float:
-            return min(one.statistics.misfit - one.statistics.degrees_of_freedom for one in fits(part, most))
-
-        if most < 1 or excess(0.0) <= 0:
-            return 0.0
-        from scipy.optimize import brentq
-
-        return float(brentq(excess, 0.0, np.linalg.norm(drag / usual), xtol=1e-6))  # there a law without drag fits
-
-    most, part = 1, between(min(1, n - 1))
+    part, freedom = _between(x - x.mean(), drag, usual, whiten)
+    stated, widened = whiten(0.0), whiten(student(freedom) * part)
     weights = (usual / np.hypot(u, part * usual)) ** 2
-    if weights @ (x - np.average(x, weights=weights)) ** 2 > _EXPONENT_U**-2:
-        most, part = n, between(n - 1)
-    by_name = {one.name: one for one in fits(part, most)}
+    known = float(weights @ (x - np.average(x, weights=weights)) ** 2)  # 1/u² of a free exponent
+    # the scatter may be as large as the upper end of its 68 % interval
+    compared = n > 1 and known * float(chdtri(n - 1, ndtr(1.0))) / (n - 1) > _EXPONENT_U**-2
+    by_name = {
+        law.name: _fit(law, spin, drag, widened, stated)
+        for law in LAWS.values()
+        if compared or len(law.constants) == 1  # others have no finite constants where spins are alike
+    }
     weighed, _ = weigh({name: one.statistics for name, one in by_name.items()})
-    return tuple(replace(by_name[name], statistics=stats) for name, stats in weighed.items()), part
+    return HeldLaws(tuple(replace(by_name[name], statistics=of) for name, of in weighed.items()), part, compared)
+
+
+def _between(x: Array, drag: Array, usual: Array, whiten: Callable[[float], Array]) -> tuple[float, float]:
+    """Return the part by which tops differ, and its degrees of freedom: those that the exponent's prior leaves.
+
+    They are n − 1 at one spin, and near n − 2 where the drags themselves show the exponent.
+
+    Args:
+        x: logarithm of the spins, about its mean, shape (n,).
+        drag: shape (n,) [Hz/s].
+        usual: the drag by the exponent that is expected, shape (n,) [Hz/s].
+        whiten: part → the matrix that makes errors of the drag independent, shape (n, n).
+    """
+    from scipy.optimize import brentq
+
+    slopes = np.column_stack([usual, EXPONENT_U * x * usual])
+
+    def fit(part: float) -> tuple[float, float]:
+        """Return χ², and what it is expected to be."""
+        white = whiten(part)
+        design = white @ slopes
+        left = np.eye(len(x)) - design @ np.linalg.solve(design.T @ design + np.diag([0.0, 1.0]), design.T)
+        return float(np.sum((left @ white @ drag) ** 2)), float(np.sum(left**2))
+
+    def excess(part: float) -> float:
+        return float(np.subtract(*fit(part)))
+
+    if len(x) < 2 or excess(0.0) <= 0:
+        return 0.0, fit(0.0)[1]
+    part = float(brentq(excess, 0.0, 10 * np.linalg.norm(drag / usual), xtol=1e-6))  # there u is ten times the drag
+    return part, fit(part)[1]
 
 
 def _fit(law: DragLaw, spin: Array, drag: Array, white: Array, stated: Array) -> HeldLaw:
-    """Fit a law; white, shape (n, n), makes errors of the drag independent, with a standard deviation of 1.
+    """Fit a law.
 
-    stated does it for the errors without what tops differ by.
+    Args:
+        law: of the drag.
+        spin: shape (n,) [Hz].
+        drag: shape (n,) [Hz/s].
+        white: makes errors of the drag independent, with a standard deviation of 1, shape (n, n).
+        stated: the same for the errors without the difference of the tops, of which χ² is.
     """
     reference = float(np.exp(np.mean(np.log(spin))))
     x, scale = spin / reference, float(np.mean(drag)) / reference

@@ -77,7 +77,7 @@ def test_the_drag_along_a_closed_form_gives_its_constants_back(law):
     time = np.linspace(0, 150, 7)
     spins = spin(law, time, 45.0, *constants)
     drag = (spin(law, time - 0.01, 45.0, *constants) - spin(law, time + 0.01, 45.0, *constants)) / 0.02
-    fits = {one.name: one for one in fit_held(spins, drag, 1e-3 * drag)[0]}
+    fits = {one.name: one for one in fit_held(spins, drag, 1e-3 * drag).laws}
     assert [one.value for one in fits[law].constants.values()] == pytest.approx(constants, rel=1e-4)  # differences
     assert fits[law].drag(spins) == pytest.approx(drag, rel=1e-5)
 
@@ -85,7 +85,7 @@ def test_the_drag_along_a_closed_form_gives_its_constants_back(law):
 def test_a_common_error_of_the_drag_does_not_average_out():
     spins = np.linspace(25, 45, 30)
     own, common = 0.001 * np.ones(30), 0.02 * drag_at(spins)
-    (alike,) = (one for one in fit_held(spins, drag_at(spins), own, common)[0] if one.name == "disc")
+    (alike,) = (one for one in fit_held(spins, drag_at(spins), own, common).laws if one.name == "disc")
     assert alike.constants["c32"].u == pytest.approx(0.02 * C, rel=0.02)  # own errors add 1e-3
 
 
@@ -95,12 +95,48 @@ def test_laws_are_not_compared_at_one_spin_and_u_has_the_scatter_of_the_tops():
         spins = 45 + 1e-3 * random.standard_normal(tops)
         true = drag_at(spins)
         drag = true * (1 + random.normal(0, 0.03, tops)) + random.normal(0, 0.01 * true)
-        laws, between = fit_held(spins, drag, 0.01 * true)
+        laws, between, compared = fit_held(spins, drag, 0.01 * true)
+        assert not compared
         assert {law.name for law in laws} == {"stokes", "newton", "disc"}
         assert 0.01 < between < 0.06
         (c32,) = (law.constants["c32"] for law in laws if law.name == "disc")
         pulls.append((c32.value - C) / c32.u)
     assert np.std(pulls) == pytest.approx(1.03, abs=0.25)  # Student's 11 degrees of freedom and more; 3 standard errors
+
+
+def fit_tops(random, spins, scatter, u):
+    """Fit the laws to the drag of tops that differ."""
+    true = drag_at(spins)
+    drag = true * (1 + random.normal(0, scatter, len(spins)) + random.normal(0, u, len(spins)))
+    return fit_held(spins, drag, u * true)
+
+
+@pytest.mark.parametrize("spread", [1e-3, 20.0])
+@pytest.mark.parametrize("tops", [3, 4])
+def test_u_of_a_constant_covers_the_truth_with_few_tops_that_differ(tops, spread):
+    random, near = np.random.default_rng(4), []
+    for _ in range(200):
+        found = fit_tops(random, 46 - spread * random.uniform(0, 1, tops), 0.03, 0.01)
+        (c32,) = (law.constants["c32"] for law in found.laws if law.name == "disc")
+        near.append(abs(c32.value - C) < c32.u)
+    assert np.mean(near) == pytest.approx(0.68, abs=0.1)  # 3 standard errors
+
+
+@pytest.mark.parametrize("tops", [2, 3, 4])
+def test_tops_that_agree_by_chance_do_not_compare_laws(tops):
+    """3 % from top to top gives an exponent to 0.3 at best with spins that differ by 4 Hz."""
+    random = np.random.default_rng(5)
+    found = [fit_tops(random, np.linspace(43, 47, tops), 0.03, 0.003).compared for _ in range(200)]
+    assert np.mean(found) < 0.2
+
+
+def test_constants_are_the_same_whether_laws_are_compared_or_not():
+    """Between the two u of the drag the exponent is just known well enough."""
+    spins = np.array([43.0, 44.0, 46.0, 47.0])
+    less, more = (fit_held(spins, drag_at(spins), u * drag_at(spins)) for u in (0.009, 0.0095))
+    assert (less.compared, more.compared) == (True, False)
+    small, large = (next(law for law in one.laws if law.name == "disc").constants["c32"] for one in (less, more))
+    assert large.u / small.u == pytest.approx(0.0095 / 0.009, rel=1e-3)
 
 
 def test_the_tilt_changes_the_drag_as_the_count_of_a_spin_down_does():

@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from analysis.held import HeldLaw, Hold, fit_held, hold_of
+from analysis.held import HeldLaw, HeldLaws, Hold, fit_held, hold_of
 from analysis.limits import AGREES_P
 from analysis.numbers import digits
-from analysis.spindown.drag import LAWS
 from analysis.spindown.tilt import slowing_by_tilt
 from analysis.uncertainty import Estimate
 from levilab.pipelines.analyzed import Analyzed
@@ -50,6 +49,7 @@ class HeldTogether:
     Attributes:
         laws: through the drag of an upright top, the best first.
         between: part of the drag by which tops differ beyond their u.
+        compared: whether the exponent of the drag is known well enough to name a best law.
         factors: of each input's drag over that of an upright top, by the spin-down's tilt; 1 where none is known.
         beside: law with a single constant → that of the spin-down, and the pull: their difference over its u.
     """
@@ -58,15 +58,16 @@ class HeldTogether:
     factors: tuple[float, ...]
     beside: dict[str, tuple[Estimate, float]]
     between: float = 0.0
+    compared: bool = False
 
     @property
     def best(self) -> HeldLaw | None:
-        """The best law; None where the spins are too near each other to compare laws."""
-        return self.laws[0] if len(self.laws) == len(LAWS) else None
+        """The best law; None where laws are not compared."""
+        return self.laws[0] if self.compared else None
 
     @property
     def drag(self) -> Estimate:
-        """The mean drag of an upright top, at the mean of the spins."""
+        """The mean drag of an upright top, at the mean of the spins, where there is no best law."""
         law, (constant,) = self.laws[0], self.laws[0].constants.values()
         drag = float(law.drag(np.array([law.reference_hz]))[0])
         return Estimate(drag, constant.u and drag * constant.u / (constant.value or 1.0), "Hz/s")
@@ -91,11 +92,13 @@ class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
         from scipy.special import chdtrc
 
         found = self.combined
-        fits = [law.statistics for law in found.laws[:1]]
-        if found.between and any(chdtrc(one.degrees_of_freedom, one.chi_square or 0.0) < AGREES_P for one in fits):
+        if not found.between:
+            return
+        fit = found.laws[0].statistics
+        if chdtrc(fit.degrees_of_freedom, fit.chi_square or 0.0) < AGREES_P:
             said = (
-                "the drags differ by {percent:n} % beyond their u: the tops differ, or no law holds; u of the "
-                "constants includes this"
+                "the drag scatters by {percent:n} % from top to top, more than its u explains: the tops differ, or no "
+                "law holds; u of the constants includes this"
             )
             yield Text(said, percent=digits(100 * found.between, 2))
 
@@ -126,8 +129,11 @@ def _of_laws(found: HeldTogether) -> Iterable[str]:
         if (chi := best.statistics.reduced_chi_square) is not None:
             yield Text("The held spins scatter about it by {times:n} of their u.", times=plain(math.sqrt(chi), 2))
     elif found.laws:
-        said = "The drag, {drag:n}, lies on the curve of each law: hold spins far from this one to see which holds."
-        yield Text(said, drag=with_uncertainty(found.drag))
+        said = (
+            "The drag at {spin:.1f} Hz, {drag:n}, lies on the curve of each law: hold more tops, or spins farther "
+            "apart, to see which holds."
+        )
+        yield Text(said, spin=found.laws[0].reference_hz, drag=with_uncertainty(found.drag))
     for law in found.laws[: 1 if best else None]:  # a single drag lies on each
         if law.name in found.beside:
             (name,) = law.constants
@@ -154,11 +160,12 @@ def combine(_: Sequence[Source[HoldReadings]], runs: Sequence[Hold], options: Ho
     spins = np.array([run.spin.value for run in runs])
     factors, u_factors = _tilt(beside, spins)
     known = [run.drag is not None for run in runs]
-    laws, between = tuple[HeldLaw, ...](), 0.0
+    held = HeldLaws((), 0.0, compared=False)
     if any(known):
         drag, u = np.array([(run.drag.value, run.drag.u) for run in runs if run.drag]).T / factors[known]
-        laws, between = fit_held(spins[known], drag, u, drag * u_factors[known])
-    return HeldTogether(laws, tuple(factors.tolist()), dict(_compare(laws, beside)) if beside else {}, between)
+        held = fit_held(spins[known], drag, u, drag * u_factors[known])
+    of_spindown = dict(_compare(held.laws, beside)) if beside else {}
+    return HeldTogether(held.laws, tuple(factors.tolist()), of_spindown, held.between, held.compared)
 
 
 def _tilt(beside: SpinDownAnalysis | None, spins: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

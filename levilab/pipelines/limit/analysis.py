@@ -442,7 +442,7 @@ def _sentences(limits: Limits) -> Iterable[str]:
     )
     yield from () if levels_off else _beside_theory(limits)
     if found.between:
-        said = "They are of {n} runs, which differ by {beyond:n} more than their tops do."
+        said = "The means of the {n} runs scatter by {beyond:n} beyond the scatter of the tops."
         yield Text(said, n=found.runs, beyond=with_uncertainty(found.between))
     if limits.ends and found.n > 1:
         ends = tuple(_times(ENDS[kind], n) for kind, n in limits.ends.items())

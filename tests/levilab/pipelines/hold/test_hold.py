@@ -8,6 +8,7 @@ import pytest
 
 from analysis.spindown.drag import LAWS
 from analysis.spindown.tilt import count_of, slowing_by_tilt
+from analysis.uncertainty import student
 from levilab.errors import DataError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.hold.figure import hold_figure
@@ -140,7 +141,7 @@ def test_tops_that_differ_at_one_spin_have_a_mean_drag_and_no_law(tmp_path):
     drags = [run.drag.value for run in found.runs]
     mean = HOLD.document(found, tmp_path)["values"]["drag"]
     assert mean["value"] == pytest.approx(np.mean(drags), rel=0.01)
-    assert mean["u"] == pytest.approx(np.std(drags, ddof=1) / np.sqrt(3), rel=0.1)
+    assert mean["u"] == pytest.approx(student(2) * np.std(drags, ddof=1) / np.sqrt(3), rel=0.1)
     assert len(hold_figure(found).axes) == 1
 
 

@@ -233,7 +233,7 @@ def test_runs_of_other_conditions_stand_apart(sample_data, tmp_path):
     both = next(group for group in analysis.groups if group.runs == (0, 1))
     assert both.statistics.between.value == pytest.approx(8**0.5, rel=0.01)  # 4 Hz apart
     assert both.statistics.mean.u == pytest.approx(2.0, rel=0.01)  # their scatter over the root of 2
-    assert "which differ by" in both.text
+    assert "The means of the 2 runs scatter by" in both.text
     assert any("are of 3 conditions and are not combined" in text for text in analysis.all_warnings)
     values = ANALYSES["limit"].document(analysis, tmp_path)["values"]
     assert {"upper_1_mean", "upper_2_mean", "upper_3_standard_error", "upper_1_between_runs"} <= values.keys()
