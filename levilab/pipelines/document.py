@@ -112,6 +112,7 @@ class Analysis(Needs[Any], Generic[A]):
         files: tables for other analyses that are saved with the result, by their names.
         compared: quantities that groups of a class compare; empty: the constants of the law, or where there is none
             the first quantities.
+        apart: why groups have no common value of these, and so no mean; empty: they have.
         curve: the fitted curve of an input, by its number and the model's name, as a function of arrays in SI; None:
             there is none.
         curve_u: its standard uncertainty, likewise.
@@ -142,6 +143,7 @@ class Analysis(Needs[Any], Generic[A]):
     symbols: Mapping[str, str] = field(default_factory=dict)
     files: Callable[[A], Mapping[str, str]] = lambda _: {}
     compared: tuple[str, ...] = ()
+    apart: Callable[[A], str] = lambda _: ""
     curve: Callable[[A, int, str], Callable[[np.ndarray], np.ndarray]] | None = None
     curve_u: Callable[[A, int, str], Callable[[np.ndarray], np.ndarray]] | None = None
 

@@ -71,6 +71,7 @@ class Compared:
         together: whether those agree; None where there are none.
         used: whether a group has a value that is neither doubtful nor far from its truth, or no group has.
         widened: whether u of any group is.
+        apart: why the groups have no common value, and so no mean; empty: they have.
     """
 
     name: str
@@ -82,6 +83,7 @@ class Compared:
     together: Comparison | None
     used: tuple[bool, ...]
     widened: bool
+    apart: str = ""
 
     @property
     def shown_unit(self) -> str:
@@ -116,7 +118,7 @@ class Compared:
     def from_class(self) -> tuple[float | None, ...]:
         """The distance of each group from the mean of the others, in u."""
         others = iter(self.together.distances if self.together else ())
-        return tuple(next(others) if use else None for use in self.used)
+        return tuple(next(others, None) if use else None for use in self.used)
 
     @cached_property
     def from_truth(self) -> tuple[float | None, ...]:
@@ -164,7 +166,8 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
     truths = [truth_of(source.run, analysis.name) for source in found.sources]
     laws = Counter(one.model for one in truths if one.model)
     parts = document["runs"]
-    best = document.get("best_model", "") if parts[0]["models"] else ""
+    has_models = any(part["models"] for part in parts)
+    best = document.get("best_model", "") if has_models else ""
     model = max(laws, key=lambda law: laws[law], default=best)
     said = [
         [
@@ -184,15 +187,21 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
         )
         for source, part, texts in zip(found.sources, parts, said, strict=True)
     )
-    names = analysis.compared or (_constants(document, model) if parts[0]["models"] else []) or _common(parts)
+    names = analysis.compared or (_constants(document, model) if has_models else []) or _common(parts)
     doubts = [bool(group.doubts) for group in groups]
-    quantities = (_quantity(name, analysis, model, parts, truths, doubts=doubts) for name in (*names, *more))
+    found_of = (_quantity(name, analysis, model, parts, truths, doubts=doubts) for name in (*names, *more))
+    quantities = tuple(one for one in found_of if one.together)
+    if why := analysis.apart(found):
+        quantities = tuple(
+            replace(one, mean=None, together=None, apart=why) if one.name in analysis.compared else one
+            for one in quantities
+        )
     others = {
         group.source.name: truth.model
         for group, truth in zip(groups, truths, strict=True)
         if truth.model not in {"", model}
     }
-    return Class(analysis, found, model, groups, tuple(one for one in quantities if one.together), others)
+    return Class(analysis, found, model, groups, quantities, others)
 
 
 def _model(part: Mapping[str, Any], name: str) -> Mapping[str, Any]:
@@ -363,6 +372,8 @@ def finding(of: Class) -> str:
             "{groups}: no quantity has a value with u", groups=count_sources([group.source for group in of.groups])
         )
     first = of.quantities[0]
+    if first.apart:
+        return Text("{symbol} of {groups}", symbol=first.symbol, groups=_count(of, first))
     return Text("{mean}, mean of {groups}", mean=_mean(first), groups=_count(of, first))
 
 
@@ -372,7 +383,9 @@ def verdict(of: Class) -> str:
         (group,), (mark,) = of.groups, of.marks
         return Text("{name:s} alone measured this: {mark}.", name=group.source.name, mark=mark.word)
     texts = [
-        Text("{mean} is the mean of {groups}{truth}.", _mean(one), _count(of, one), _beside_truth(one))
+        Text("{symbol} has no mean: {why}.", symbol=one.symbol, why=one.apart)
+        if one.apart
+        else Text("{mean} is the mean of {groups}{truth}.", _mean(one), _count(of, one), _beside_truth(one))
         for one in of.quantities
     ]
     return Sentences(count_marks(of), *_scenes(of), *texts)
@@ -389,7 +402,11 @@ def agreement(of: Class) -> str:
     """Return how far the groups agree, quantity by quantity, and how well they met the truth; empty for one group."""
     if len(of.groups) == 1:
         return ""
-    texts = [Text("{symbol}: {agreement}.", symbol=one.symbol, agreement=_agreement(one)) for one in of.quantities]
+    texts = [
+        Text("{symbol}: {agreement}.", symbol=one.symbol, agreement=_agreement(one))
+        for one in of.quantities
+        if not one.apart
+    ]
     return Sentences(*texts, _truth(of) if of.knows_truth else "")
 
 

@@ -77,11 +77,16 @@ class HoldAnalysis(Analyzed[HoldReadings, Hold, HeldTogether, HoldOptions]):
     """Held spins, each by itself and together."""
 
     @property
+    def at_one_spin(self) -> bool:
+        """Whether the held spins agree."""
+        return bool(np.ptp([run.spin.value for run in self.runs]) < _ONE_SPIN_HZ)
+
+    @property
     def text(self) -> str:
         """What the data say, in a few sentences."""
         spins = [run.spin.value or 0.0 for run in self.runs]
         said = "{n} runs held a top, at {low:.1f} Hz to {high:.1f} Hz."
-        if np.ptp(spins) < _ONE_SPIN_HZ:
+        if self.at_one_spin:
             said = "{n} runs held a top, at {low:.1f} Hz."
         several = Text(said, n=len(spins), low=min(spins), high=max(spins))
         last = (several,) if len(spins) > 1 else text_of(self.runs[0]).each

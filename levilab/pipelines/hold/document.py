@@ -71,6 +71,10 @@ def _run_entries(run: Hold) -> dict[str, Any]:
     return {"values": values_of(find_all(QUANTITIES, run)), "models": [], "verdict": text_of(run)}
 
 
+def _apart(analysis: HoldAnalysis) -> str:
+    return "" if analysis.at_one_spin else "the groups held different spins, and the drag rises with the spin"
+
+
 def _renumber(found: HeldTogether, order: Sequence[int]) -> HeldTogether:
     return replace(found, factors=tuple(found.factors[k] for k in order))
 
@@ -99,4 +103,5 @@ HOLD = Analysis(
     row=HOLD_ROW,
     symbols=symbols_of(QUANTITIES),
     compared=("drag",),
+    apart=_apart,
 )

@@ -278,7 +278,7 @@ def _values(of: Class, quantity: Compared) -> Tabular:
     names = [*(group.source.name for group in of.groups), "class mean"]
     kinds = [*(_ROWS[mark.word] for mark in of.marks), "together"]
     rows = [Row(cells, kind) for kind, cells in zip(kinds, zip(names, *columns, strict=True), strict=True)]
-    rows = rows if len(of.groups) > 1 else rows[:1]
+    rows = rows if len(of.groups) > 1 and mean else rows[:-1]
     note = "value(u): the digits in parentheses are u of the last digits."
     if quantity.widened:
         note = Sentences(note, "u is larger than in levilab report, as few repetitions give it (Student's t).")
@@ -286,7 +286,7 @@ def _values(of: Class, quantity: Compared) -> Tabular:
         note = Sentences(
             note, "The distance of the mean from the truth is in its u without the differences of the tops."
         )
-    if any(one and not use for one, use in zip(quantity.estimates, quantity.used, strict=True)):
+    if mean and any(one and not use for one, use in zip(quantity.estimates, quantity.used, strict=True)):
         note = Sentences(note, "The mean is without results to repeat.")
     name = f"{of.analysis.name}-{quantity.name.replace('_', '-')}"
     return Tabular(name, table("", heads, rows, numbers=numbers), note, first_column_wraps=True, narrow="turn")
@@ -332,10 +332,11 @@ def _groups(of: Class) -> Tabular:
 
 def _picture(of: Class) -> Picture:
     truth = "; diamonds are the truth that each seed made, and the last panel has the distance from it" * of.knows_truth
+    mean = ", and the mean of the class" * any(one.mean for one in of.quantities)
     return Picture(
         name=f"{of.analysis.name}-class",
         title="The class.",
-        caption=Text("Each group's value with its u, and the mean of the class{truth}.", truth=truth),
+        caption=Text("Each group's value with its u{mean}{truth}.", mean=mean, truth=truth),
         alt=finding(of),
         draw=partial(_draw, of),
     )

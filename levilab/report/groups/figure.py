@@ -32,9 +32,10 @@ def class_figure(of: Class) -> Figure:
     width = (_RIGHT - _LEFT - (panels - 1) * _GAP) / panels
     said, made_up = in_mathtext(in_language(finding(of))), [group.source.synthetic for group in of.groups]
     with new_figure(_HEAD + height + _FOOT, said, made_up) as figure:
-        about = in_language("point and bar: value ± u of a group; line: mean of the class")
+        about = in_language("point and bar: value ± u of a group")
+        line = in_language("; line: mean of the class") if any(one.mean for one in shown) else ""
         diamond = in_language("; diamond: truth of the virtual bench") if of.knows_truth else ""
-        write(figure, 0.08, 0.52, f"{about}{diamond}", fontsize=SMALL)
+        write(figure, 0.08, 0.52, f"{about}{line}{diamond}", fontsize=SMALL)
         for k in range(panels):
             axes = panel(figure, _LEFT + k * (width + _GAP), _HEAD, width, height)
             if k < len(shown):

@@ -165,6 +165,26 @@ def test_held_spins_are_compared_by_their_drag_and_no_residuals_are_spoken_of(tm
     assert "Residuals" not in write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")
 
 
+def test_groups_that_held_different_spins_have_no_mean_drag(tmp_path):
+    for k, run in enumerate(sorted((SAMPLE_DATA / "hold").glob("*-hz"))):
+        folder = tmp_path / "class" / run.name
+        shutil.copytree(run, folder)
+        record = json.loads((run / RECORD).read_text(encoding="utf-8"))
+        (folder / RECORD).write_text(json.dumps(record | {"group": f"Group {k}"}), encoding="utf-8")
+    of = compared(tmp_path / "class", "hold")
+    (drag,) = of.quantities
+    assert all(drag.estimates)
+    assert drag.from_class == (None,) * 4
+    assert "d has no mean: the groups held different spins, and the drag rises with the spin." in verdict(of)
+    assert "scatter" not in agreement(of)
+    assert finding(of) == "d of 4 groups"
+    page = write_class([tmp_path / "class"], tmp_path / "class.html").read_text(encoding="utf-8")
+    assert "mean of the class" not in page
+    assert "class mean" not in page
+    assert "χ²" not in page
+    write_class([tmp_path / "class"], tmp_path / "class.xlsx")
+
+
 def test_page_and_pdf_begin_with_the_result(of_three, tmp_path):
     page = write_class([of_three], tmp_path / "new" / "class.html").read_text(encoding="utf-8")
     places = [page.index(f">{title}<") for title in ("Result", "Figure", "Runs")]
