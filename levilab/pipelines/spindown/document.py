@@ -264,6 +264,9 @@ def _row(budgets: Sequence[Budget], law: str, name: str, row: str) -> Component 
 def _entries(analysis: SpinDownAnalysis) -> dict[str, Any]:
     combined = analysis.combined
     several = len(analysis.runs) > 1
+    if analysis.is_doubtful:
+        undecided = replace(combined.verdict, decided=False)
+        return {"values": {}, "models": []} | _verdict(combined.best, undecided, analysis.text)
     return {
         "values": _combined_values(combined),
         "models": [_combined_model(fit) for fit in combined.fits] if several else _models(analysis.runs[0]),

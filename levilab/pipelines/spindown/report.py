@@ -253,7 +253,7 @@ def _runs_table(analysis: SpinDownAnalysis) -> Table:
             str(len(run.time)),
             *cells,
             Text("{first:.2f} → {last:.2f}", first=run.frequency[0], last=run.frequency[-1]),
-            run.best if run.verdict.decided else "undecided",
+            run.best if run.verdict.decided and not source.readings.doubtful else "undecided",
         )
         for source, run, *cells in zip(analysis.sources, analysis.runs, *cells_of(OF_RUN, analysis.runs), strict=True)
     ]
@@ -406,14 +406,27 @@ MOST_COUNTS = 12
 MOST_FALLS = 8
 
 
+_SUBJECT, _HEADING = "spin-down", "Spin-down of a levitated top"
+
+
 def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
     """Return verdict, laws, their meaning, how well they fit, the constants run by run, and the readings."""
     combined = analysis.combined
     n = combined.fit(combined.best).statistics.n
-    part = ReportPart(
-        subject="spin-down",
-        heading="Spin-down of a levitated top",
-        lead=Text("{readings} used", readings=how_many(n, "reading")),
+    lead = Text("{readings} used", readings=how_many(n, "reading"))
+    if analysis.is_doubtful:
+        return ReportPart(
+            subject=_SUBJECT,
+            heading=_HEADING,
+            lead=lead,
+            result=(),
+            figure=FigureText("Spin-down.", "The readings as they were read.", _points(analysis)),
+            inputs=input_parts(analysis, _in_words, lambda *_: (), lambda _: UNIT_FIRST),
+        )
+    return ReportPart(
+        subject=_SUBJECT,
+        heading=_HEADING,
+        lead=lead,
         result=(
             Paragraph(Sentences(*meaning(analysis)), "What it means."),
             *_falls(analysis),
@@ -442,18 +455,6 @@ def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
             lambda source, run, options: (_readings(source, run, options, combined.best),),
             verdict_of_run,
         ),
-    )
-    if not analysis.is_doubtful:
-        return part
-    return replace(
-        part,
-        result=(),
-        figure=FigureText("Spin-down.", "The readings as they were read.", _points(analysis)),
-        values=(),
-        short_figure=None,
-        compared=(),
-        runs=(),
-        inputs=input_parts(analysis, _in_words, lambda *_: (), lambda _: UNIT_FIRST),
     )
 
 

@@ -172,7 +172,10 @@ def test_another_unit_taken_for_hertz_is_doubted(tmp_path, unit, factor):
     (source,) = found.sources
     assert source.readings.doubtful
     assert found.text == "The unit comes first: laws are compared once it is known."  # and no "fits best … known to"
-    assert len(spindown_tables(found)) == 1  # without constants
+    (table,) = spindown_tables(found)  # without constants
+    assert "undecided" in table.rows[0].cells
+    document = SPINDOWN.document(found, tmp_path)
+    assert (document["values"], document["models"], document["decided"]) == ({}, [], False)
     assert f"f=2 [{unit}]" in source.warnings[0]
     assert "describes" not in finding_of(found)  # nor has the figure
     assert not spindown_part(found).result
