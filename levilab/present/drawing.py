@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 
 from levilab.present.looks import GREY, MARKERS, SERIES, Look
 from levilab.present.style import STYLE, WIDE
+from levilab.present.units import KNOWN
 from levilab.texts.text import Text, in_language
 
 if TYPE_CHECKING:
@@ -34,6 +35,8 @@ SIGMAS = ((2.0, 0.07), (1.0, 0.10))
 SMALL = 7.0
 #: Widths of a letter of 9 pt on the average [inch], for wrapping.
 _LETTER = 0.078
+#: The unit of a number, with the space before it.
+_UNIT = re.compile(rf"(?<=[\d)]) (?:{'|'.join(map(re.escape, sorted(KNOWN, key=len, reverse=True)))})(?!\w)")
 #: Height of a line of small text [inch].
 _LINE = 0.125
 
@@ -91,7 +94,7 @@ def _in_two_lines(text: str, most: int) -> list[str]:
     >>> _in_two_lines("Held at 45.0005(10) Hz, it floats", 25)  # no number without its unit
     ['Held at 45.0005(10)\xa0Hz,', 'it floats']
     """
-    text = re.sub(r"(?<=[\d)=]) |(?<=\bmT) ", "\N{NO-BREAK SPACE}", text)
+    text = _UNIT.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), text)
     widths = range(len(text) // 2, most) if len(text) > most else ()
     halves = (textwrap.wrap(text, width) for width in widths)
     return next((two for two in halves if len(two) == 2), textwrap.wrap(text, most, max_lines=2, placeholder=" …"))

@@ -46,7 +46,8 @@ def _analysis_of(result: Path) -> str:
 _OF_DESKTOPS = (".", "~$", "desktop.ini", "Thumbs.db", SKIP)
 
 #: Tables that are saved with the result of a film, and this: results, and no further inputs of a folder.
-_OF_FILM, _RESULT_OF_FILM = re.compile(r"(.+)\.(tracks|spin|limit)\.csv"), re.compile(r"(.+)\.\w+\.result\.video\.json")
+_OF_FILM = re.compile(r"(.+)\.(tracks|spin|limit|precession)\.csv")
+_RESULT_OF_FILM, _RESULT_OF_FILMS = re.compile(r"(.+)\.\w+\.result\.video\.json"), "result.video.json"
 
 #: How names of files end that levilab writes beside what it reads.
 _RESULT, _CORRECTION = re.compile(r"result(\.\w+)?\.json$"), ".levilab.toml"
@@ -62,6 +63,8 @@ def _files(root: Path) -> list[Path]:
             continue
         seen.add(real)
         films = {film[1] for name in files if (film := _RESULT_OF_FILM.fullmatch(name))}
+        if _RESULT_OF_FILMS in files:
+            films |= {"films", *(Path(name).stem for name in files)}
         own = {name for name in files if (table := _OF_FILM.fullmatch(name)) and table[1] in films}
         found += [Path(folder) / name for name in files if name not in own and not name.startswith(_OF_DESKTOPS)]
     return found

@@ -399,7 +399,7 @@ class InShort:
     Attributes:
         title, anchor: of the chapter.
         verdict: empty for none.
-        notes: how many there are; empty for none.
+        notes: their number as text; empty for none.
     """
 
     title: str

@@ -55,7 +55,12 @@ def _contents(document: Document) -> Html:
         return join([])
     writer = Writer()
     if chapters := in_short(sections):
-        return element("nav", [_chapter(one, writer.new_id(one.anchor)) for one in chapters], class_="chapters")
+        return element(
+            "nav",
+            [_chapter(one, writer.new_id(one.anchor)) for one in chapters],
+            class_="chapters",
+            aria_label="Contents",
+        )
     links = [element("a", words(one.title), href=f"#{writer.new_id(one.anchor)}") for one in sections]
     return element("nav", links, aria_label="Contents")
 

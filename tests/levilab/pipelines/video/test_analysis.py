@@ -25,6 +25,7 @@ from levilab.animation.camera import (
 from levilab.errors import DataError, UsageError
 from levilab.formats.film import open_film, pictures
 from levilab.pipelines.catalogue import ANALYSES
+from levilab.pipelines.inputs.files import data_files
 from levilab.pipelines.options import VideoOptions
 from levilab.pipelines.suits import save
 from levilab.pipelines.video.leaning import rising_of
@@ -329,7 +330,12 @@ def test_films_of_a_driven_top_are_a_sweep_of_the_drive(path, found, tmp_path):
     assert not names & video.files(replace(one, sources=4 * one.sources, runs=4 * one.runs)).keys()  # it slows down
     table = video.files(replace(one, sources=4 * one.sources, runs=tuple(films)))["films.precession.csv"]
     (tmp_path / "films.precession.csv").write_text(table)
-    sweep = ANALYSES["precession"].analyze([tmp_path]).combined
+    (tmp_path / "IMG_0042.spin.csv").write_text("")
+    assert len(data_files(tmp_path)) == 2
+    for name in ("IMG_0042.mp4", "result.video.json"):  # of several films
+        (tmp_path / name).touch()
+    assert [file.name for file in data_files(tmp_path)] == ["IMG_0042.mp4"]
+    sweep = ANALYSES["precession"].analyze([tmp_path / "films.precession.csv"]).combined
     assert sweep.line.slope == pytest.approx(-0.2)
     assert sweep.column("drive") == pytest.approx([30, 32, 34, 37])
 
