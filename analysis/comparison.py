@@ -79,14 +79,25 @@ def _from_others(x: NDArray[np.float64], u: NDArray[np.float64], k: int) -> floa
 
 
 def weighted_mean(x: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float, float, float]:
-    """Return the mean weighted by 1/u², its u, and χ² about it (W. G. Cochran, Biometrics 10, 101 (1954))."""
+    """Return the mean weighted by 1/u², its u, and χ² about it (W. G. Cochran, Biometrics 10, 101 (1954)).
+
+    Args:
+        x: shape (n,), n at least 1.
+        u: of each, shape (n,), positive.
+    """
     weights = (u.min() / u) ** 2
     mean = float(weights @ x / weights.sum())
     return mean, float(u.min() / math.sqrt(weights.sum())), float((((x - mean) / u) ** 2).sum())
 
 
 def scatter_between(x: NDArray[np.float64], u: NDArray[np.float64], chi_square: float | None = None) -> float:
-    """Return τ, with which χ² is as given, or else its expectation n − 1; 0 where it is less without.  u may be 0."""
+    """Return τ ≥ 0 so that χ² of the values with √(u² + τ²) equals a target; 0 if it is below the target with u alone.
+
+    Args:
+        x: shape (n,).
+        u: of each, without their difference, shape (n,), not negative.
+        chi_square: the target, positive; None: its expectation n − 1.
+    """
     from scipy.optimize import brentq
 
     expected = len(x) - 1 if chi_square is None else chi_square
@@ -95,9 +106,9 @@ def scatter_between(x: NDArray[np.float64], u: NDArray[np.float64], chi_square: 
         both = np.hypot(u, tau)
         return weighted_mean(x, both)[2] - expected if both.all() else math.inf
 
-    if len(x) < 2 or excess(0.0) <= 0:
-        return 0.0
     widest = float(np.ptp(x))
+    if not widest or excess(0.0) <= 0:
+        return 0.0
     return widest * float(brentq(lambda part: excess(part * widest), 0.0, max(2.0, math.sqrt(len(x) / expected))))
 
 
@@ -106,10 +117,16 @@ def u_of_between(x: NDArray[np.float64], u: NDArray[np.float64]) -> float:
 
     The interval has the τ with which χ² is between its quantiles (W. Viechtbauer, Stat. Med. 26, 37 (2007)).  Values
     that agree better than their u by chance do not give τ better than those that agree as expected.
+
+    Args:
+        x: shape (n,), n at least 2.
+        u: of each, without their difference, shape (n,), not negative.
     """
     from scipy.special import chdtri, ndtr
 
     freedom = len(x) - 1
+    if not np.ptp(x):  # the limit for values that agree ever better
+        return float(np.sqrt(np.mean(u**2) * (freedom / chdtri(freedom, ndtr(1.0)) - 1)))
     less = min(1.0, weighted_mean(x, u)[2] / freedom) if u.all() else 1.0
     ends = (scatter_between(x, u, less * float(chdtri(freedom, ndtr(side)))) for side in (-1.0, 1.0))
     return max(abs(end - scatter_between(x, u)) for end in ends)

@@ -246,13 +246,12 @@ def combine(runs: Sequence[Sample]) -> Statistics:
         joined = (np.concatenate(column) if len(column) == len(runs) else None for column in columns)
         found = summarize(Sample(np.concatenate(limits), *joined))
         return replace(found, trend=None, trend_p=None, runs=len(runs))
-    means = np.array([one.mean() for one in limits])
+    origin = limits[0][0]  # equal limits have equal means, not rounded ones
+    means = origin + np.array([(one - origin).mean() for one in limits])
     square = sum((one.size - 1) * _scatter(one) ** 2 for one in limits if one.size > 1) / within
     own = np.maximum(square / numbers, [run.least for run in runs])
-    differ = Estimate(0.0, 0.0, "Hz")
-    if _scatter(means):
-        differ = Estimate(scatter_between(means, np.sqrt(own)), u_of_between(means, np.sqrt(own)), "Hz")
-    between = (differ.value or 0.0) ** 2
+    differ = Estimate(tau := scatter_between(means, np.sqrt(own)), u_of_between(means, np.sqrt(own)), "Hz")
+    between = tau**2
     weights = _weights(own + between)
     mean = float(weights @ means)
     by_scatter = float(weights**2 @ (own + between))
