@@ -129,9 +129,8 @@ def _correlation(runs: Sequence[SpinDown]) -> Estimate | None:
     if not seen:
         return None
     values, u = np.array(seen).T
-    value, weight = weighted_mean(values, u)[0], u**-2 / (u**-2).sum()
-    spread = float(np.sqrt(weight**2 @ (u**2 + (values - value) ** 2))) if len(seen) > 1 else float(u[0])
-    return Estimate(value, spread, "1")
+    value, of_mean, _ = weighted_mean(values, u)
+    return Estimate(value, float(np.linalg.norm((of_mean / u) ** 2 * np.hypot(u, values - value))), "1")
 
 
 def _tilt(runs: Sequence[SpinDown], best: str) -> Mean | None:

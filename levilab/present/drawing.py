@@ -42,17 +42,17 @@ _LINE = 0.125
 
 
 @contextmanager
-def new_figure(height: float, text: str, made_up: Sequence[bool] = ()) -> Iterator[Figure]:
+def new_figure(height: float, text: str, synthetic: Sequence[bool] = ()) -> Iterator[Figure]:
     """Yield a figure as wide as a page, in the style of all, with its headline.
 
     Args:
         height: of the figure [inch].
         text: see `headline`.
-        made_up: whether each input is synthetic.
+        synthetic: whether each input is synthetic.
     """
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(WIDE, height))
-        headline(figure, text, synthetic_mark(made_up))
+        headline(figure, text, synthetic_mark(synthetic))
         yield figure
 
 
@@ -100,16 +100,16 @@ def _in_two_lines(text: str, most: int) -> list[str]:
     return next((two for two in halves if len(two) == 2), textwrap.wrap(text, most, max_lines=2, placeholder=" …"))
 
 
-def synthetic_mark(made_up: Sequence[bool]) -> str:
+def synthetic_mark(synthetic: Sequence[bool]) -> str:
     """Return what stands in the mark, for inputs of which some are synthetic; empty where none is.
 
     >>> synthetic_mark([True, True]), synthetic_mark([True, False]), synthetic_mark([False])
     ('SYNTHETIC', '1 of 2 SYNTHETIC', '')
     """
-    count = sum(made_up)
+    count = sum(synthetic)
     if not count:
         return ""
-    return "SYNTHETIC" if count == len(made_up) else Text("{count} of {n} SYNTHETIC", count=count, n=len(made_up))
+    return "SYNTHETIC" if count == len(synthetic) else Text("{count} of {n} SYNTHETIC", count=count, n=len(synthetic))
 
 
 def sigma_bands(axes: Axes) -> None:

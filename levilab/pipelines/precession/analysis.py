@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 
 from analysis.arrays import Array
-from analysis.comparison import compare
+from analysis.comparison import weighted_mean
 from analysis.errors import AnalysisError
 from analysis.precession.coherence import Coherence, coherence, pulse_times
 from analysis.precession.sweep import Sweep, SweepFit, fit_sweep
@@ -115,10 +115,12 @@ def combine(runs: Sequence[PrecessionRun], options: PrecessionOptions) -> SweepF
 
 def _about_slopes(fits: Sequence[SweepFit]) -> Iterable[Remark]:
     """Yield a remark where the slopes of the runs differ by more than their u."""
+    from scipy.special import chdtrc
+
     slopes = [(fit.line.slope, fit.line.u_slope) for fit in fits if fit.line.u_slope]
     if len(slopes) < 2:
         return
-    p = compare(*zip(*slopes, strict=True)).p
+    p = float(chdtrc(len(slopes) - 1, weighted_mean(*np.array(slopes).T)[2]))
     if p < DIFFERENT_P:
         yield Remark("slopes differ", values=(len(slopes), p))
 

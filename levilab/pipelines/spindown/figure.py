@@ -71,8 +71,8 @@ def spindown_figure(analysis: SpinDownAnalysis) -> Figure:
     if analysis.is_doubtful:
         return short_figure(analysis)
     straight = [law for law in laws_of(analysis) if law in STRAIGHT_LINES]
-    height, made_up = _HEIGHT if straight else _LINES_TOP - 0.4, [one.synthetic for one in analysis.sources]
-    with new_figure(height, _finding(analysis), made_up) as figure:
+    height = _HEIGHT if straight else _LINES_TOP - 0.4
+    with new_figure(height, _finding(analysis), [one.synthetic for one in analysis.sources]) as figure:
         unit = _unit(analysis)
         _draw_spin(panel(figure, _LEFT, 0.62, 4.3, 1.75), analysis)
         if len(analysis.runs) > len(MARKERS):

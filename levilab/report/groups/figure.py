@@ -30,8 +30,8 @@ def class_figure(of: Class) -> Figure:
     height = max(_ROW * count, 0.6)
     panels = len(shown) + of.knows_truth
     width = (_RIGHT - _LEFT - (panels - 1) * _GAP) / panels
-    said, made_up = in_mathtext(in_language(finding(of))), [group.source.synthetic for group in of.groups]
-    with new_figure(_HEAD + height + _FOOT, said, made_up) as figure:
+    said, synthetic = in_mathtext(in_language(finding(of))), [group.source.synthetic for group in of.groups]
+    with new_figure(_HEAD + height + _FOOT, said, synthetic) as figure:
         about = in_language("point and bar: value ± u of a group")
         line = in_language("; line: mean of the class") if any(one.mean for one in shown) else ""
         diamond = in_language("; diamond: truth of the virtual bench") if of.knows_truth else ""
