@@ -39,6 +39,11 @@ class Interrupted(BaseException):
         self.by = by
         super().__init__(f"interrupted by {by}")
 
+    @property
+    def key(self) -> str:
+        """The key that sent the signal, or else the signal."""
+        return "Ctrl-C" if self.by == "SIGINT" else self.by
+
 
 class Stop:
     """Whether a signal asked for the end.

@@ -130,7 +130,7 @@ def _acquire(
                 if off.is_set()
                 else "interrupted by {by} before the bench was open"
             )
-            text = Text(seen, by=interruption.by.replace("SIGINT", "Ctrl-C"))
+            text = Text(seen, by=interruption.key)
             writer.event(None, RunEvent.INTERRUPTED, text)
             show.close()  # its picture of the bench is from before the outputs went off
             show.message(text)

@@ -89,7 +89,7 @@ class Analyses:
                 status, err = self.carry_out(words)
                 if status:
                     said = err.strip().removeprefix("levilab: ").replace(str(path), path.name)[-600:]
-                    said = said.replace("--columns", "columns")  # a page has no options
+                    said = re.sub(r"--(?=[a-z])", "", said)  # a page has no options
                     self.failed[path] = said or f"levilab {words[0]} failed"
                     return
         except subprocess.TimeoutExpired:
