@@ -245,7 +245,7 @@ def test_an_unlocked_top_has_the_wobble_once_a_turn_beside_the_drive():
 def texts(found):
     figure = motion_figure(found)
     titles = [panel.get_title(loc="left") for panel in figure.axes]
-    return "\n".join([*titles, *(text.get_text() for text in figure.texts)])
+    return "\n".join([*titles, *(text.get_text() for text in figure.texts)]).replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_the_figure_calls_a_change_of_the_energy_an_error_only_where_nothing_changes_it():
