@@ -214,7 +214,7 @@ def _between(x: Array, drag: Array, usual: Array, whiten: Callable[[float], Arra
     slopes = np.column_stack([usual, EXPONENT_U * x * usual])
 
     def fit(part: float) -> tuple[float, float]:
-        """Return χ², and what it is expected to be."""
+        """Return χ², and its expectation."""
         white = whiten(part)
         design = white @ slopes
         left = np.eye(len(x)) - design @ np.linalg.solve(design.T @ design + np.diag([0.0, 1.0]), design.T)
