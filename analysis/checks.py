@@ -1,4 +1,4 @@
-"""Checks of columns that a caller gives: the first value that cannot be is named."""
+"""Checks of columns that a caller gives: the error names the first value that is wrong."""
 
 import numpy as np
 
@@ -19,7 +19,7 @@ def check_positive(quantity: str, values: Array, unit: str = "Hz") -> None:
 
 
 def check_increasing(times: Array, *, strictly: bool = True) -> None:
-    """Raise TimesNotIncreasing where a time [s], of shape (n,), lies before the last one or, if strictly, at it."""
+    """Raise TimesNotIncreasing where a time [s], of shape (n,), is before the time above it or, if strictly, at it."""
     apart = np.diff(times)
     if (wrong := np.flatnonzero(apart <= 0 if strictly else apart < 0)).size:
         i = int(wrong[0])

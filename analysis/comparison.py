@@ -129,4 +129,5 @@ def u_of_between(x: NDArray[np.float64], u: NDArray[np.float64]) -> float:
         return float(np.sqrt(np.mean(u**2) * (freedom / chdtri(freedom, ndtr(1.0)) - 1)))
     less = min(1.0, weighted_mean(x, u)[2] / freedom) if u.all() else 1.0
     ends = (scatter_between(x, u, less * float(chdtri(freedom, ndtr(side)))) for side in (-1.0, 1.0))
-    return max(abs(end - scatter_between(x, u)) for end in ends)
+    tau = scatter_between(x, u)
+    return max(abs(end - tau) for end in ends)

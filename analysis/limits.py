@@ -250,8 +250,8 @@ def combine(runs: Sequence[Sample]) -> Statistics:
     means = origin + np.array([(one - origin).mean() for one in limits])
     square = sum((one.size - 1) * _scatter(one) ** 2 for one in limits if one.size > 1) / within
     own = np.maximum(square / numbers, [run.least for run in runs])
-    differ = Estimate(tau := scatter_between(means, np.sqrt(own)), u_of_between(means, np.sqrt(own)), "Hz")
-    between = tau**2
+    differ = scatter_between(means, np.sqrt(own))
+    between = differ**2
     weights = _weights(own + between)
     mean = float(weights @ means)
     by_scatter = float(weights**2 @ (own + between))
@@ -269,7 +269,7 @@ def combine(runs: Sequence[Sample]) -> Statistics:
         step=step,
         freedom=_freedom(variance, by_scatter, len(runs) - 1 if between > 0 else within),
         runs=len(runs),
-        between=differ,
+        between=Estimate(differ, u_of_between(means, np.sqrt(own)), "Hz"),
         common=common,
     )
 

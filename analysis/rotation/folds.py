@@ -98,9 +98,10 @@ def evidence_of(record: Record, fit: LineFit, images: list[Image], rate: float) 
     """
     fits = [fit, *(fit_line(record, one.of(fit.frequency, rate), one.sign * fit.chirp) for one in images[1:])]
     log = np.array([one.likelihood for one in fits])
-    even_slopes = [fit_line(record, one.frequency, one.chirp, drags=False) if one.chirp < 0 else one for one in fits]
-    ramped = np.array([one.likelihood for one in even_slopes])
-    times = _even_times(record) if len(fits) > 1 else None
+    several = len(fits) > 1
+    driven = [fit_line(record, f.frequency, f.chirp, drags=False) if several and f.chirp < 0 else f for f in fits]
+    ramped = np.array([one.likelihood for one in driven])
+    times = _even_times(record) if several else None
     even = -math.inf
     if times is not None:
         even = fit_line(record.at(times + record.middle), fit.frequency, fit.chirp).likelihood

@@ -406,45 +406,37 @@ MOST_COUNTS = 12
 MOST_FALLS = 8
 
 
-_SUBJECT, _HEADING = "spin-down", "Spin-down of a levitated top"
-
-
 def spindown_part(analysis: SpinDownAnalysis) -> ReportPart:
     """Return verdict, laws, their meaning, how well they fit, the constants run by run, and the readings."""
     combined = analysis.combined
     n = combined.fit(combined.best).statistics.n
-    lead = Text("{readings} used", readings=how_many(n, "reading"))
+    points = _points(analysis)
+    part = ReportPart(
+        subject="spin-down",
+        heading="Spin-down of a levitated top",
+        lead=Text("{readings} used", readings=how_many(n, "reading")),
+        result=(),
+        figure=FigureText("Spin-down.", "The readings as they were read.", points),
+        inputs=input_parts(analysis, _in_words, lambda *_: (), lambda _: UNIT_FIRST),
+    )
     if analysis.is_doubtful:
-        return ReportPart(
-            subject=_SUBJECT,
-            heading=_HEADING,
-            lead=lead,
-            result=(),
-            figure=FigureText("Spin-down.", "The readings as they were read.", _points(analysis)),
-            inputs=input_parts(analysis, _in_words, lambda *_: (), lambda _: UNIT_FIRST),
-        )
-    return ReportPart(
-        subject=_SUBJECT,
-        heading=_HEADING,
-        lead=lead,
-        result=(
-            Paragraph(Sentences(*meaning(analysis)), "What it means."),
-            *_falls(analysis),
-            *_laws(analysis),
-        ),
+        return part
+    return replace(
+        part,
+        result=(Paragraph(Sentences(*meaning(analysis)), "What it means."), *_falls(analysis), *_laws(analysis)),
         figure=FigureText(
             title="Spin-down.",
             caption=(
                 "The readings with all drag laws; what each law leaves over, which is noise about zero where the law "
                 "holds; and the lines that one draws on paper, straight where their law holds and no tilt bends them."
             ),
-            points=_points(analysis),
+            points=points,
         ),
         values=(Tabular("spindown-laws", _constants_table(analysis, short=True), VALUE_U),),
         short_figure=FigureText(
             title="Spin-down.",
             caption="The readings with the law that is nearest to them; below, readings and all laws less that law.",
-            points=_points(analysis),
+            points=points,
         ),
         compared=(_comparison(analysis), *_count(analysis)),
         runs_title="Run by run",

@@ -82,7 +82,9 @@ _ROWS = {GOOD: "best", LOOK: "", REPEAT: "outlier"}
 _FROM_CLASS, _TRUTH, _FROM_TRUTH = "from the others [u]", "truth", "from the truth [u]"
 
 
-def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str, others: str = "") -> Document:
+def class_document(
+    classes: Sequence[Class], paths: Sequence[Path], name: str, others: str = "", unread: Iterable[str] = ()
+) -> Document:
     """Return the document of a class.
 
     Args:
@@ -90,10 +92,10 @@ def class_document(classes: Sequence[Class], paths: Sequence[Path], name: str, o
         paths: as they were typed.
         name: of the document's file.
         others: about files that hold no readings.
+        unread: groups of inputs that could not be used.
     """
     sources = list({source.path.resolve(): source for of in classes for source in of.found.sources}.values())
     alone = len(classes) == 1
-    unread = {name.partition(", ")[0] for of in classes for name in of.unread}  # their groups
     warnings = dict.fromkeys(plain_text(text) for text in (*_notes_of(classes), others) if text)
     notes = [Section("Notes", (Warnings(tuple((text,) for text in warnings)),), anchor="notes")] if warnings else []
     chapters: list[Block] = []
@@ -400,7 +402,8 @@ def write_class(
     classes[0] = replace(classes[0], unread=of_inputs)
     date = newest_of(results)
     if form:
-        document = (heading or Heading()).above(class_document(classes, paths, output.name, others))
+        groups = [folder_of(path) or path.name for path in unread]
+        document = (heading or Heading()).above(class_document(classes, paths, output.name, others, groups))
         content = form.content(in_language_of_reader(replace(document, date=date, language=spoken())))
     else:
         content = class_workbook(classes, date)
