@@ -161,7 +161,10 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, aside: Array, 
     columns = chebvander(late, orders[-1])
     basis, swing = columns[:, :count], (sways * columns[:, _FREE:])[:, :swings]
     widths = np.hypot(falls, _DRIVES[:, None] * drives)[:, : count - _FREE]
-    nuisance = np.concatenate([_nuisance(turns, start * (rows - rows.mean()), aside), swing], axis=1)
+    late_rows, sight = _LINE_TIME * start * (rows - rows.mean()), _NEARNESS_U * aside / (2 * np.pi)
+    nuisance = np.column_stack([late_rows, sight, swing])
+    first = _fit(basis, turns, u, nuisance, widths)[0][:count]
+    nuisance = np.column_stack([nuisance, _waves(basis @ first)])
     slope, bend = (chebval(0.0, chebder(np.eye(count), n)) / half**n for n in (1, 2))
     chirp = float(bend @ _fit(basis, turns, u, nuisance, widths)[0][:count])
     slower = chirp * min(chirp / start, 0.0)  # of the slope, a second; that of an even drive stays
@@ -190,15 +193,14 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, aside: Array, 
     )
 
 
-def _nuisance(turns: Array, late: Array, aside: Array) -> Array:
-    """Return further terms of a phase, in standard deviations of the priors, shape (n, p) [turns].
+def _waves(turns: Array) -> Array:
+    """Return harmonics of the angle of smooth turns, in standard deviations of their priors, shape (n, 4) [turns].
 
-    Rows that are read one after another; the line of sight; and harmonics of the angle, from a mark that does not turn
-    about the middle of the rim and a camera that looks from the side.
+    They are of a mark that does not turn about the middle of the rim, and of a camera that looks from the side.  Waves
+    of turns with their noise would explain the noise where two turns take a whole number of pictures.
     """
-    waves = [part(2 * np.pi * m * turns) for m in range(1, _HARMONICS + 1) for part in (np.cos, np.sin)]
-    sight = _NEARNESS_U * aside / (2 * np.pi)
-    return np.stack([_LINE_TIME * late, sight, *(_HARMONIC * wave for wave in waves)], axis=1)
+    angles = 2 * np.pi * np.arange(1, _HARMONICS + 1) * turns[:, None]
+    return _HARMONIC * np.concatenate([np.cos(angles), np.sin(angles)], axis=1)
 
 
 def _follow(times: Array, phase: Array, turns: Array, frequency: float, start: float) -> None:

@@ -81,6 +81,18 @@ def test_u_of_a_driven_top_holds_its_swing(length, turns, spin, most, most_u):
     assert np.sqrt(np.mean(((found.spin - spin(found.time)) / found.u) ** 2)) < (1.6 if most == 4 else 5)
 
 
+@pytest.mark.parametrize(("spin", "size"), [(30.0, 0.02), (29.99, 0.02), (29.99, 0.0)])
+def test_the_swing_of_a_spin_of_half_an_even_rate_is_not_taken_for_a_harmonic(spin, size):
+    times, random, pulls = np.arange(0, 20, 1 / 60), np.random.default_rng(24), []
+    none, rate = 0 * times, 2 * np.pi * 0.1
+    for start in np.arange(8.0):
+        turns = spin * times - size / rate * np.cos(rate * times + start) + random.normal(0, NOISE, times.size)
+        found = turning_of(times, turns % 1, none + NOISE, none, none, start=spin)
+        pulls.append((found.frequency - spin - size * np.sin(rate * found.middle + start)) / found.u_frequency)
+        assert found.u_frequency < 1e-3
+    assert np.sqrt(np.mean(np.square(pulls))) < 2.1  # 4 standard errors of 8; 20 if noise is in the harmonics
+
+
 def test_u_of_a_free_top_falls_with_the_length_without_a_step():
     u, random = [], np.random.default_rng(21)
     for length, rate in ((1.99, 240), (2.01, 240), (20, 60)):
