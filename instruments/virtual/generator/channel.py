@@ -18,12 +18,13 @@ from numpy.typing import NDArray
 
 from instruments.virtual.core.parameters import limit, number
 from instruments.virtual.core.parser import ScpiError, Value
-from instruments.virtual.generator.arbitrary import Memory, built_in_waveforms
+from instruments.virtual.generator.arbitrary import exponential_rise
 
 #: The generator's own resistance [Ω], its greatest voltage without a load [V], and SCPI's infinity.
 SOURCE_OHM, OPEN_V, INFINITE = 50.0, 10.0, 9.9e37
 #: The sources of triggers that need nothing from outside.
 _BY_ITSELF = {"IMM", "TIM", "INT"}
+_ARBITRARY = {"ARB", "USER"}
 _WORDS = {"MIN", "MINIMUM", "MAX", "MAXIMUM", "DEF", "DEFAULT"}
 
 
@@ -75,15 +76,12 @@ class Family:
     Attributes:
         waveforms: that it can make.
         square: the limits of the duty cycle of a square wave [%] at a frequency [Hz].
-        arb: the word for arbitrary waveforms.
-        library: names of the arbitrary waveforms that it is made with.
         least_vpp: smallest amplitude into 50 Ω [V].
         shortest_pulse: width of it [s].
         shortest_edge: of a pulse [s].
         longest_burst: period of bursts, at most [s].
         burst_rest: the pause between two bursts, at least [s].
-        points: fewest and most samples of an arbitrary waveform.
-        room: samples in the memory for them.
+        first_arb: name of the arbitrary waveform after ``*RST``, where it has such waveforms.
         edge_part: an edge is no longer than this part of the shorter half of a pulse.
         latency: from an edge at the trigger input to the start of a burst [s]; the data sheets' order.
         trigger_jitter: its scatter, 1σ [s].
@@ -91,15 +89,12 @@ class Family:
 
     waveforms: tuple[Waveform, ...]
     square: Callable[[float], tuple[float, float]]
-    arb: str
-    library: tuple[str, ...]
     least_vpp: float
     shortest_pulse: float
     shortest_edge: float
     longest_burst: float
     burst_rest: float
-    points: tuple[int, int]
-    room: int
+    first_arb: str = ""
     edge_part: float = 0.625
     latency: float = 500e-9
     trigger_jitter: float = 6e-9
@@ -208,8 +203,7 @@ class Channel:
         self.family, self.index = family, index
         self._settings, self._report = settings, report
         self.prefix = f"{index}:"
-        self.memory = Memory(family.room)
-        self.library = {name: values for name, values in built_in_waveforms().items() if name in family.library}
+        self.empty()
         self._now = now
         #: Begin and end of the last triggered burst or sweep [s].
         self.under_way = (-math.inf, -math.inf)
@@ -223,10 +217,6 @@ class Channel:
     def number(self, name: str) -> float:
         """Return a setting that is a number."""
         return float(self[name])
-
-    def on(self, mode: str) -> bool:
-        """Return whether a mode is on; not every family has every mode."""
-        return bool(self._settings.get(self.prefix + mode))
 
     def conflict(self, text: str) -> None:
         """Queue error −221: another setting had to change; the command goes on."""
@@ -268,12 +258,15 @@ class Channel:
         """Samples of the arbitrary waveform that is selected."""
         return int(self.samples.size)
 
+    def empty(self) -> None:
+        """Hold no arbitrary waveform but the one that is there after ``*RST``."""
+        #: By name, −1 to 1, shape (n,) each.
+        self.held = {self.family.first_arb: exponential_rise()}
+
     @property
     def samples(self) -> NDArray[np.float64]:
         """The arbitrary waveform that is selected, −1 to 1, shape (n,)."""
-        name = str(self["arb"])
-        held = self.memory.held.get(name)
-        return self.library[name.rpartition("\\")[2].removesuffix(".ARB")] if held is None else held
+        return self.held[str(self["arb"])]
 
     @property
     def frequency(self) -> float:
@@ -286,10 +279,6 @@ class Channel:
             self["arb_rate"] = value * self.points
         else:
             self["frequency"] = value
-
-    def set_rate(self, value: float) -> None:
-        """Set the samples per second of an arbitrary waveform."""
-        self["arb_rate"] = value
 
     def frequency_limits(self) -> tuple[float, float]:
         """Return the limits of the frequency of the selected waveform [Hz]."""
@@ -311,26 +300,6 @@ class Channel:
     def square_duties(self) -> tuple[float, float]:
         """Return the limits of the duty cycle of a square wave [%]."""
         return self.family.square(self.number("frequency"))
-
-    # --- sweeps: centre and span are start and stop in other words ---
-
-    def sweep_centre(self) -> float:
-        """Return the mean of start and stop [Hz]."""
-        return (self.number("sweep_start") + self.number("sweep_stop")) / 2
-
-    def set_sweep_centre(self, value: float) -> None:
-        """Move start and stop; the span stays, as far as there is room for it [Hz]."""
-        half = min(self.sweep_span() / 2, value - 1e-6)
-        self["sweep_start"], self["sweep_stop"] = value - half, value + half
-
-    def sweep_span(self) -> float:
-        """Return the span from start to stop [Hz]."""
-        return self.number("sweep_stop") - self.number("sweep_start")
-
-    def set_sweep_span(self, value: float) -> None:
-        """Move start and stop; the centre stays [Hz]."""
-        centre = self.sweep_centre()
-        self["sweep_start"], self["sweep_stop"] = max(centre - value / 2, 1e-6), centre + value / 2
 
     # --- voltages, as they are displayed: at the load that OUTPut:LOAD names ---
 
@@ -375,7 +344,7 @@ class Channel:
         return rms * self._crest()
 
     def _crest(self) -> float:
-        if self["waveform"] != self.family.arb:
+        if self["waveform"] not in _ARBITRARY:
             return self.waveform.crest
         return 2.0 / max(float(np.sqrt(np.mean(self.samples**2))), 1e-3)
 
@@ -506,7 +475,7 @@ class Channel:
             symmetry=self.number("symmetry") / 100 if short == "RAMP" else 1.0,
             inverted=inverted,
             burst=self._burst(),
-            samples=self.samples if short == self.family.arb else None,
+            samples=self.samples if short in _ARBITRARY else None,
             triggered=self._triggered() if on and silent else None,
             closes=self.family.latency if on and self["burst"] and self._gate == "INV" else None,
         )

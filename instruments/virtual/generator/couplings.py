@@ -8,7 +8,7 @@ import math
 from instruments.virtual.generator.channel import INFINITE, Channel
 
 #: Modes of which only one can be on.
-MODES = ("burst", "sweep", "am", "fm", "pm", "pwm", "fsk", "bpsk", "sum")
+MODES = ("burst", "sweep")
 
 #: Waveforms as the error queue names them.
 _LONG = {
@@ -32,7 +32,7 @@ def _turn_off_other_modes(channel: Channel, cause: str) -> None:
     if cause not in MODES or not channel[cause]:
         return
     for mode in MODES:
-        if mode != cause and channel.on(mode):
+        if mode != cause and channel[mode]:
             channel[mode] = False
             channel.conflict(f"turned off {mode} by selection of other mode or modulation")
 

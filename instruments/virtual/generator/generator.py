@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 from instruments.clock import Clock
 from instruments.virtual.core.device import VirtualInstrument
-from instruments.virtual.core.parameters import choice, limit, nr3, optional_parameter, parameter, read_quoted
+from instruments.virtual.core.parameters import choice, limit, optional_parameter, parameter, read_quoted
 from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.generator.arbitrary import DeviceError, attribute, plain_name, samples
 from instruments.virtual.generator.channel import INFINITE, Channel, Family, Output, quantity_of
 from instruments.virtual.generator.couplings import MODES, resolve
 
@@ -29,8 +28,6 @@ class VirtualGenerator(VirtualInstrument):
 
     family: Family
     numbered: Sequence[int] = (1,)
-    #: Arbitrary waveforms that can be selected without being loaded first.
-    BUILT_IN: ClassVar[tuple[str, ...]] = ()
 
     def __init__(
         self,
@@ -184,8 +181,7 @@ class VirtualGenerator(VirtualInstrument):
         wanted = dict(zip(("frequency", "amplitude", "offset"), parameters, strict=False))
         with self.all_or_none():
             for mode in MODES:
-                if channel.prefix + mode in self.settings:
-                    channel[mode] = False
+                channel[mode] = False
             source = self.commands.defaults[f"{channel.prefix}trigger_source"]
             channel["trigger_source"], channel["waveform"] = source, waveform
             frequency = channel.read(wanted.get("frequency", "DEF"), *channel.frequency_limits(), 1e3, "HZ")
@@ -204,36 +200,3 @@ class VirtualGenerator(VirtualInstrument):
         shown = channel.from_vpp(channel.number("amplitude_vpp"), str(channel["voltage_unit"]))
         numbers = (self.spell(value) for value in (channel.frequency, shown, channel.number("offset")))
         return f'"{channel["waveform"]} {",".join(numbers)}"'
-
-    # --- arbitrary waveforms ---
-
-    def store(self, n: int, name: str, data: list[str], *, full_scale: float = 1.0) -> None:
-        """Keep a waveform that was sent, as numbers or as a block, in the place of one of this name.
-
-        full_scale: the number that stands for 1, of a converter's codes if it is another one.  Raises ScpiError.
-        """
-        memory = self.channel(n).memory
-        order = "<" if self.settings["byte_order"] == "SWAP" else ">"
-        least, most = self.family.points
-        old = memory.held[name].size if name in memory.held else 0
-        kind = order + ("f4" if full_scale == 1.0 else "i2")
-        room = min(most, memory.free + old)
-        memory.held[name] = samples(data, full_scale=full_scale, block=kind, least=least, most=room)
-
-    def select(self, n: int, parameters: list[str]) -> None:
-        """FUNCtion:ARBitrary, FUNCtion:USER: the waveform of this name.  Raises ScpiError."""
-        channel, name = self.channel(n), plain_name(parameter(parameters))
-        if name not in channel.memory.held and name not in self.BUILT_IN:
-            raise DeviceError(785, "Specified arb waveform does not exist")
-        channel["arb"] = name
-        self.on_change(channel.prefix + "arb")
-
-    def attribute(self, n: int, which: str, parameters: list[str]) -> str:
-        """DATA:ATTRibute: a property of a waveform, by default of the one that is selected.  Raises ScpiError."""
-        channel, asked = self.channel(n), optional_parameter(parameters)
-        name = plain_name(asked) if asked else str(channel["arb"])
-        values = channel.memory.held.get(name, channel.library.get(name, channel.samples if not asked else None))
-        if values is None:
-            raise DeviceError(785, "Specified arb waveform does not exist")
-        value = attribute(values, which)
-        return f"{value:+.0f}" if which == "POIN" else nr3(value)

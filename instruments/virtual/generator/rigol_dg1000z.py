@@ -29,15 +29,11 @@ def _family(sine: float, square: float) -> Family:
             Waveform("DC", sine),
         ),
         square=lambda frequency: (max(0.01, 1.6e-6 * frequency), min(99.99, 100 - 1.6e-6 * frequency)),
-        arb="USER",
-        library=(),
         least_vpp=1e-3,
         shortest_pulse=16e-9,
         shortest_edge=10e-9,
         longest_burst=500.0,
         burst_rest=1e-6,
-        points=(8, 16_384),
-        room=16_384,
     )
 
 

@@ -75,8 +75,6 @@ class Quantity(Number):
 _PULSE = "[SOURce[n]:][FUNCtion:]PULSe:"
 _LEVEL = "[SOURce[n]:]VOLTage[:LEVel][:IMMediate]"
 _TURN = (-360.0, 360.0)
-#: The waveforms that modulate.
-INNER = "SINusoid SQUare TRIangle RAMP NRAMp NOISe PRBS ARB USER"
 
 #: Of each channel of either family; a setting's name begins with the number of its channel.
 CHANNEL: tuple[Row, ...] = (
@@ -147,47 +145,8 @@ CHANNEL: tuple[Row, ...] = (
     Word("[SOURce[n]:]SWEep:SPACing", "{n}:sweep_spacing", "LINear LOGarithmic"),
     Quantity("[SOURce[n]:]FREQuency:STARt", "{n}:sweep_start", 100.0, (1e-6, 30e6), "HZ"),
     Quantity("[SOURce[n]:]FREQuency:STOP", "{n}:sweep_stop", 1e3, (1e-6, 30e6), "HZ"),
-    Quantity(
-        *("[SOURce[n]:]FREQuency:CENTer", "{n}:sweep_start", 550.0, (1e-6, 30e6), "HZ"),
-        get=Channel.sweep_centre,
-        keep=Channel.set_sweep_centre,
-        alias=True,
-    ),
-    Quantity(
-        *("[SOURce[n]:]FREQuency:SPAN", "{n}:sweep_start", 900.0, (-30e6, 30e6), "HZ"),
-        get=Channel.sweep_span,
-        keep=Channel.set_sweep_span,
-        alias=True,
-    ),
-    Quantity("[SOURce[n]:]SWEep:HTIMe", "{n}:sweep_hold", 0.0, (0, 3600), "S"),
-    Quantity("[SOURce[n]:]SWEep:RTIMe", "{n}:sweep_return", 0.0, (0, 3600), "S"),
-    Quantity("[SOURce[n]:]MARKer:FREQuency", "{n}:marker_frequency", 500.0, (1e-6, 30e6), "HZ"),
-    # modulation, of which the model keeps the settings
-    *(
-        row
-        for name, frequency in (("AM", 100.0), ("FM", 10.0), ("PM", 10.0), ("PWM", 10.0))
-        for header, key in ((f"[SOURce[n]:]{name}", f"{{n}}:{name.lower()}"),)
-        for row in (
-            Switch(f"{header}:STATe", key),
-            Word(f"{header}:SOURce", f"{key}_source", "INTernal EXTernal"),
-            Word(f"{header}:INTernal:FUNCtion", f"{key}_function", INNER),
-            Quantity(f"{header}:INTernal:FREQuency", f"{key}_frequency", frequency, (1e-6, 30e6), "HZ"),
-        )
-    ),
-    Quantity("[SOURce[n]:]AM[:DEPTh]", "{n}:am_depth", 100.0, (0, 120), "PCT"),
-    Quantity("[SOURce[n]:]FM[:DEViation]", "{n}:fm_deviation", 100.0, (1e-6, 15e6), "HZ"),
-    Quantity("[SOURce[n]:]PM[:DEViation]", "{n}:pm_deviation", 180.0, (0, 360), "DEG"),
-    Quantity("[SOURce[n]:]PWM[:DEViation]", "{n}:pwm_deviation", 1e-5, (0, 1e6), "S"),
-    Switch("[SOURce[n]:]FSKey:STATe", "{n}:fsk"),
-    Word("[SOURce[n]:]FSKey:SOURce", "{n}:fsk_source", "INTernal EXTernal"),
-    Quantity("[SOURce[n]:]FSKey:FREQuency", "{n}:fsk_frequency", 100.0, (1e-6, 30e6), "HZ"),
-    Quantity("[SOURce[n]:]FSKey:INTernal:RATE", "{n}:fsk_rate", 10.0, (1e-6, 1e6), "HZ"),
-    # a signal in one command, and what a waveform in the memory is like
+    # a signal in one command
     Ask("[SOURce[n]:]APPLy", lambda s, n: s.ask_apply(n)),
-    Both("[SOURce[n]:]DATA:ATTRibute:AVERage", None, lambda s, n, p: s.attribute(n, "AVER", p)),
-    Both("[SOURce[n]:]DATA:ATTRibute:CFACtor", None, lambda s, n, p: s.attribute(n, "CFAC", p)),
-    Both("[SOURce[n]:]DATA:ATTRibute:POINts", None, lambda s, n, p: s.attribute(n, "POIN", p)),
-    Both("[SOURce[n]:]DATA:ATTRibute:PTPeak", None, lambda s, n, p: s.attribute(n, "PTP", p)),
 )
 
 #: Of the whole instrument, of either family.

@@ -24,8 +24,8 @@ NO_SETTING = ("*OPC", "CONFigure", "MEASure", "DISPlay:DATA", "C1:(BSWV", "C2:(B
 KEPT = {Virtual53230A: {"timeout"}, VirtualSDS1000XE: {"header"}, VirtualSDG1000X: {"header"}}
 KEPT |= {VirtualTDS2000: {"header", "verbose"}}
 MASKS = ("*ESE", "*SRE")
-#: Numbers that the instrument moves to the nearest that it can do, by twin; a sweep begins above 0 Hz.
-ADJUSTED = {VirtualDSOX1000: r"CHANnel\d:OFFSet", VirtualGenerator: r".*FREQuency:SPAN"}
+#: Numbers that the instrument moves to the nearest that it can do, by twin.
+ADJUSTED = {VirtualDSOX1000: r"CHANnel\d:OFFSet"}
 #: Two long forms have this short form.
 ONE_SHORT_FORM = {"OPER:COND"}
 #: Levels that follow the light, where they are automatic.
