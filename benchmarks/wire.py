@@ -35,7 +35,7 @@ import pyvisa
 
 from instruments.clock import VirtualClock
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.generator.keysight_33500b import Virtual33500B
@@ -132,8 +132,8 @@ def in_process(rounds: int, duration: float) -> dict[str, Any]:
         links: dict[str, Any] = {
             "PyVISA on @levilab": opened(ADDRESS, ours).query,
             "PyVISA on @sim": opened(ADDRESS, simulated).query,
-            "our transport on @levilab": VisaTransport(ADDRESS, library=ours).query,
-            "our transport on @sim": VisaTransport(ADDRESS, library=simulated).query,
+            "our transport on @levilab": open_link(ADDRESS, library=ours).query,
+            "our transport on @sim": open_link(ADDRESS, library=simulated).query,
         }
         found = {}
         for question in ("*IDN?", "FREQ?"):
@@ -218,7 +218,7 @@ def over_loopback(rounds: int, duration: float) -> dict[str, Any]:
         }
         for way, name in resources.items():
             links[f"PyVISA, {way}"] = opened(name, "@py")
-            links[f"our transport, {way}"] = VisaTransport(name, library="@py")
+            links[f"our transport, {way}"] = open_link(name, library="@py")
         asking: Contenders = {name: partial(link.query, "FREQ?") for name, link in links.items()}
         found = measured(asking, rounds=rounds, duration=duration)
         for link in links.values():
@@ -278,13 +278,13 @@ def fetch(parent: Connection, way: str, traced: bool) -> None:  # noqa: FBT001 -
     with ExitStack() as opened_:
         if way == "in process":
             bus, light = scope_bench()
-            scope = RigolDS1000Z(VisaTransport(ADDRESS, library=library_for(bus)), clock=bus.instruments[ADDRESS].clock)
+            scope = RigolDS1000Z(open_link(ADDRESS, library=library_for(bus)), clock=bus.instruments[ADDRESS].clock)
 
             def physics() -> float:
                 return light.seconds
         else:
             server = opened_.enter_context(in_another_process(serve_scope))
-            scope = RigolDS1000Z(VisaTransport(server.recv(), library="@py"), clock=VirtualClock())
+            scope = RigolDS1000Z(open_link(server.recv(), library="@py"), clock=VirtualClock())
 
             def physics() -> float:
                 server.send("light")

@@ -4,12 +4,12 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
-from instruments.clock import Clock
+from instruments.clock import Clock, WallClock
 from instruments.links.http import HttpTransport
-from instruments.links.serial_port import SerialTransport
+from instruments.links.serial_port import SerialPort
 from instruments.links.sound import SoundLink
-from instruments.links.transport import TrafficLog, Transport
-from instruments.links.visa import VisaTransport
+from instruments.links.transport import MessageLink, Port, TrafficLog, Transport
+from instruments.links.visa import VisaPort
 
 #: Scheme of an address → the link to it, with the arguments of `open_link` but for `line`.
 LINKS: dict[str, Callable[..., Transport]] = {
@@ -26,7 +26,7 @@ LINKS: dict[str, Callable[..., Transport]] = {
 def open_link(
     address: str,
     *,
-    line: Mapping[str, Any],
+    line: Mapping[str, Any] | None = None,
     library: Any = "@py",
     timeout: float = 2.0,
     clock: Clock | None = None,
@@ -37,20 +37,25 @@ def open_link(
     Args:
         address: a port (``COM3``), a URL (``phyphox://host:8080``, ``socket://host:port``) or the name of a VISA
             resource.
-        line: settings of a serial line, and the pause that the instrument needs between messages.
-        library: PyVISA's, by its name or itself.
+        line: settings of a serial line (baud_rate, data_bits, parity, stop_bits), and the pause that the instrument
+            needs between messages.
+        library: PyVISA's, by its name or itself; ``"@py"`` needs nothing installed, ``""`` is the vendor's.
         timeout: of one answer [s].
         clock: for the pauses between messages; by default the wall clock.
         log: called with all bytes.
 
     Raises:
         NotConnected: nothing could be opened there.
+        Occupied: another program has it.
+        OutOfRange: a serial line cannot be set so.
     """
     if link := LINKS.get(address.partition("://")[0].lower()):
         return link(address, library=library, timeout=timeout, clock=clock, log=log)
-    options = dict(line)
-    serial_name = address.upper().startswith("ASRL") and library == "@py"
-    if "::" not in address or serial_name:
-        return SerialTransport(address, timeout=timeout, clock=clock, log=log, **options)
+    options = dict(line or {})
     pause = options.pop("pause", 0.0)
-    return VisaTransport(address, library=library, timeout=timeout, line=options, pause=pause, clock=clock, log=log)
+    port: Port
+    if "::" not in address or (address.upper().startswith("ASRL") and library == "@py"):
+        port = SerialPort(address, timeout=timeout, clock=clock or WallClock(), **options)
+    else:
+        port = VisaPort(address, library, options)
+    return MessageLink(port, address, timeout=timeout, pause=pause, clock=clock, log=log)

@@ -5,14 +5,13 @@ import errno
 import re
 import socket
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from instruments.clock import Clock, WallClock
+from instruments.clock import Clock
 from instruments.errors import NoAnswer, NotConnected, Occupied, OutOfRange, SilentLine
 from instruments.links.advice import one_line
-from instruments.links.transport import LONGEST_ANSWER, Failure, MessageLink, Resynchronising, TrafficLog
+from instruments.links.transport import LONGEST_ANSWER, Failure, Resynchronising
 
 #: pyserial's letters for the words of bench.toml.
 PARITIES = {"none": "N", "odd": "O", "even": "E", "mark": "M", "space": "S"}
@@ -21,55 +20,6 @@ PARITIES = {"none": "N", "odd": "O", "even": "E", "mark": "M", "space": "S"}
 _CHUNK = 4096
 
 _IN_USE = {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}
-
-
-class SerialTransport(MessageLink):
-    """An instrument at a serial port."""
-
-    def __init__(
-        self,
-        address: str,
-        *,
-        baud_rate: int = 9600,
-        data_bits: int = 8,
-        parity: str = "none",
-        stop_bits: float = 1,
-        timeout: float = 2.0,
-        pause: float = 0.0,
-        clock: Clock | None = None,
-        log: TrafficLog | None = None,
-    ) -> None:
-        """Open the port.
-
-        Args:
-            address: a port (``COM3``, ``/dev/ttyUSB0``), the same as a VISA resource (``ASRLCOM3::INSTR``,
-                ``ASRL3::INSTR`` for the third port), or a URL of pyserial's (``socket://host:port``).
-            baud_rate: of the line [bit/s].
-            data_bits: 5 to 8.
-            parity: none, odd, even, mark or space.
-            stop_bits: 1, 1.5 or 2.
-            timeout: of one answer [s].
-            pause: after each message and each answer, before the next message [s].
-            clock: for the pause; by default the wall clock.
-            log: called with all bytes.
-
-        Raises:
-            NotConnected: the port cannot be opened.
-            Occupied: another program has it.
-            OutOfRange: no such parity.
-        """
-        if parity not in PARITIES:
-            raise OutOfRange(address, "parity", parity, "one of " + ", ".join(PARITIES))
-        options = {
-            "baudrate": baud_rate,
-            "bytesize": data_bits,
-            "parity": PARITIES[parity],
-            "stopbits": stop_bits,
-            "timeout": timeout,
-            "write_timeout": timeout,
-        }
-        port = SerialPort(address, options, clock or WallClock())
-        super().__init__(port, address, timeout=timeout, pause=pause, clock=clock, log=log)
 
 
 class SerialPort:
@@ -84,10 +34,45 @@ class SerialPort:
     text = "plain text (wrong baud rate or parity?)"
     silence: type[NoAnswer] = SilentLine
 
-    def __init__(self, address: str, options: Mapping[str, Any], clock: Clock) -> None:
+    def __init__(
+        self,
+        address: str,
+        *,
+        timeout: float,
+        clock: Clock,
+        baud_rate: int = 9600,
+        data_bits: int = 8,
+        parity: str = "none",
+        stop_bits: float = 1,
+    ) -> None:
+        """Take an address.
+
+        Args:
+            address: a port (``COM3``, ``/dev/ttyUSB0``), the same as a VISA resource (``ASRLCOM3::INSTR``,
+                ``ASRL3::INSTR`` for the third port), or a URL of pyserial's (``socket://host:port``).
+            timeout: of one answer [s].
+            clock: of the bench.
+            baud_rate: of the line [bit/s].
+            data_bits: 5 to 8.
+            parity: none, odd, even, mark or space.
+            stop_bits: 1, 1.5 or 2.
+
+        Raises:
+            OutOfRange: no such parity.
+        """
+        if parity not in PARITIES:
+            raise OutOfRange(address, "parity", parity, "one of " + ", ".join(PARITIES))
         self.device: Any = None
         self.received = bytearray()
-        self._address, self._options, self._clock = address, options, clock
+        self._address, self._clock = address, clock
+        self._options: dict[str, Any] = {
+            "baudrate": baud_rate,
+            "bytesize": data_bits,
+            "parity": PARITIES[parity],
+            "stopbits": stop_bits,
+            "timeout": timeout,
+            "write_timeout": timeout,
+        }
 
     def open(self) -> None:
         """See :class:`instruments.links.transport.Port`."""

@@ -12,15 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 from instruments.errors import NoAnswer, NotConnected, Occupied, SilentLine
 from instruments.links.advice import advice, one_line
-from instruments.links.transport import LONGEST_ANSWER, Failure, MessageLink, Resynchronising, TrafficLog
+from instruments.links.transport import LONGEST_ANSWER, Failure, Resynchronising
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from pyvisa.highlevel import VisaLibraryBase
-
-    from instruments.clock import Clock
-
 
 #: How the names of bare TCP connections end, and those of serial lines begin.
 _BARE_SOCKET, _LINE = "::SOCKET", "ASRL"
@@ -33,44 +30,16 @@ _HELD_BY_ANOTHER = {-1073807345, -1073807246}
 _HAS_NO_LOCKS = {-1073807257, -1073807231}
 
 
-class VisaTransport(MessageLink):
-    """A message-based VISA resource: GPIB, USB, TCP socket, VXI-11, HiSLIP, serial, or a virtual one."""
-
-    def __init__(
-        self,
-        address: str,
-        *,
-        library: str | VisaLibraryBase = "@py",
-        timeout: float = 2.0,
-        line: Mapping[str, Any] | None = None,
-        pause: float = 0.0,
-        clock: Clock | None = None,
-        log: TrafficLog | None = None,
-    ) -> None:
-        """Open the resource.
-
-        Args:
-            address: a VISA resource name.
-            library: a PyVISA library; ``"@py"`` needs nothing installed, ``""`` is the vendor's.
-            timeout: of one answer [s].
-            line: settings of a serial resource: ``baud_rate``, ``data_bits``, ``parity`` (none, odd, …), ``stop_bits``.
-            pause: after each message and each answer, before the next message [s].
-            clock: for the pause; by default the wall clock.
-            log: called with all bytes.
-
-        Raises:
-            NotConnected: the resource cannot be opened.
-        """
-        port = VisaPort(address, library, line or {})
-        super().__init__(port, address, timeout=timeout, pause=pause, clock=clock, log=log)
-
-
 class VisaPort:
-    """A PyVISA resource; see :class:`instruments.links.transport.Port`.  resource: PyVISA's own, once it is open."""
+    """A message-based VISA resource: GPIB, USB, TCP socket, VXI-11, HiSLIP, serial, or a virtual one.
+
+    See :class:`instruments.links.transport.Port`.  resource: PyVISA's own, once it is open.
+    """
 
     text = "plain text"
 
     def __init__(self, address: str, library: str | VisaLibraryBase, line: Mapping[str, Any]) -> None:
+        """Take a resource name; line: settings of a serial resource, baud_rate, data_bits, parity, stop_bits."""
         self.resource: Any = None
         self.silence: type[NoAnswer] = NoAnswer
         self.resynchronising = Resynchronising.DEVICE_CLEAR

@@ -11,7 +11,7 @@ import pytest
 from instruments.catalogue import CATALOGUE
 from instruments.errors import OutOfRange
 from instruments.ieee488 import identity_fields
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from levilab.bench.bench import open_bench
@@ -32,7 +32,7 @@ class Opened:
         self.twin = hostile.instrument(name, self.room)
         address = "ASRLbox::INSTR" if ROWS[name].driver.SERIAL else "TCPIP0::box::inst0::INSTR"
         line = {key: value for key, value in ROWS[name].driver.SERIAL.items() if key != "pause"}
-        transport = VisaTransport(address, library=library_for(VirtualBench({address: self.twin})), line=line)
+        transport = open_link(address, library=library_for(VirtualBench({address: self.twin})), line=line)
         self.driver = ROWS[name].driver(transport, clock=self.room.clock)
 
 

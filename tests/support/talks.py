@@ -7,7 +7,7 @@ import dataclasses
 
 import pytest
 
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from support.conversation import conversation
@@ -40,4 +40,4 @@ def talk(driver, lines, act, end):
 
 def connected(driver, device, address="TCPIP0::instrument::inst0::INSTR", **options):
     """A driver at a virtual instrument; a clock that it wants is the instrument's."""
-    return driver(VisaTransport(address, library=library_for(VirtualBench({address: device}))), **options)
+    return driver(open_link(address, library=library_for(VirtualBench({address: device}))), **options)

@@ -23,8 +23,9 @@ from instruments.drivers.oscilloscope.tektronix_tds2000 import TektronixTDS2000
 from instruments.drivers.scpi import ScpiInstrument
 from instruments.errors import CommandRefused, InstrumentError, NotConnected
 from instruments.ieee488 import PLAIN_BLOCK, BlockForm, block_of
-from instruments.links.serial_port import SerialTransport
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
+from instruments.links.transport import MessageLink
+from instruments.links.visa import VisaPort
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.bench.visa_library import library_for
@@ -335,7 +336,7 @@ SEVEN_BITS = ("line", "levilab")
 _bench_numbers = itertools.count()
 
 
-class _Hasty(VisaTransport):
+class _Hasty(MessageLink):
     """The bench's clock jumps to each answer: a measurement takes no longer than any answer."""
 
     def query(self, message, *, patience=0.0):
@@ -388,7 +389,7 @@ class Pair:
         self.bench, transport = self._within(device) if way in WITHIN else self._proxied(device)
         clock = {"clock": self.room.clock} if name in SCOPES else {}
         side = VirtualBench({NETWORK: device}, lock=self.bench.lock)
-        self.side = self.kind.driver(VisaTransport(NETWORK, library=library_for(side)), **clock)
+        self.side = self.kind.driver(open_link(NETWORK, library=library_for(side)), **clock)
         self.driver = self.kind.driver(transport, **clock)
         self._opened.callback(self.side.close)
         self._opened.callback(self.driver.close)
@@ -410,8 +411,8 @@ class Pair:
             name = f"wire{next(_bench_numbers)}"
             benches[name] = lambda: bench
             self._opened.callback(benches.pop, name)
-            return bench, SerialTransport(f"levilab://box?bench={name}", **line)
-        return bench, VisaTransport(address, library=library_for(bench), line=line)
+            return bench, open_link(f"levilab://box?bench={name}", line=line)
+        return bench, open_link(address, library=library_for(bench), line=line)
 
     def _proxied(self, device):
         self.tap = Tapped(device, self.wire.heard)
@@ -421,7 +422,7 @@ class Pair:
         port = int(re.findall(r"(?<=[:,])\d+", offer)[-1])
         proxy = self._opened.enter_context(Proxy(port, self.wire, self.way))
         near = offer.replace(str(port), str(proxy.port))
-        return bench, _Hasty(near, library="@py", timeout=AT_MOST)
+        return bench, _Hasty(VisaPort(near, "@py", {}), near, timeout=AT_MOST)
 
     # --- what the far end knows ---
 

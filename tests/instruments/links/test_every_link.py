@@ -8,8 +8,7 @@ import serial
 
 from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected
-from instruments.links.serial_port import SerialTransport
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.bench.visa_library import library_for
@@ -37,9 +36,7 @@ def link(request, clock, monkeypatch):
         serial, "protocol_handler_packages", [*serial.protocol_handler_packages, "instruments.virtual.bench"]
     )
     monkeypatch.setitem(benches, "", lambda: bench)
-    with contextlib.closing(
-        SerialTransport(port) if port else VisaTransport(address, library=library_for(bench))
-    ) as link:
+    with contextlib.closing(open_link(port) if port else open_link(address, library=library_for(bench))) as link:
         yield link
 
 

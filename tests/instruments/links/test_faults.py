@@ -6,7 +6,7 @@ from instruments.clock import VirtualClock
 from instruments.drivers.scpi import ScpiInstrument, parse_reading
 from instruments.drivers.setting import Setting
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, NotConnected
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import FAULTS, LATE, Fault
 from instruments.virtual.bench.visa_library import library_for
@@ -50,7 +50,7 @@ class Box(ScpiInstrument):
 def box(request):
     clock = VirtualClock()
     bench = VirtualBench({request.param: VirtualBox(clock)})
-    box = Box(VisaTransport(request.param, library=library_for(bench)))
+    box = Box(open_link(request.param, library=library_for(bench)))
     box.bench, box.clock = bench, clock
     return box
 
@@ -165,7 +165,7 @@ def test_an_error_that_stood_in_the_queue_is_raised_with_a_reading(box):
 
 
 def test_a_lock_keeps_another_program_out_and_is_gone_with_its_link(box):
-    other = Box(VisaTransport(box.transport.address, library=library_for(box.bench)))
+    other = Box(open_link(box.transport.address, library=library_for(box.bench)))
     other.transport.lock()
     for act in (box.transport.lock, box.reading):
         with pytest.raises(NotConnected, match=r"locked|another program"):

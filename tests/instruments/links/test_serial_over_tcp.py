@@ -6,13 +6,13 @@ import struct
 import pytest
 
 from instruments.errors import NotConnected
-from instruments.links.serial_port import SerialTransport
+from instruments.links.opening import open_link
 
 
 @pytest.fixture
 def converter():
     with socket.create_server(("127.0.0.1", 0)) as server:
-        transport = SerialTransport(f"socket://127.0.0.1:{server.getsockname()[1]}")
+        transport = open_link(f"socket://127.0.0.1:{server.getsockname()[1]}")
         far_end, _ = server.accept()
         with far_end:
             yield transport, far_end
@@ -26,7 +26,7 @@ def test_a_message_behind_one_without_an_answer_is_sent_at_once(converter):
 
 def test_a_converter_that_hung_up_is_called_again(monkeypatch):
     with socket.create_server(("127.0.0.1", 0)) as server:
-        transport = SerialTransport(f"socket://127.0.0.1:{server.getsockname()[1]}")
+        transport = open_link(f"socket://127.0.0.1:{server.getsockname()[1]}")
         first, _ = server.accept()
         first.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         first.close()

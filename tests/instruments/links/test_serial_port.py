@@ -18,7 +18,8 @@ from hypothesis import strategies as st
 from instruments.clock import VirtualClock
 from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied, OutOfRange
-from instruments.links.serial_port import SerialTransport, port_name
+from instruments.links.opening import open_link
+from instruments.links.serial_port import port_name
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.core.line import LineSettings, receive
@@ -57,7 +58,7 @@ def bench(clock, monkeypatch):
 
 
 def test_a_port_that_another_program_has_taken_is_occupied(bench):
-    with contextlib.closing(SerialTransport(SLOW)) as transport:
+    with contextlib.closing(open_link(SLOW)) as transport:
         next(iter(bench._client_locks.values())).holders[:] = ["another program"]
         with pytest.raises(Occupied):
             transport.query("*IDN?")
@@ -76,7 +77,7 @@ def test_a_port_that_another_program_has_taken_is_occupied(bench):
     ],
 )
 def test_wrong_settings_raise_each_time_with_a_hint(bench, wrong, error):
-    with contextlib.closing(SerialTransport(METER, **(LINE | wrong))) as transport:
+    with contextlib.closing(open_link(METER, line=LINE | wrong)) as transport:
         for _ in range(2):
             with pytest.raises(error, match="parity"):
                 transport.query("*IDN?")
@@ -84,14 +85,14 @@ def test_wrong_settings_raise_each_time_with_a_hint(bench, wrong, error):
 
 def test_a_parity_that_does_not_exist_is_refused():
     with pytest.raises(OutOfRange) as refused:
-        SerialTransport(METER, parity="Odd")
+        open_link(METER, line={"parity": "Odd"})
     assert (refused.value.name, refused.value.value) == ("parity", "Odd")
 
 
 @pytest.mark.parametrize("wrong", [{"data_bits": 9}, {"stop_bits": 3}, {"baud_rate": -1}])
 def test_settings_that_no_port_has_raise(bench, wrong):
     with pytest.raises(NotConnected, match="cannot be opened"):
-        SerialTransport(METER, **(LINE | wrong))
+        open_link(METER, line=LINE | wrong)
 
 
 LINES = st.builds(
@@ -172,7 +173,7 @@ PIECES = st.lists(
 def test_whatever_is_heard_is_text_or_a_block_or_an_error(pieces):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(serial, "serial_for_url", lambda *_, **__: Port(pieces))
-        transport = SerialTransport("COM1", timeout=1.0)
+        transport = open_link("COM1", timeout=1.0)
         for _ in range(3):
             with contextlib.suppress(InstrumentError):
                 answer = transport.query("UNIT?")
@@ -233,7 +234,7 @@ def test_the_error_of_a_port_that_does_not_open_has_advice(monkeypatch, platform
     failing(monkeypatch, error)
     monkeypatch.setattr(sys, "platform", platform)
     with pytest.raises(expected, match=words) as missing:
-        SerialTransport("/dev/ttyUSB7")
+        open_link("/dev/ttyUSB7")
     assert missing.value.address == "/dev/ttyUSB7"
     assert "\n" not in str(missing.value)
 
@@ -248,20 +249,20 @@ def test_the_error_of_a_forbidden_port_names_its_group(monkeypatch, tmp_path):
     failing(monkeypatch, serial.SerialException(errno.EACCES, "denied"))
     monkeypatch.setattr(sys, "platform", "linux")
     with pytest.raises(NotConnected, match=f"usermod -aG {group}"):
-        SerialTransport(str(port))
+        open_link(str(port))
 
 
 def test_a_locked_port_is_occupied_until_it_is_given_back(bench):
-    first, second = SerialTransport(SLOW), SerialTransport(SLOW)
+    first, second = open_link(SLOW), open_link(SLOW)
     first.lock()
     with pytest.raises(Occupied):
         second.lock()
     second.close()
     first.reopen()
     with pytest.raises(Occupied):
-        SerialTransport(SLOW)
+        open_link(SLOW)
     first.close()
-    with contextlib.closing(SerialTransport(SLOW)) as third:
+    with contextlib.closing(open_link(SLOW)) as third:
         third.lock()
         assert third.query("*IDN?") == IDENTITY
 
@@ -359,7 +360,7 @@ def serving():
 
 
 def test_a_line_behind_a_socket_that_is_lost_and_found_again():
-    with serving() as address, contextlib.closing(SerialTransport(address, timeout=AT_MOST)) as transport:
+    with serving() as address, contextlib.closing(open_link(address, timeout=AT_MOST)) as transport:
         transport.lock()  # sockets have none
         assert transport.query("TEXT?") == "+1.0"
         with pytest.raises(NotConnected):
@@ -387,10 +388,10 @@ def test_a_line_at_a_pseudo_terminal():
     thread = threading.Thread(target=instrument)
     thread.start()
     try:
-        with contextlib.closing(SerialTransport(address, timeout=AT_MOST)) as transport:
+        with contextlib.closing(open_link(address, timeout=AT_MOST)) as transport:
             transport.lock()
             assert transport.query("TEXT?") == "+1.0"
-            second = SerialTransport(address)
+            second = open_link(address)
             with pytest.raises(Occupied):
                 second.lock()
             second.close()

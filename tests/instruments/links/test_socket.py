@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from instruments.errors import NoAnswer, NotConnected
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
 from support.waiting import HANG_GUARD_S as AT_MOST
 
 #: A time-out that is meant to be reached [s].
@@ -63,13 +63,13 @@ def serving(port=0):
 
 def test_a_bare_socket_sends_at_once():
     """VISA's default; without it a message behind another without an answer waits 0.04 s for its acknowledgement."""
-    with serving() as server, contextlib.closing(VisaTransport(server.address, timeout=AT_MOST)) as transport:
+    with serving() as server, contextlib.closing(open_link(server.address, timeout=AT_MOST)) as transport:
         link = transport.port.resource.visalib.sessions[transport.port.resource.session].interface
         assert link.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 
 def test_patience_lets_a_slow_answer_come():
-    with serving() as server, contextlib.closing(VisaTransport(server.address, timeout=SHORT)) as transport:
+    with serving() as server, contextlib.closing(open_link(server.address, timeout=SHORT)) as transport:
         threading.Timer(2 * SHORT, server.release.set).start()
         assert transport.query("LATE?", patience=AT_MOST) == "late"
 
@@ -77,7 +77,7 @@ def test_patience_lets_a_slow_answer_come():
 def test_a_server_that_is_gone_raises_and_is_found_again_when_back():
     with serving() as server:
         port = server.server_address[1]
-        transport = VisaTransport(server.address, timeout=SHORT)
+        transport = open_link(server.address, timeout=SHORT)
         with pytest.raises(NoAnswer):  # the other side hung up: no answer will come
             transport.query("BYE")
     with contextlib.closing(transport):
@@ -94,5 +94,5 @@ def test_a_server_that_is_gone_raises_and_is_found_again_when_back():
 def test_a_port_where_no_program_listens_raises():
     with serving() as server:
         address = server.address
-    with pytest.raises(NotConnected), contextlib.closing(VisaTransport(address)) as transport:
+    with pytest.raises(NotConnected), contextlib.closing(open_link(address)) as transport:
         transport.query("*IDN?")

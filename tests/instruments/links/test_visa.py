@@ -9,7 +9,7 @@ from pyvisa.constants import ResourceAttribute, StatusCode
 
 from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import LevilabVisaLibrary, library_for
 from instruments.virtual.core.rows import Ask
@@ -41,14 +41,14 @@ def library_with(bench, **methods):
 @pytest.mark.parametrize("address", ["TCPIP0::absent.levilab::inst0::INSTR", "no resource name at all", ""])
 def test_an_address_where_nothing_is_raises_in_one_line(bench, address):
     with pytest.raises(NotConnected) as missing:
-        VisaTransport(address, library=library_for(bench))
+        open_link(address, library=library_for(bench))
     assert missing.value.address == address
     assert "\n" not in str(missing.value)
 
 
 def test_an_unknown_library_raises_our_error():
     with pytest.raises(NotConnected, match="nolibrary"):
-        VisaTransport(ADDRESS, library="@nolibrary")
+        open_link(ADDRESS, library="@nolibrary")
 
 
 def test_whatever_a_library_raises_on_opening_becomes_our_error(bench):
@@ -57,12 +57,12 @@ def test_whatever_a_library_raises_on_opening_becomes_our_error(bench):
         raise Exception("could not connect:\nno route")  # noqa: TRY002
 
     with pytest.raises(NotConnected, match="could not connect: no route"):
-        VisaTransport(ADDRESS, library=library_with(bench, open=unreachable))
+        open_link(ADDRESS, library=library_with(bench, open=unreachable))
 
 
 def test_the_log_gets_the_bytes_of_both_directions(bench):
     traffic = []
-    transport = VisaTransport(ADDRESS, library=library_for(bench), log=lambda *line: traffic.append(line))
+    transport = open_link(ADDRESS, library=library_for(bench), log=lambda *line: traffic.append(line))
     transport.write("*CLS")
     with pytest.raises(BadAnswer):
         transport.query("BIN?")
@@ -91,7 +91,7 @@ def test_patience_is_for_an_answer_and_not_for_the_messages_after_it(bench):
 
         return call
 
-    transport = VisaTransport(ADDRESS, library=library_with(bench, write=noted("write"), clear=noted("clear")))
+    transport = open_link(ADDRESS, library=library_with(bench, write=noted("write"), clear=noted("clear")))
     transport.query("*IDN?", patience=3000.0)
     transport.write("*CLS")
     transport.query("*IDN?", patience=3000.0)
@@ -112,7 +112,7 @@ def test_between_two_messages_the_instrument_is_left_alone(clock, address):
         (sent if direction == ">" else answered).append(clock.now())
 
     library = library_for(VirtualBench({address: Slow(clock)}))
-    transport = VisaTransport(address, library=library, pause=0.05, clock=clock, log=log)
+    transport = open_link(address, library=library, line={"pause": 0.05}, clock=clock, log=log)
     for _ in range(3):
         transport.query("*IDN?")
     transport.write("*CLS")
@@ -128,7 +128,7 @@ def test_between_two_messages_the_instrument_is_left_alone(clock, address):
 
 
 def test_without_a_pause_no_time_is_lost(bench, clock):
-    transport = VisaTransport(ADDRESS, library=library_for(bench), clock=clock)
+    transport = open_link(ADDRESS, library=library_for(bench), clock=clock)
     for _ in range(3):
         transport.query("*IDN?")
     assert clock.now() < 0.05
@@ -156,7 +156,7 @@ class SlowOnce(Slow):
 @pytest.mark.parametrize("questions", [["LIST?"], ["*IDN?"], ["LIST?", "*IDN?"], ["*IDN?", "*IDN?"], ["SLOW?"]])
 def test_on_a_serial_line_no_late_answer_is_taken_for_another(clock, questions):
     device = SlowOnce(clock)
-    transport = VisaTransport(LINE, library=library_for(VirtualBench({LINE: device})))
+    transport = open_link(LINE, library=library_for(VirtualBench({LINE: device})))
     device.slow = len(questions)
     right = {"*OPC?": "1", "LIST?": "1,2,1,1,1", "*IDN?": IDENTITY, "SLOW?": "slow"}
     silent = 0
@@ -183,7 +183,7 @@ def test_on_a_serial_line_no_late_answer_is_taken_for_another(clock, questions):
     ids=lambda one: getattr(one, "abbreviation", None) or (one.__name__ if isinstance(one, type) else repr(one)),
 )
 def test_a_link_without_locks_is_no_trouble_and_one_that_breaks_is(bench, monkeypatch, trouble, error):
-    transport = VisaTransport(ADDRESS, library=library_for(bench))
+    transport = open_link(ADDRESS, library=library_for(bench))
     monkeypatch.setattr(transport.port.resource, "lock_excl", Mock(side_effect=trouble))
     if error is None:
         transport.lock()

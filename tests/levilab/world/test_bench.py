@@ -8,7 +8,7 @@ import serial
 from instruments.catalogue import COUNTERS
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
 from instruments.virtual.bench import serial_line
 from instruments.virtual.bench.visa_library import library_for
 from levilab.bench.config import ConfigError
@@ -67,7 +67,7 @@ def test_the_laser_is_at_the_counters_second_input_and_channel_three(counter):
     library = library_for(virtual_bus(world, models={"counter": counter}))
     bench = pyvisa.ResourceManager(library)
     driver = PendulumCNT91 if counter == "CNT-91" else Keysight53230A
-    device = driver(VisaTransport(VIRTUAL["counter"].address, library=library))
+    device = driver(open_link(VIRTUAL["counter"].address, library=library))
     device.prepare(gate_s=0.5, trigger_level_v=0.6, channel=2)
     assert device.frequency() == pytest.approx(33.0, abs=1e-3)
     scope = bench.open_resource(VIRTUAL["oscilloscope"].address)

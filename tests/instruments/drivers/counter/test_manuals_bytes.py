@@ -12,7 +12,7 @@ from instruments.clock import VirtualClock
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.errors import BadAnswer, CommandRefused, NoAnswer, OutOfRange
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.keysight_53230a import Virtual53230A
@@ -226,7 +226,7 @@ def bench(request):
     driver, virtual = request.param
     clock = VirtualClock()
     library = library_for(VirtualBench({ADDRESS: virtual(clock, signal=light, second=faster_light)}))
-    counter = driver(VisaTransport(ADDRESS, library=library))
+    counter = driver(open_link(ADDRESS, library=library))
     yield counter, clock
     counter.close()
     pyvisa.ResourceManager(library).close()
@@ -296,7 +296,7 @@ def test_a_counter_that_joins_answers_in_another_way_counts_as_well(driver, virt
     joined, found = [], []
     for model in (virtual, Other):
         library = library_for(VirtualBench({address: model(VirtualClock(), signal=light)}))
-        counter = driver(VisaTransport(address, library=library, log=record))
+        counter = driver(open_link(address, library=library, log=record))
         counter.prepare(gate_s=0.1, trigger_level_v=0.6)
         found.append(counter.settings())
         assert not counter.changed_settings(counter.settings())

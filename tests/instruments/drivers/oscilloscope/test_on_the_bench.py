@@ -13,7 +13,7 @@ from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
 from instruments.drivers.oscilloscope.tektronix_tds2000 import TektronixTDS2000
 from instruments.errors import BadAnswer, SettingsLost
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import Fault
 from instruments.virtual.bench.visa_library import library_for
@@ -30,7 +30,7 @@ def bench(make, signal):
     name = "TCPIP0::scope.levilab::inst0::INSTR"
     device = make(clock, signals={1: signal})
     library = library_for(VirtualBench({name: device}))
-    return device, VisaTransport(name, library=library), clock
+    return device, open_link(name, library=library), clock
 
 
 PAIRS = [
@@ -113,7 +113,7 @@ def prepared(driver, make, address="TCPIP0::scope.levilab::inst0::INSTR"):
     clock = VirtualClock()
     device = make(clock, signals={1: pulses})
     bus = VirtualBench({address: device})
-    scope = driver(VisaTransport(address, library=library_for(bus)), clock=clock)
+    scope = driver(open_link(address, library=library_for(bus)), clock=clock)
     scope.prepare(**PULSES, trigger_level_v=0.65)
     yield device, scope, bus
     scope.close()

@@ -13,7 +13,7 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.errors import OutOfRange
-from instruments.links.visa import VisaTransport
+from instruments.links.opening import open_link
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.counter.pendulum_cnt91 import VirtualCNT91
@@ -229,7 +229,7 @@ def test_readings_that_could_take_longer_than_visa_waits_are_refused_before_anyt
     address = "GPIB0::10::INSTR"
     bench = VirtualBench({address: VirtualCNT91(VirtualClock(), signal=pulses(25.0))})
     sent = []
-    transport = VisaTransport(address, library=library_for(bench), log=lambda *what: sent.append(what))
+    transport = open_link(address, library=library_for(bench), log=lambda *what: sent.append(what))
     driver = PendulumCNT91(transport)
     driver.prepare(gate_s=100.0, trigger_level_v=0.6)
     sent.clear()
