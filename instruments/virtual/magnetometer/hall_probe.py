@@ -1,4 +1,4 @@
-"""A Hall probe in its place, and how a gaussmeter looks at the field there: steady, r.m.s., peaks and frequency."""
+"""A Hall probe in its place, and how a gaussmeter looks at the field there: steady, r.m.s. and peaks."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ _STEADY_LOOKS = 16
 class Reading:
     """What stood at the probe.
 
-    instant: of the reading [s]; mode: as in RDGMODE; steady, rms, lowest, highest [T]; frequency [Hz];
-    noise: in units of the last digit.
+    instant: of the reading [s]; mode: as in RDGMODE; steady, rms, lowest, highest [T]; noise: in units of the last
+    digit.
     """
 
     instant: float
@@ -26,7 +26,6 @@ class Reading:
     rms: float
     lowest: float
     highest: float
-    frequency: float
     noise: float
 
 
@@ -44,11 +43,11 @@ class HallProbe:
         """Read.  mode: as in RDGMODE; time_constant: of the filter for steady fields [s]; noise: see Reading."""
         steady = self.steady(instant, time_constant)
         if mode == 1:
-            return Reading(instant, mode, steady, 0.0, steady, steady, 0.0, noise)
+            return Reading(instant, mode, steady, 0.0, steady, steady, noise)
         step = _WINDOW / _LOOKS
         field = self._sample(instant - _WINDOW + step * np.arange(1, _LOOKS + 1))
         rms, lowest, highest = float(field.std()), float(field.min()), float(field.max())
-        return Reading(instant, mode, steady, rms, lowest, highest, _frequency(field, step), noise)
+        return Reading(instant, mode, steady, rms, lowest, highest, noise)
 
     def steady(self, instant: float, time_constant: float) -> float:
         """Return the mean over the time constant, the probe's own zero error included [T]."""
@@ -58,13 +57,3 @@ class HallProbe:
 
     def _sample(self, times: NDArray[np.floating]) -> NDArray[np.float64]:
         return np.array([self.flux_density(time) for time in np.maximum(times, 0.0).tolist()])
-
-
-def _frequency(field: NDArray[np.float64], step: float) -> float:
-    """Return the frequency of an alternating field, by its rising crossings of the mean [Hz]; 0 of fewer than two."""
-    level = field - field.mean()
-    rising = np.flatnonzero((level[:-1] < 0) & (level[1:] >= 0))
-    if len(rising) < 2:
-        return 0.0
-    at = rising + level[rising] / (level[rising] - level[rising + 1])
-    return float((len(at) - 1) / (at[-1] - at[0]) / step)

@@ -34,7 +34,7 @@ _PROBE_TYPES = {"HSE": 40, "HST": 41, "UHS": 42}
 _ZERO_ERROR = 5e-6
 
 #: Operational status (425: bits 0 to 4, 6 and 7; 455/475: bit 5 is the end of a field ramp).
-_NO_PROBE, _OVERLOAD, _NEW_READING, _ALARM, _ZERO_DONE = 1, 2, 4, 8, 128
+_NO_PROBE, _OVERLOAD, _NEW_READING, _ZERO_DONE = 1, 2, 4, 128
 
 #: How long zeroing takes (assumed) [s].
 _ZEROING = 5.0
@@ -106,39 +106,23 @@ def field_text(value: float) -> str:
     return f"{value / 10.0**exponent:+08.3f}E{exponent:+03d}"
 
 
-_ALARM_FIELDS = (
-    Field("alarm", 0, 1, 0),
-    Field("alarm_mode", 1, 2, 1),
-    Field("alarm_low", -3.5e9, 3.5e9, 0, whole=False),
-    Field("alarm_high", -3.5e9, 3.5e9, 0, whole=False),
-    Field("alarm_inside", 1, 2, 1),
-    Field("alarm_sort", 0, 1, 0),
-    Field("alarm_audible", 0, 1, 1),
-)
 #: The commands of the family.
 FAMILY: tuple[Row, ...] = (
     Fields("UNIT", (Field("unit", 1, 4, 1),)),
     Own("AUTO", lambda d, p: d.set_auto(p), lambda d: f"{d.value('auto'):.0f}", ("auto", 1.0)),
     Own("RANGE", lambda d, p: d.set_range(p), lambda d: f"{d.range_index() + 1}", ("range", 1.0)),
-    Ask("RDGFIELD", lambda d: d.answer(d.displayed_field)),
-    Ask("RDGREL", lambda d: d.answer(lambda: d.displayed_field() - d.relative_to)),
-    Ask("RDGMNMX", lambda d: d.extremes()),
+    Ask("RDGFIELD", lambda d: d.reading_text()),
     Ask("OPST", lambda d: f"{d.operational_status():03d}"),
     Ask("TYPE", lambda d: f"{_PROBE_TYPES.get(d.probe or '', 0):02d}"),
     Ask("PRBSENS", lambda d: field_text(0.0 if d.probe is None else 1.0)),
     Ask("PRBSNUM", lambda d: "" if d.probe is None else "H00001"),
-    Own("RELSP", lambda d, p: d.set_relative_to(p), lambda d: d.in_unit(d.relative_to)),
     Do("ZPROBE", lambda d: d.begin_zeroing()),
     Do("ZCLEAR", lambda d: d.clear_zero()),
-    Do("MXRST", lambda d: d.reset_extremes()),
-    Fields("MXHOLD", (Field("hold", 0, 1, 0),)),
     Fields("LOCK", (Field("locked", 0, 1, 0), Field("lock_code", 0, 999, 123))),
     Fields("BEEP", (Field("beep", 0, 1, 1),)),
     Fields("BRIGT", (Field("brightness", 0, 3, 2),)),
     Ask("KEYST", lambda _d: "00"),
     Both("DFLT", lambda d, p: d.restore_factory_settings(p)),
-    Fields("ALARM", _ALARM_FIELDS),
-    Ask("ALARMST", lambda d: ",".join(f"{on:d}" for on in d.alarms())),
 )
 
 
@@ -147,7 +131,6 @@ class VirtualGaussmeter(VirtualInstrument):
 
     flux_density: at the probe, along its axis, at a time [s] → [T]; asked at times up to a second back.
     probe: HSE, HST or UHS, None when none is plugged in; zero_error: before ZPROBE [T]; seed: of the noise.
-    The extremes (MXHOLD) are of the readings that were asked for, not of those in between.
     """
 
     takes_blocks = False
@@ -176,8 +159,6 @@ class VirtualGaussmeter(VirtualInstrument):
         self._zero_done = False
         self._last: Reading | None = None
         self._answered: float | None = None  # the instant of the latest reading that was answered
-        self.relative_to = 0.0  # of RDGREL [T]
-        self._lowest, self._highest = math.inf, -math.inf
         self._last_question = ""
         super().__init__(clock, identity=identity, pace=pace)
 
@@ -194,10 +175,6 @@ class VirtualGaussmeter(VirtualInstrument):
 
     def _unit(self) -> float:
         return _UNITS_T[int(self.value("unit")) - 1]
-
-    def in_unit(self, value: float) -> str:
-        """Return a flux density [T] as it is printed in the present unit."""
-        return field_text(value / self._unit())
 
     def restore_factory_settings(self, parameters: list[str]) -> None:
         """DFLT 99; the number keeps it from being sent by mistake."""
@@ -280,46 +257,16 @@ class VirtualGaussmeter(VirtualInstrument):
         reading = self.reading()
         shown = round((self.field() + _NOISE * reading.noise * resolution) / resolution) * resolution
         self._answered = reading.instant
-        self._lowest, self._highest = min(self._lowest, shown), max(self._highest, shown)
         return shown
 
     def _is_overloaded(self) -> bool:
         return self.probe is not None and abs(self.field()) > self._ranges()[self.range_index()]
 
-    def answer(self, value: Callable[[], float]) -> str:
-        """Return a field [T] in the present unit, or why there is none."""
+    def reading_text(self) -> str:
+        """RDGFIELD?: the reading in the present unit, or why there is none."""
         if self.probe is None:
             return "NO PROBE"
-        return "OL" if self._is_overloaded() else self.in_unit(value())
-
-    def extremes(self) -> str:
-        """RDGMNMX?: both, or on the 425 zero and the greatest."""
-        self.answer(self.displayed_field)
-        seen = [value if math.isfinite(value) else 0.0 for value in (self._lowest, self._highest)]
-        return ",".join(map(self.in_unit, seen))
-
-    def reset_extremes(self) -> None:
-        """MXRST: the extremes are those of the readings from now on."""
-        self._lowest, self._highest = math.inf, -math.inf
-
-    def set_relative_to(self, parameters: list[str]) -> None:
-        """RELSP: what RDGREL is relative to, in the present unit.  Raises ScpiError."""
-        if len(parameters) != 1:
-            raise ScpiError(-109)
-        limit = 35.0 / self._unit()
-        self.relative_to = self._unit() * number(parameters[0], low=-limit, high=limit, default=0.0)
-
-    def alarms(self) -> tuple[bool, bool]:
-        """Return whether the low and the high alarm are on."""
-        if not self.value("alarm") or self.probe is None:
-            return False, False
-        size = self.field() / self._unit()
-        if self.value("alarm_mode") == 1:
-            size = abs(size)
-        low, high = self.value("alarm_low"), self.value("alarm_high")
-        if self.value("alarm_inside") == 2:
-            return (low < size < high,) * 2
-        return size < low, size > high
+        return "OL" if self._is_overloaded() else field_text(self.displayed_field() / self._unit())
 
     # --- status and zero ---
 
@@ -328,12 +275,7 @@ class VirtualGaussmeter(VirtualInstrument):
         if self.probe is None:
             return _NO_PROBE
         new = self.reading().instant != self._answered
-        return (
-            _OVERLOAD * self._is_overloaded()
-            + _NEW_READING * new
-            + _ALARM * any(self.alarms())
-            + _ZERO_DONE * self._zero_done
-        )
+        return _OVERLOAD * self._is_overloaded() + _NEW_READING * new + _ZERO_DONE * self._zero_done
 
     def begin_zeroing(self) -> None:
         """ZPROBE: in a while the present field counts as zero."""

@@ -3,16 +3,9 @@
 from typing import ClassVar
 
 from instruments.virtual.core.line import LineSettings
-from instruments.virtual.core.rows import Ask, Row
-from instruments.virtual.magnetometer.lakeshore import FAMILY, Field, Fields, VirtualGaussmeter, field_text
+from instruments.virtual.magnetometer.lakeshore import FAMILY, Field, Fields, VirtualGaussmeter
 
-_OWN: tuple[Row, ...] = (
-    Fields("RDGMODE", (Field("mode", 1, 2, 1), Field("filter", 0, 1, 1), Field("band", 1, 2, 1))),
-    Ask("RDGMX", lambda d: d.extremes().split(",")[1]),
-    Fields("REL", (Field("relative", 0, 1, 0),)),
-    Fields("RELAY", (Field("relay", 0, 2, 0), Field("relay_alarm", 1, 3, 3))),
-    Ask("RELAYST", lambda d: d.relay()),
-)
+_RDGMODE = Fields("RDGMODE", (Field("mode", 1, 2, 1), Field("filter", 0, 1, 1), Field("band", 1, 2, 1)))
 
 
 class Virtual425(VirtualGaussmeter):
@@ -29,20 +22,10 @@ class Virtual425(VirtualGaussmeter):
         "UHS": (35e-6, 350e-6, 3.5e-3),
     }
 
-    ROWS: ClassVar = (*FAMILY, *_OWN)
+    ROWS: ClassVar = (*FAMILY, _RDGMODE)
 
     def _time_constant(self) -> float:
         return 0.1 if self.value("filter") else 0.01
 
     def _counts(self) -> float:
         return 35_000.0 if self.value("filter") and self._mode() == 1 else 3500.0
-
-    def extremes(self) -> str:
-        """See the base: zero and the greatest."""
-        return field_text(0.0) + "," + super().extremes().split(",")[1]
-
-    def relay(self) -> str:
-        """RELAYST?: whether the relay is on."""
-        low, high = self.alarms()
-        by_alarm = (low, high, low or high)[int(self.value("relay_alarm")) - 1]
-        return f"{int((False, True, by_alarm)[int(self.value('relay'))])}"

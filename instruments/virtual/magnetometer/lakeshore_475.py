@@ -10,7 +10,7 @@ from instruments.virtual.magnetometer.lakeshore import FAMILY, Field, Fields, Vi
 
 _COMMON: tuple[Row, ...] = (
     *VirtualGaussmeter.COMMON,
-    Do("*CLS", lambda d: d.clear_events()),
+    Do("*CLS", lambda d: d.clear_status()),
     Ask("*ESR", lambda d: f"{d.status.take_events():03d}"),
     Fields("*ESE", (Field("event_enable", 0, 255, 0),)),
     Fields("*SRE", (Field("request_enable", 0, 255, 0),)),
@@ -36,16 +36,11 @@ _CPARAM = (
 )
 _OWN: tuple[Row, ...] = (
     Fields("RDGMODE", _RDGMODE),
-    Ask("RDGPEAK", lambda d: d.peaks()),
-    Ask("RDGFRQ", lambda d: field_text(d.reading().frequency)),
     Ask("RDGTEMP", lambda d: field_text(23.0 if d.value("temperature_unit") == 1 else 296.15)),
     Ask("RDGOHM", lambda d: field_text(d.field())),
-    Fields("REL", (Field("relative", 0, 1, 0), Field("relative_source", 1, 2, 1))),
     Fields("TUNIT", (Field("temperature_unit", 1, 2, 1),)),
     Fields("BAUD", (Field("baud", 0, 3, 0),)),
     Fields("MODE", (Field("remote", 0, 2, 0),)),
-    Fields("OPSTE", (Field("operation_enable", 0, 255, 0),)),
-    Ask("OPSTR", lambda d: d.take_events()),
     Fields("CMODE", (Field("control", 0, 1, 0),)),
     Fields("CSETP", (Field("setpoint", -3.5e9, 3.5e9, 0, whole=False),)),
     Fields("CPARAM", _CPARAM),
@@ -74,13 +69,10 @@ class Virtual475(VirtualGaussmeter):
     serial_settings = LineSettings(9600, 7, "O", 1.0)
     COMMON: ClassVar = _COMMON
     ROWS: ClassVar = (*FAMILY, *_OWN)
-    _events = 0
 
     def on_change(self, name: str) -> None:
-        """REL with source 2 takes the present field; BAUD sets this end of the line."""
-        if name == "relative" and self.value("relative_source") == 2 and self.probe:
-            self.relative_to = self.displayed_field()
-        elif name == "baud":
+        """BAUD sets this end of the line."""
+        if name == "baud":
             self.serial_settings = replace(self.serial_settings, baud_rate=self._BAUD_RATES[int(self.value("baud"))])
         elif name in {"event_enable", "request_enable"}:
             setattr(self.status, name, int(self.value(name)))
@@ -107,12 +99,6 @@ class Virtual475(VirtualGaussmeter):
         shown = int(self.value("peak_shown"))
         return (positive, negative, max(positive, negative, key=abs))[shown - 1]
 
-    def peaks(self) -> str:
-        """RDGPEAK?: both peaks."""
-        reading = self.reading()
-        peaks = (reading.lowest, reading.highest)
-        return ",".join(field_text((peak + self._hall.zero_error - self._zero) / self._unit()) for peak in peaks)
-
     # --- status (475 manual, 6.1.4) ---
 
     def completion(self) -> str:
@@ -122,25 +108,6 @@ class Virtual475(VirtualGaussmeter):
             self._finish_zeroing()
         return "1"
 
-    def operational_status(self) -> int:
-        """See the base; its bits stay among the events until they are asked for."""
-        status = super().operational_status()
-        self._events |= status
-        return status
-
-    def take_events(self) -> str:
-        """OPSTR?: the events of the operational status; asking empties them."""
-        self.operational_status()
-        events, self._events = self._events, 0
-        return f"{events:03d}"
-
-    def clear_events(self) -> None:
-        """*CLS: no events."""
-        self._events = self.status.events = 0
-
     def status_byte(self, *, message_available: bool = False) -> int:
-        """Bit 5: standard events, bit 6: service request, bit 7: operation events."""
-        bits = self.status.byte(errors_waiting=False, message_available=message_available)
-        operation = 128 * bool(self._events & int(self.value("operation_enable")))
-        requested = 64 * bool(operation & self.status.request_enable)
-        return bits | operation | requested
+        """Bit 5: standard events, bit 6: service request; there is no error queue."""
+        return self.status.byte(errors_waiting=False, message_available=message_available)

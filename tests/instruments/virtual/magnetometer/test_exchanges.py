@@ -87,10 +87,9 @@ READINGS = {
         *((meter(Virtual425, ALTERNATING), meter(Virtual475, ALTERNATING)), 2.0),
         ("UNIT 2;RDGFIELD?", near(0.01, 2e-2)),
     ),
-    "peaks and frequency": (
+    "positive and negative peaks": (
         *((meter(Virtual475, alternating(2e-3, 47.0, 1e-3)),), "UNIT 2;RDGMODE 3,2,1,1,1", 1.0),
-        *(("RDGPEAK?", about([-1e-3, 3e-3], 1e-5)), ("RDGFIELD?", about(3e-3, 1e-5)), ("RDGFRQ?", near(47.0, 1e-2))),
-        *("RDGMODE 3,2,1,1,2", ("RDGFIELD?", about(-1e-3, 1e-5))),
+        *(("RDGFIELD?", about(3e-3, 1e-5)), "RDGMODE 3,2,1,1,2", ("RDGFIELD?", about(-1e-3, 1e-5))),
     ),
     "a mode set in part keeps the rest": (NEW, ("RDGMODE 2, 3;RDGMODE?", "2,3,1,1,1")),  # so does fsc2 with a 455
     "control, and the compensations of the probe": (  # both on, as the maker delivers it
@@ -114,41 +113,18 @@ ZERO = {
         *(has(128), ("RDGFIELD?", about(0.0, 5e-7)), "ZCLEAR", 1.0, ("RDGFIELD?", near(25e-6, 0.1))),
     ),
     "peaks are counted from the zero that was taken": (  # a steady 12.3 mT: both are the field, and the probe's error
-        *((meter(Virtual475, zero_error=5e-6),), 2.0, ("UNIT 2;RDGMODE 3;RDGPEAK?", near([12.305e-3] * 2, 1e-5))),
-        *(("ZPROBE;*OPC?", "1"), 2.0, ("RDGPEAK?", about([0.0] * 2, 5e-7))),
+        *((meter(Virtual475, zero_error=5e-6),), 2.0, ("UNIT 2;RDGMODE 3;RDGFIELD?", near(12.305e-3, 1e-3))),
+        *(("ZPROBE;*OPC?", "1"), 2.0, ("RDGFIELD?", about(0.0, 5e-7))),
     ),
     "the 475 holds its answer until it is zeroed": (
         *(NEW, ("ZPROBE;*OPC?", "1"), lambda device: device.clock.now() == about(5.0, 0.1), has(128)),
     ),
-    "relative readings": (
-        *(BOTH, ("UNIT 2;RELSP 0.01;RELSP?", "+100.000E-04"), ("RDGREL?", about(0.0023, 1e-5))),
-        ("UNIT 1;RELSP?", 100.0),
-    ),
-    "the 475 takes the present field as what is relative to": (
-        *(NEW, 2.0, ("REL 1,2;REL?", "1,2"), ("RELSP?", near(123.0, 1e-3))),
-    ),
-    "the 425 keeps the greatest only": (
-        *(OLD, 2.0, ("RDGMX?", near(123.0, 1e-3)), ("RDGMNMX?", near([0.0, 123.0], 1e-3))),
-    ),
-    **{
-        f"an alarm {alarm}": (  # at 123 G
-            *(OLD, (f"ALARM {alarm};RELAY 2,3;ALARMST?;RELAYST?", f"{on};{int('1' in on)}"), has(8, on="1" in on)),
-        )
-        for alarm, on in {
-            "0,1,100,120,1,0,0": "0,0", "1,1,100,120,1,0,0": "0,1", "1,1,130,200,1,0,0": "1,0",
-            "1,1,100,200,1,0,0": "0,0", "1,1,100,200,2,0,0": "1,1",
-        }.items()
-    },
-}  # fmt: skip
+}
 
 STATUS = {
     **{f"the 425 has no {question}": (OLD, (question, None)) for question in ("*ESR?", "*STB?", "*OPC?", "*TST?")},
     "the 475 sets event bits for what it does not understand": (
         *(NEW, ("*ESR?", "128"), "FOO?", "UNIT 9", ("*ESR?;*ESR?", "048;000")),
-    ),
-    "the 475 latches operation events for a service request": (
-        *(NEW, "OPSTE 2;*SRE 128;RANGE 1", has(2), ("*STB?", "192")),
-        *(lambda device: int(device.execute("OPSTR?").data) & 2, "*CLS;AUTO 1", ("*STB?", "000")),
     ),
     "a reset leaves the masks of the status": (*(NEW, "*ESE 48;*SRE 16;FOO;*RST", ("*ESE?;*SRE?;*STB?", "48;16;032")),),
 }

@@ -102,17 +102,3 @@ def test_a_new_reading_sets_its_bit_of_the_operation_status():
     seen = [int(ask(device, "OPST?")) & 4 for _ in range(4)]
     assert seen == sorted(seen)
     assert seen[-1] == 4
-
-
-def test_extremes_are_kept_until_they_are_reset():
-    field = [0.01]
-    device = meter(Virtual475, lambda _: field[0])
-    for size in (0.01, 0.03, -0.02, 0.0):
-        field[0] = size
-        device.clock.sleep(2.0)
-        ask(device, "RDGFIELD?")
-    lowest, highest = map(float, ask(device, "UNIT 2;RDGMNMX?").split(","))
-    assert (lowest, highest) == (pytest.approx(-0.02, rel=1e-3), pytest.approx(0.03, rel=1e-3))
-    lowest, highest = map(float, ask(device, "MXRST;RDGMNMX?").split(","))
-    assert lowest == pytest.approx(0.0, abs=1e-6)
-    assert highest == pytest.approx(0.0, abs=1e-6)
