@@ -95,7 +95,7 @@ COUNTERS: tuple[Model[Counter], ...] = (
             Virtual53230A,
             digits=10,
             numbered=(1,),
-            lacks=("SPERiod", "TINTerval", "PWIDth", "NWIDth", "PDUTycycle", "NDUTycycle", "TOTalize"),
+            lacks=("SPERiod", "TINTerval"),
             identity="Keysight Technologies,53210A,VIRTUAL,3.09-levilab",
         ),
         "TCPIP0::192.168.1.20::5025::SOCKET",

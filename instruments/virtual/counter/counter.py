@@ -253,26 +253,19 @@ class VirtualCounter(VirtualInstrument):
 
     def inputs(self) -> Inputs:
         """Return the inputs as they are set now."""
-        return Inputs(
-            {
-                channel: (
-                    signal,
-                    self.trigger_input(channel, falling=falling),
-                    self.trigger_input(channel, falling=not falling),
-                )
-                for channel, signal in self._signals.items()
-                for falling in (self.settings[f"slope{channel}"] == "NEG",)
-            }
-        )
+        return Inputs({channel: (signal, self.trigger_input(channel)) for channel, signal in self._signals.items()})
 
-    def trigger_input(self, channel: int, *, falling: bool) -> TriggerInput:
+    def is_falling(self, channel: int) -> bool:
+        """Return whether an input triggers on falling edges."""
+        return self.settings[f"slope{channel}"] == "NEG"
+
+    def trigger_input(self, channel: int) -> TriggerInput:
         """Return the trigger of an input, with the settings that it has now."""
         raise NotImplementedError
 
     def measure(self, inputs: Inputs, gate: GateTime) -> Measurement:
         """Begin one measurement of the selected function."""
-        falling = self.settings[f"slope{self._channels[0]}"] == "NEG"
-        return measurement(self.kind, inputs, self._channels, gate, falling=falling)
+        return measurement(self.kind, inputs, self._channels, gate)
 
     @property
     def kind(self) -> str:
@@ -348,8 +341,7 @@ class VirtualCounter(VirtualInstrument):
 
     def find_level(self, channel: int) -> float:
         """Find the automatic level: where the trigger would fire now [V]."""
-        falling = self.settings[f"slope{channel}"] == "NEG"
-        entry = self.trigger_input(channel, falling=falling)
+        entry = self.trigger_input(channel)
         self.busy_until(self._ready + entry.window)
         return entry.thresholds(self._signals[channel], min(self._ready, self.clock.now() + 1.0)).fire
 

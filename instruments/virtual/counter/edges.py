@@ -110,10 +110,6 @@ class EdgeFinder:
         self._times, self._passed = self._times[count:], self._passed + count
         return Edge(self._passed, float(self._times[0])) if self._times.size else None
 
-    def count_before(self, instant: float) -> int:
-        """Return the number of known edges before this time [s]."""
-        return self._passed + int(np.searchsorted(self._times, instant))
-
     def refresh(self, instant: float) -> None:
         """Find a level that follows the signal again, where it is too old, at the beginning of a measurement [s]."""
         follows = self._entry.level is None or self._entry.alternating

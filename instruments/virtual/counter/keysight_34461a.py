@@ -95,7 +95,7 @@ class Virtual34461A(VirtualCounter):
     numbered = (1,)
     FUNCTIONS: ClassVar = _FUNCTIONS
     ROWS: ClassVar = _ROWS
-    DEFAULTS: ClassVar = {"slope1": "POS", "slowest": 20.0}
+    DEFAULTS: ClassVar = {"slowest": 20.0}
 
     def spell(self, value: float) -> str:
         """Return a number with nine digits: +1.00000000E-01."""
@@ -158,10 +158,10 @@ class Virtual34461A(VirtualCounter):
         """Return the range in use [V]."""
         return _range_for(self._rms() / _OVERLOAD) if self.settings["automatic_range"] else self.value("range")
 
-    def trigger_input(self, channel: int, *, falling: bool) -> TriggerInput:
+    def trigger_input(self, channel: int) -> TriggerInput:
         """See the base: near the zero crossing of what the coupling lets through."""
         wide = self._range()
-        return TriggerInput(_FIRES * wide, _HYSTERESIS * wide, window=1.0, alternating=True, falling=falling)
+        return TriggerInput(_FIRES * wide, _HYSTERESIS * wide, window=1.0, alternating=True)
 
     # --- measuring ---
 

@@ -3,8 +3,6 @@
 import math
 from typing import Any, ClassVar
 
-import numpy as np
-
 from instruments.clock import Clock
 from instruments.ieee488 import INFINITY, NOT_A_NUMBER
 from instruments.virtual.core.parameters import block_text, choice, limit, number, optional_parameter, parameter
@@ -41,11 +39,6 @@ _FUNCTIONS = {
     "PER": Function("PERiod"),
     "SPER": Function("SPERiod"),
     "TINT": Function("TINTerval", inputs=2),
-    "PWID": Function("PWIDth"),
-    "NWID": Function("NWIDth"),
-    "PDUT": Function("PDUTycycle"),
-    "NDUT": Function("NDUTycycle"),
-    "TOT": Function("TOTalize:TIMed"),
 }
 _HEADERS = {name: "[:SCALar][:VOLTage]:" + function.header for name, function in _FUNCTIONS.items()}
 
@@ -63,8 +56,6 @@ _GATE: tuple[Row, ...] = (
     Number("[SENSe[1]:]FREQuency:GATE:TIME", "gate", 0.1, (1e-6, 1e3), "S"),
     Word("[SENSe[1]:]FREQuency:GATE:POLarity", "gate_polarity", "POSitive NEGative"),
     Word("[SENSe[1]:]FREQuency:MODE", "mode", "AUTO RECiprocal CONTinuous RCONtinuous"),
-    Word("[SENSe[1]:]TOTalize:GATE:SOURce", "total_source", "TIME EXTernal ADVanced IMMediate"),
-    Number("[SENSe[1]:]TOTalize:GATE:TIME", "total_gate", 0.1, (1e-6, 1e3), "S"),
     Word("[SENSe[1]:]TINTerval:GATE:SOURce", "interval_source", "IMMediate ADVanced"),
     Word("[SENSe[1]:]ROSCillator:SOURce", "reference", "INTernal EXTernal"),
     Switch("[SENSe[1]:]ROSCillator:SOURce:AUTO", "reference_auto", default=True),
@@ -79,9 +70,6 @@ _INPUT: tuple[Row, ...] = (
     Own("INPut[n]:LEVel[1]:AUTO", lambda d, n, p: d.set_automatic(n, p), lambda d, n: d.automatic(n), AUTOMATIC),
     Both("INPut[n]:LEVel[1][:ABSolute]", lambda d, n, p: d.set_level(n, p), lambda d, n, p: d.level(n, p), LEVEL),
     Count("INPut[n]:LEVel[1]:RELative", "relative{n}", 50.0, (10, 90)),
-    Ask("INPut[n]:LEVel[1]:MAXimum", lambda d, n: d.spell(d.extremes(n)[1])),
-    Ask("INPut[n]:LEVel[1]:MINimum", lambda d, n: d.spell(d.extremes(n)[0])),
-    Ask("INPut[n]:LEVel[1]:PTPeak", lambda d, n: d.spell(float(np.ptp(d.extremes(n))))),
 )
 _TRIGGERING: tuple[Row, ...] = (
     Count("SAMPle:COUNt", "samples", 1.0, (1, 1e6)),
@@ -135,7 +123,8 @@ class Virtual53230A(VirtualCounter):
 
     Sources: Keysight 53220A/53230A Programmer's Reference and User's Guide.  The guide gives readings a three-digit
     exponent; here it has two, as for every other instrument on this bench.  The time-out is 1 s in the guide and off
-    in the reference, when shipped: here 1 s, and neither a reset nor a configuration changes it.
+    in the reference, when shipped: here 1 s, and neither a reset nor a configuration changes it.  Widths of pulses,
+    duty cycles and totals are missing.
     """
 
     identity = "Keysight Technologies,53230A,VIRTUAL,3.09-levilab"
@@ -165,7 +154,7 @@ class Virtual53230A(VirtualCounter):
             raise ScpiError(-108)
         gate = self._gate_for(name, plain)
         self.choose(name, channels or (1,))
-        self.settings |= {"gate_source": "TIME", "gate": gate, "total_gate": gate, "mode": "AUTO"}
+        self.settings |= {"gate_source": "TIME", "gate": gate, "mode": "AUTO"}
         self.settings |= {"samples": 1.0, "triggers": 1.0, "trigger_source": "IMM", "trigger_delay": 0.0}
         self.settings |= {f"automatic{channel}": True for channel in self._channels}
         self.settings |= {f"relative{channel}": 50.0 for channel in self._channels}
@@ -178,8 +167,6 @@ class Virtual53230A(VirtualCounter):
             else number(text, low=0, high=1e12, default=0.1, unit="HZ" if name == "FREQ" else "S")
             for text in [*plain, "DEF", "DEF"][:2]
         )
-        if name == "TOT":
-            return 0.1 if math.isnan(expected) else min(max(expected, 1e-6), 1e3)
         if math.isnan(expected) or math.isnan(resolution) or not resolution:
             return 0.1
         return min(max(self._resolution * expected / resolution, 1e-4), 1e3)
@@ -188,12 +175,12 @@ class Virtual53230A(VirtualCounter):
 
     def initiate(self) -> None:
         """INITiate: one run of as many readings as triggers and samples make."""
-        gate = float(self.settings["total_gate" if self._function == "TOT" else "gate"])
+        gate = self.value("gate")
         # a time-out below the gate counts as twice the gate
         timeout = self.value("timeout")
         timeout = timeout if timeout >= gate else 2 * gate
-        gated = self._function in {"FREQ", "PER", "TOT"}
-        gapless = self._function in {"FREQ", "PER"} and self.settings["mode"] in {"CONT", "RCON"}
+        gated = self._function in {"FREQ", "PER"}
+        gapless = gated and self.settings["mode"] in {"CONT", "RCON"}
         triggers = 1.0 if gapless else self.value("triggers")
 
         def measure(inputs: Inputs, begin: float, _: int) -> Measurement:
@@ -252,7 +239,7 @@ class Virtual53230A(VirtualCounter):
         """See the base."""
         return 5.125 * self._wide(channel) * self.value(f"probe_factor{channel}")
 
-    def trigger_input(self, channel: int, *, falling: bool) -> TriggerInput:
+    def trigger_input(self, channel: int) -> TriggerInput:
         """See the base.  A probe's factor is in the levels, not in the voltage at the input."""
         setting = {name: self.settings[f"{name}{channel}"] for name in ("automatic", "level", "probe_factor")}
         relative = self.value(f"relative{channel}") / 100
@@ -264,15 +251,8 @@ class Virtual53230A(VirtualCounter):
             upper=relative,
             lower=relative,
             alternating=self.settings[f"coupling{channel}"] == "AC",
-            falling=falling,
+            falling=self.is_falling(channel),
         )
-
-    def extremes(self, channel: int) -> tuple[float, float]:
-        """Return the least and the greatest voltage at an input now [V]."""
-        entry = self.trigger_input(channel, falling=False)
-        low, high = entry.extremes(self._signals[channel], min(self._ready, self.clock.now() + 1.0))
-        self.busy_until(self._ready + entry.window)
-        return low, high
 
     # --- the memory ---
 

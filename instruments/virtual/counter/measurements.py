@@ -1,4 +1,4 @@
-"""The measurements of the virtual counters: from edges to a frequency, a period, an interval, a duty cycle, a total.
+"""The measurements of the virtual counters: from edges to a frequency, a period, an interval.
 
 A measurement is a Python generator: it yields the input and the time up to which it needs edges, and goes on when the
 run has looked that far.
@@ -29,18 +29,16 @@ Measurement = Generator[Wanted, None, Reading]
 
 @dataclass
 class Inputs:
-    """The edges of the inputs, for one run.  inputs: by channel, signal and settings for its slope and the other."""
+    """The edges of the inputs, for one run.  inputs: by channel, signal and settings."""
 
-    inputs: dict[int, tuple[Signal, TriggerInput, TriggerInput]]
-    _finders: dict[tuple[int, bool], EdgeFinder] = field(default_factory=dict)
+    inputs: dict[int, tuple[Signal, TriggerInput]]
+    _finders: dict[int, EdgeFinder] = field(default_factory=dict)
 
-    def finder(self, channel: int, instant: float, *, other_slope: bool = False) -> EdgeFinder:
-        """Return the edge finder of a channel's own slope or the other one; a new one begins at this time [s]."""
-        key = channel, other_slope
-        if key not in self._finders:
-            signal, own, other = self.inputs[channel]
-            self._finders[key] = EdgeFinder(signal, other if other_slope else own, instant)
-        return self._finders[key]
+    def finder(self, channel: int, instant: float) -> EdgeFinder:
+        """Return the edge finder of a channel; a new one begins at this time [s]."""
+        if channel not in self._finders:
+            self._finders[channel] = EdgeFinder(*self.inputs[channel], instant)
+        return self._finders[channel]
 
     def forget(self) -> None:
         """Drop all edge finders, so that the next ones start from the beginning."""
@@ -102,7 +100,7 @@ def period(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
     return found if found.value == NOT_A_NUMBER else Reading(1 / found.value, found.stamp, found.done)
 
 
-def interval(inputs: Inputs, start: int, stop: int, gate: GateTime, *, slopes: tuple[bool, bool]) -> Measurement:
+def interval(inputs: Inputs, start: int, stop: int, gate: GateTime) -> Measurement:
     """Measure the time from an edge of one input to the next edge of another, or of the same one [s].
 
     Args:
@@ -110,12 +108,8 @@ def interval(inputs: Inputs, start: int, stop: int, gate: GateTime, *, slopes: t
         start: channel of the first edge.
         stop: channel of the second.
         gate: when to begin, and the deadline.
-        slopes: for each edge, whether it has the other slope than the one set.
     """
-    finders = [
-        inputs.finder(channel, gate.begin, other_slope=other)
-        for channel, other in zip((start, stop), slopes, strict=True)
-    ]
+    finders = [inputs.finder(channel, gate.begin) for channel in (start, stop)]
     for finder in finders:
         finder.refresh(gate.begin)
     opened = yield from first_edge(finders[0], gate.begin, gate.deadline)
@@ -127,48 +121,15 @@ def interval(inputs: Inputs, start: int, stop: int, gate: GateTime, *, slopes: t
     return Reading(closed.time - opened.time, opened.time, closed.time)
 
 
-def duty(inputs: Inputs, channel: int, gate: GateTime, *, slopes: tuple[bool, bool]) -> Measurement:
-    """Measure the duty cycle: the part of a period between an edge of one slope and the next edge of the other."""
-    width = yield from interval(inputs, channel, channel, gate, slopes=slopes)
-    if width.value == NOT_A_NUMBER:
-        return width
-    again = yield from first_edge(inputs.finder(channel, gate.begin, other_slope=slopes[0]), width.done, gate.deadline)
-    if again is None:
-        return gate.without_result()
-    return Reading(width.value / (again.time - width.stamp), width.stamp, again.time)
-
-
-def total(inputs: Inputs, channel: int, gate: GateTime) -> Measurement:
-    """Count the edges while the gate is open."""
-    finder = inputs.finder(channel, gate.begin)
-    finder.refresh(gate.begin)
-    finder.find(gate.begin)
-    before, end = finder.count_before(gate.begin), gate.begin + gate.length
-    while finder.reached < end:
-        yield finder, end
-    return Reading(float(finder.count_before(end) - before), gate.begin, end)
-
-
-#: By function; the arguments are inputs, channels, gate, and whether the first channel counts falling edges.
-_FUNCTIONS: dict[str, Callable[[Inputs, tuple[int, ...], GateTime, bool], Measurement]] = {
-    "FREQ": lambda inputs, channels, gate, _: frequency(inputs, channels[0], gate),
-    "PER": lambda inputs, channels, gate, _: period(inputs, channels[0], gate),
-    "SPER": lambda inputs, channels, gate, _: period(inputs, channels[0], replace(gate, length=0.0)),
-    "TINT": lambda inputs, channels, gate, _: interval(inputs, channels[0], channels[-1], gate, slopes=(False, False)),
-    "PWID": lambda inputs, channels, gate, falling: interval(
-        inputs, channels[0], channels[0], gate, slopes=(falling, not falling)
-    ),
-    "NWID": lambda inputs, channels, gate, falling: interval(
-        inputs, channels[0], channels[0], gate, slopes=(not falling, falling)
-    ),
-    "PDUT": lambda inputs, channels, gate, falling: duty(inputs, channels[0], gate, slopes=(falling, not falling)),
-    "NDUT": lambda inputs, channels, gate, falling: duty(inputs, channels[0], gate, slopes=(not falling, falling)),
-    "TOT": lambda inputs, channels, gate, _: total(inputs, channels[0], gate),
+#: By function; the arguments are inputs, channels, gate.
+_FUNCTIONS: dict[str, Callable[[Inputs, tuple[int, ...], GateTime], Measurement]] = {
+    "FREQ": lambda inputs, channels, gate: frequency(inputs, channels[0], gate),
+    "PER": lambda inputs, channels, gate: period(inputs, channels[0], gate),
+    "SPER": lambda inputs, channels, gate: period(inputs, channels[0], replace(gate, length=0.0)),
+    "TINT": lambda inputs, channels, gate: interval(inputs, channels[0], channels[-1], gate),
 }
 
 
-def measurement(
-    function: str, inputs: Inputs, channels: tuple[int, ...], gate: GateTime, *, falling: bool
-) -> Measurement:
-    """Begin one measurement of this function.  falling: whether the first channel counts falling edges."""
-    return _FUNCTIONS[function](inputs, channels, gate, falling)
+def measurement(function: str, inputs: Inputs, channels: tuple[int, ...], gate: GateTime) -> Measurement:
+    """Begin one measurement of this function."""
+    return _FUNCTIONS[function](inputs, channels, gate)

@@ -61,10 +61,6 @@ _FUNCTIONS = {
     "PER:BTB": Function("PERiod:BTBack", kind="SPER"),
     "PER:SING": Function("PERiod:SINGle", kind="SPER"),
     "TINT": Function("TINTerval", inputs=2),
-    "PWID": Function("PWIDth"),
-    "NWID": Function("NWIDth"),
-    "PDUT": Function("PDUTycycle"),
-    "NDUT": Function("NDUTycycle"),
 }
 #: Behind CONFigure and MEASure: header, function, and whether an array of results is meant.
 _WAYS = tuple(
@@ -160,7 +156,8 @@ class VirtualCNT91(VirtualCounter):
     """Pendulum CNT-91, sold as Tektronix FCA3100 as well.
 
     native: what has no result is answered with an empty line or a binary not-a-number, and not with 9.91E37 (the GPIB
-    modes native and compatible, handbook, 8-36).  The inputs 1 and 2 are called A and B on the front.
+    modes native and compatible, handbook, 8-36).  The inputs 1 and 2 are called A and B on the front.  Widths of pulses
+    and duty cycles are missing.
 
     Sources: Programmer's Handbook of the CNT-90 series, 4031 600 90201 (pages as cited); PyMeasure's CNT91, QMI's
     Tektronix_FCA3000 and QCoDeS's FCA3100 for what programs send.  What follows no source: the order of the limits
@@ -293,7 +290,7 @@ class VirtualCNT91(VirtualCounter):
         """See the base."""
         return 5.0 * self.value(f"attenuation{channel}")
 
-    def trigger_input(self, channel: int, *, falling: bool) -> TriggerInput:
+    def trigger_input(self, channel: int) -> TriggerInput:
         """See the base.  Back to back, and for times, an automatic level is one level with a narrow hysteresis."""
         wide = self._function in {"FREQ", "PER"}
         return TriggerInput(
@@ -303,7 +300,7 @@ class VirtualCNT91(VirtualCounter):
             upper=_UPPER if wide else 0.5,
             lower=_LOWER if wide else 0.5,
             alternating=self.settings[f"coupling{channel}"] == "AC",
-            falling=falling,
+            falling=self.is_falling(channel),
         )
 
     # --- series ---
