@@ -143,6 +143,11 @@ def _renumber(groups: tuple[Limits, ...], order: Sequence[int]) -> tuple[Limits,
     return tuple(replace(group, runs=tuple(order.index(k) for k in group.runs)) for group in groups)
 
 
+def _apart(analysis: LimitAnalysis) -> str:
+    both = len({run.which for run in analysis.runs}) > 1
+    return "some groups measured lower limits, others upper ones: give the runs of each alone" if both else ""
+
+
 LIMIT = Analysis(
     name="limit",
     experiments=frozenset({"limit"}),
@@ -165,4 +170,5 @@ LIMIT = Analysis(
     row=LIMIT_ROW,
     symbols=symbols_of(QUANTITIES),
     compared=("mean",),
+    apart=_apart,
 )

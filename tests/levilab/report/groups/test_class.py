@@ -185,6 +185,16 @@ def test_groups_that_held_different_spins_have_no_mean_drag(tmp_path):
     write_class([tmp_path / "class"], tmp_path / "class.xlsx")
 
 
+def test_lower_and_upper_limits_have_no_mean(tmp_path):
+    for kind in ("lower", "upper"):
+        shutil.copytree(SAMPLE_DATA / f"{kind}-limits", tmp_path / kind)
+        record = json.loads((tmp_path / kind / RECORD).read_text(encoding="utf-8"))
+        (tmp_path / kind / RECORD).write_text(json.dumps(record | {"group": kind}), encoding="utf-8")
+    of = compared(tmp_path, "limit")
+    assert all(of.quantities[0].estimates)
+    assert "has no mean: some groups measured lower limits, others upper ones" in verdict(of)
+
+
 def test_page_and_pdf_begin_with_the_result(of_three, tmp_path):
     page = write_class([of_three], tmp_path / "new" / "class.html").read_text(encoding="utf-8")
     places = [page.index(f">{title}<") for title in ("Result", "Figure", "Runs")]
