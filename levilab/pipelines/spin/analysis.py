@@ -37,7 +37,7 @@ from levilab.pipelines.options import SpinOptions
 from levilab.pipelines.row import Column, Quantity, columns_of, entry
 from levilab.pipelines.spin.magnetometer import FieldRecord, findings_of, spin_of_line, track_middle
 from levilab.pipelines.spin.readings import Records, track_of_record
-from levilab.pipelines.spin.words import NEAR_UNUSED, finding_text
+from levilab.pipelines.spin.words import NEAR_UNUSED, finding_text, finding_weight
 from levilab.present.numbers import with_decimals, with_uncertainty
 from levilab.texts.note import Note, kind_of
 from levilab.texts.text import Sentences, Text
@@ -238,8 +238,9 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
 
     def about_run(self, run: SpinRun) -> Iterable[str]:
         """Return what to know of one input."""
-        said = ((note.name, finding_text(note, run.series.of)) for note in run.notes)
-        return (Note(kind, Text("{text} ({kind:s})", text=text, kind=kind)) for kind, text in said)
+        for note in run.notes:
+            text = Text("{text} ({kind:s})", text=finding_text(note, run.series.of), kind=note.name)
+            yield Note(note.name, text, weight=finding_weight(note))
 
 
 #: Number of samples that show the steps of a converter; closer numbers than this part of their range are rounding.

@@ -6,10 +6,18 @@ from types import MappingProxyType
 from analysis.numbers import digits
 from analysis.pulses import Finding
 from levilab.present.numbers import enumeration, filled
+from levilab.texts.note import Weight
 from levilab.texts.text import Text, how_many
 
+#: Findings that leave open which of several spins is the right one.
+_DOUBTS = frozenset({"fast", "fold-doubt"})
 #: About the option `near` where it has no effect.
 NEAR_UNUSED = "`near` is not used: only a magnetometer's samples and a film's pictures leave a choice of spins"
+
+
+def finding_weight(found: Finding) -> Weight:
+    """Return the weight of a finding."""
+    return "doubt" if found.name in _DOUBTS else "warning"
 
 
 def finding_text(found: Finding, part: str = "window") -> str:

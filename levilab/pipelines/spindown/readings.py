@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from analysis.errors import AnalysisError, NotPositive, TimesNotIncreasing
 from analysis.numbers import digits
-from analysis.pulses import Track, phases, track_of_times
+from analysis.pulses import Finding, Track, phases, track_of_times
 from analysis.pulses.times import FASTEST_BY_HAND_HZ
 from analysis.rotation import FieldTrack, track_of_field
 from analysis.rotation.track import WINDOW_S as FIELD_WINDOW_S
@@ -37,7 +37,7 @@ from levilab.pipelines.inputs.source import Readings
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.spin.magnetometer import FieldRecord, findings_of, read_field_record
 from levilab.pipelines.spin.readings import track_of_record
-from levilab.pipelines.spin.words import NEAR_UNUSED, finding_text
+from levilab.pipelines.spin.words import NEAR_UNUSED, finding_text, finding_weight
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run
 from levilab.texts.note import Note, of_file
@@ -47,6 +47,8 @@ from levilab.texts.text import Text, how_many, text_of
 QUANTITIES = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: Length of a window of a record, in which its frequency is one reading [s].
 WINDOW_S = 2.0
+#: No top falls below this: the published limits are 21.86 Hz, less five times their scatter [Hz].
+_LOWEST_FALL_HZ = 20.6
 _NAMED = "{name:s}: {text}"
 
 
@@ -173,11 +175,16 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
             track = track_of_record(record, options.channel, WINDOW_S, "auto")
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)("{path:s}: {error}", path, error) from error
-    notes = [of_file(note.name, Text(_NAMED, name=path.name, text=finding_text(note))) for note in track.notes]
+    notes = [_note(path, note) for note in track.notes]
     what = Text(
         "a list of pulse times of {s:n} s" if times is not None else "a record of {s:n} s", s=digits(duration, 3)
     )
     return _of_track(path, track, WINDOW_S, what, (record.warnings, notes))
+
+
+def _note(path: "Path", found: Finding) -> Note:
+    text = Text(_NAMED, name=path.name, text=finding_text(found))
+    return of_file(found.name, text, finding_weight(found))
 
 
 def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions") -> SpinReadings:
@@ -188,7 +195,7 @@ def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions")
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)("{path:s}: {error}", path, error) from error
     found = findings_of(track.spins)
-    notes = [of_file(note.name, Text(_NAMED, name=path.name, text=finding_text(note))) for note in found]
+    notes = [_note(path, note) for note in found]
     what = Text("a magnetometer's record of {s:n} s", s=digits(record.duration, 3))
     window = record.duration / round(record.duration / FIELD_WINDOW_S)
     readings = _of_track(path, track, window, what, (record.warnings, notes))
@@ -302,7 +309,7 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
         say = _say_unit(table, "t", {unit: length_of(lasts / factor * of) for unit, of in units})
         text = "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz in {length}, in air it takes minutes{say}"
         return [_doubt(Text(text, table.path.name, first, last, length_of(lasts), say))]
-    if first > FASTEST_BY_HAND_HZ and FALLS_BETWEEN_HZ[1] < last / 2 < FALLS_BETWEEN_HZ[0]:
+    if first > FASTEST_BY_HAND_HZ and _LOWEST_FALL_HZ < last / 2 < FALLS_BETWEEN_HZ[0]:
         doubt = Text(
             "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz: is each turn counted twice? No hand starts a "
             "top so fast, and it falls at {half:.3g} Hz; f=NAME [1/2s] halves the numbers",

@@ -340,10 +340,30 @@ def test_pulse_times_in_microseconds_without_a_unit_are_asked_for_it(write):
     assert read_record(write(f"t [us]\n{times}")).times[1] == pytest.approx(0.025, rel=1e-12)
 
 
-def test_times_from_pulse_to_pulse_are_no_times_of_pulses(write):
+@pytest.mark.parametrize(("title", "unit"), [("dt [ms]", 1e-3), ("Periode in ms", 1e-3), ("T us", 1e-6), ("", 1e-6)])
+def test_times_from_pulse_to_pulse_are_added(title, unit, write):
     """A micro-controller prints them, and those of a top that slows increase as well."""
+    turns = 25e-3 + 2.3e-6 * np.arange(300)
+    record = read_record(write(f"{title}\n" + "".join(f"{turn / unit:.4f}\n" for turn in turns)))
+    np.testing.assert_allclose(record.times, np.cumsum(turns), rtol=1e-7)
+    assert "taken for times from pulse to pulse, of 38.93 to 40 Hz" in record.warnings[0]
+
+
+def test_times_of_pulses_are_not_added_though_they_could_be_turns(write):
+    times = 20 + np.arange(1000) / 30  # as ms they would be turns of 50 to 19 Hz
+    record = read_record(write("".join(f"{time:.5f}\n" for time in times)))
+    np.testing.assert_allclose(record.times, times, atol=1e-5)
+
+
+def test_times_too_near_are_no_times_of_pulses(write):
     with pytest.raises(TableError, match=r"2\.3e-06 s apart, and no top turns so fast: of times from"):
-        read_record(write("dt [ms]\n" + "".join(f"{25 + 0.0023 * k:.4f}\n" for k in range(300))))
+        read_record(write("dt [ms]\n" + "".join(f"{2.5 + 0.0023 * k:.4f}\n" for k in range(300))))
+
+
+@pytest.mark.parametrize("title", ["Pulse time us", "t us"])
+def test_the_last_word_of_a_title_is_the_unit(title, write):
+    record = read_record(write(f"{title}\n" + "".join(f"{25_000 * k}\n" for k in range(300))))
+    assert record.times[1] == pytest.approx(0.025, rel=1e-12)
 
 
 @pytest.mark.parametrize("title", ["f [Hz]", "rpm", "signal [V]", "height"])

@@ -132,6 +132,15 @@ def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path):
     assert len(SPIN.analyze([path]).runs[0].series) == 15
 
 
+@pytest.mark.parametrize("analysis", [SPIN, SPINDOWN], ids=["spin", "spindown"])
+def test_a_spin_too_fast_for_a_hand_is_doubted(analysis, tmp_path):
+    path, turns = tmp_path / "two-marks.csv", 2 * coasting_turns(t := np.linspace(0, 10, 10_001))
+    times = np.interp(np.arange(1, int(turns[-1])), turns, t)
+    path.write_text("pulse time [s]\n" + "".join(f"{x:.7f}\n" for x in times), encoding="utf-8")
+    (doubt,) = analysis.analyze([path]).doubts
+    assert "Hz is too fast for a hand: without a drive there are two marks at" in doubt
+
+
 def test_a_record_that_is_too_short_is_no_spin_down(sample_data):
     with pytest.raises(DoesNotSuit, match=r"lasts 0\.5 s, a spin-down needs 3 windows of 2 s"):
         SPINDOWN.analyze([sample_data / "scope-files" / "recording.wav"])

@@ -88,7 +88,8 @@ def test_points_behind_thousands_are_named_where_they_pass_for_decimals(tmp_path
 
 
 @pytest.mark.parametrize(
-    ("first", "last", "asks"), [(76, 44, True), (76, 49.8, True), (76, 60, False), (50, 44, False), (66, 42, False)]
+    ("first", "last", "asks"),
+    [(76, 44, True), (76, 49.8, True), (76, 60, False), (50, 44, False), (76, 42, True), (66, 41, False)],
 )
 def test_a_count_that_ends_at_twice_the_lower_limit_is_doubted(first, last, asks, tmp_path):
     readings = spin_readings(table_of(tmp_path, f"t,f\n0,{first}\n90,{(first + last) / 2}\n180,{last}\n"))
