@@ -17,12 +17,12 @@ from instruments.virtual.core.parameters import choice, number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Text, Word, whole
 from instruments.virtual.oscilloscope.record import Record
-from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input, levels
+from instruments.virtual.oscilloscope.scope import SETUP, VirtualOscilloscope, at_input, levels
 
 #: The fastest rate [1/s].
 _FASTEST = 2e9
 #: Bits of the operation status register.
-_RUN, _WAIT_TRIGGER, _OVERLOAD = 8, 32, 2048
+_RUN, _WAIT_TRIGGER = 8, 32
 #: Points of a record for the screen.
 _FOR_SCREEN = 62_500
 
@@ -80,17 +80,11 @@ _CONTROL: tuple[Row, ...] = (
     Both("DIGitize", lambda s, p: s.digitize_sources(p)),
     Both("AUToscale", lambda s, _p: s.autoscale()),
     Do("TRIGger:FORCe", lambda s: s.force()),
-    Do("CDISplay"),
-    Ask("TER", lambda s: s.trigger_event()),
     Ask("AER", lambda s: s.arm_event()),
-    Ask("ADER", lambda s: f"{int(not s.running() and s.acquisition.latest is not None):+d}"),  # a record is complete
     Ask("OPERegister:CONDition", lambda s: f"{s.condition():+d}"),
     Ask("OPERation:CONDition", lambda s: f"{s.condition():+d}"),
     Ask("OPERegister[:EVENt]", lambda s: f"{s.condition():+d}"),
-    Ask("RSTate", lambda s: s.state()),
-    Ask("*LRN", lambda s: ":SYST:SET " + s.block(s.setup())),
     Ask("*OPT"),
-    *PRESETS,
 )
 _TIME: tuple[Row, ...] = (
     Word("TIMebase:MODE", "time_mode", "MAIN WINDow XY ROLL"),
@@ -116,14 +110,12 @@ _TRIGGER: tuple[Row, ...] = (
     Word("TRIGger[:EDGE]:SOURce", "trigger_source", lambda s: s.channel_words() + " EXTernal LINE WGEN", "CHAN1"),
     Word("TRIGger[:EDGE]:SLOPe", "trigger_slope", "NEGative *POSitive EITHer ALTernate"),
     Number("TRIGger[:EDGE]:LEVel", "trigger_level", 0.0, levels(6), "V"),
-    Do("TRIGger:LEVel:ASETup", lambda s: s.half_level()),
     Word("TRIGger:SWEep", "trigger_sweep", "AUTO NORMal"),
     Word("TRIGger[:EDGE]:COUPling", "trigger_coupling", "AC *DC LFReject"),
     Word("TRIGger[:EDGE]:REJect", "trigger_rejection", "OFF LFReject HFReject"),
     Number("TRIGger:HOLDoff", "holdoff", 60e-9, (60e-9, 10.0), "S"),
     Switch("TRIGger:NREJect", "noise_rejection"),
     Switch("TRIGger:HFReject", "high_rejection"),
-    Ask("TRIGger", lambda s: s.whole_trigger()),
 )
 #: Fields of the preamble that can be asked for by themselves, and their places in it.
 _PARTS = {"TYPE": 1, "COUNt": 3, "XINCrement": 4, "XORigin": 5, "XREFerence": 6}
@@ -143,10 +135,8 @@ _WAVEFORM: tuple[Row, ...] = (
 _REST: tuple[Row, ...] = (
     Own("MEASure:SOURce", lambda s, p: s.set_source(p), lambda s: str(s.settings["measure_source"])),
     Word("MEASure:SHOW", "measure_shown", "1 ON"),
-    Do("MEASure:CLEar", lambda s: s.clear_results()),
-    Ask("MEASure:RESults", lambda s: s.all_results()),
     *(
-        Both(f"MEASure:{word}", lambda s, p, m=name: s.install(m, p), lambda s, p, m=name: s.measurement(m, p))
+        Both(f"MEASure:{word}", lambda s, p: s.install(p), lambda s, p, m=name: s.measurement(m, p))
         for word, name in _MEASUREMENTS.items()
     ),
     Both("DISPlay:DATA", answer=lambda s, p: s.picture(p)),
@@ -174,7 +164,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
 
     def __init__(self, clock: Clock, *, channels: int = 2, memory: int = 1_000_000, **model: Any) -> None:
         self._memory = memory
-        self._results: list[tuple[str, int]] = []
         super().__init__(clock, channels=channels, **model)
 
     def spell(self, value: float) -> str:
@@ -206,13 +195,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
         """``*TRG`` is the same as ``:DIGitize`` without a source."""
         self.digitize_sources([])
 
-    def trigger_event(self) -> str:
-        """TER?: whether it has triggered since this was asked."""
-        acquisition = self.acquisition
-        acquisition.follow(self.now)
-        event, acquisition.was_triggered = acquisition.was_triggered, False
-        return f"{int(event):+d}"
-
     def arm_event(self) -> str:
         """AER?: whether it was armed since this was asked."""
         acquisition = self.acquisition
@@ -227,12 +209,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
             return 0
         waits = self.now >= self.acquisition.filled and self.acquisition.first(self.now) is None
         return _RUN + _WAIT_TRIGGER * waits
-
-    def state(self) -> str:
-        """RSTate?: RUN, SING or STOP."""
-        if not self.running():
-            return "STOP"
-        return "SING" if self.acquisition.once else "RUN"
 
     # --- settings as a whole ---
 
@@ -252,16 +228,6 @@ class VirtualDSOX1000(VirtualOscilloscope):
         s = self.settings
         ten, position = 10 * self.value("time_scale"), self.value("time_offset")
         return f":TIM:MODE {s['time_mode']};REF {s['time_reference']};MAIN:RANG {ten:+.5E};POS {position:+.6E}"
-
-    def whole_trigger(self) -> str:
-        """Return the answer to ``:TRIG?``."""
-        s = self.settings
-        return (
-            f":TRIG:MODE {s['trigger_mode']};SWE {s['trigger_sweep']};NREJ {int(s['noise_rejection'])};"
-            f"HFR {int(s['high_rejection'])};HOLD {self.value('holdoff'):+.3E};"
-            f":TRIG:EDGE:SOUR {s['trigger_source']};LEV {self.value('trigger_level'):+.5E};"
-            f"SLOP {s['trigger_slope']};REJ {s['trigger_rejection']};COUP {s['trigger_coupling']}"
-        )
 
     # --- scaling ---
 
@@ -364,25 +330,14 @@ class VirtualDSOX1000(VirtualOscilloscope):
             return self.channel_of(str(self.settings["measure_source"]))
         return self.channel_of(parameters[-1])
 
-    def install(self, name: str, parameters: list[str]) -> None:
-        """MEASure:FREQuency and its like: a measurement more on the screen.  Raises ScpiError."""
-        self._results = [*self._results, (name, self._where(parameters))][-8:]
-
-    def clear_results(self) -> None:
-        """MEASure:CLEar."""
-        self._results = []
+    def install(self, parameters: list[str]) -> None:
+        """MEASure:FREQuency and its like: a measurement for the screen; its source must exist.  Raises ScpiError."""
+        self._where(parameters)
 
     def measurement(self, name: str, parameters: list[str]) -> str:
         """MEASure:FREQuency? and its like.  Raises ScpiError."""
-        return self._value(name, self._where(parameters))
-
-    def _value(self, name: str, channel: int) -> str:
-        value = self.measure(name, channel)
+        value = self.measure(name, self._where(parameters))
         return self.spell(100 * value if name in _PERCENT and value < self.no_measurement else value)
-
-    def all_results(self) -> str:
-        """MEASure:RESults?: what was installed, one after the other."""
-        return ",".join(self._value(name, channel) for name, channel in self._results) or "NONE"
 
     def picture(self, parameters: list[str]) -> str:
         """Return the picture, for ``[<format>[,<palette>]]``.  Raises ScpiError."""

@@ -15,7 +15,7 @@ from instruments.virtual.core.parameters import boolean, choice, limit, number, 
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Word, whole
 from instruments.virtual.oscilloscope.record import Codes, Record
-from instruments.virtual.oscilloscope.scope import PRESETS, SETUP, VirtualOscilloscope, at_input, levels, one_two_five
+from instruments.virtual.oscilloscope.scope import SETUP, VirtualOscilloscope, at_input, levels, one_two_five
 
 #: Points of the record for one channel shown; half of it for two, a quarter for more.
 _DEPTHS = (12_000, 120_000, 1_200_000, 12_000_000, 24_000_000)
@@ -73,7 +73,6 @@ _CONTROL: tuple[Row, ...] = (
     Do("CLS", lambda s: s.clear_status()),
     Do("CALibrate:STARt"),
     Do("CALibrate:QUIT"),
-    *PRESETS,
 )
 _TIME: tuple[Row, ...] = (
     Number("TIMebase[:MAIN]:SCALe", "time_scale", 1e-6, (5e-9, 50.0), "S", rounded=one_two_five),
@@ -98,7 +97,6 @@ _TRIGGER: tuple[Row, ...] = (
     Number("TRIGger:HOLDoff", "holdoff", 16e-9, (16e-9, 10.0), "S"),
     Switch("TRIGger:NREJect", "noise_rejection"),
     Ask("TRIGger:STATus", lambda s: s.status_word()),
-    Do("TLHAlf", lambda s: s.half_level()),
 )
 _PARTS = ("XINCrement", "XORigin", "XREFerence", "YINCrement", "YORigin", "YREFerence")
 _WAVEFORM: tuple[Row, ...] = (

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from instruments.clock import Clock
 from instruments.virtual.core.device import VirtualInstrument
-from instruments.virtual.core.parameters import block_content, block_text, choice, number, parameter
+from instruments.virtual.core.parameters import block_content, block_text, choice, parameter
 from instruments.virtual.core.parser import ScpiError, Value
 from instruments.virtual.core.rows import Both, short_header
 from instruments.virtual.core.signal import Signal, crossings, no_signal
@@ -74,7 +74,6 @@ class VirtualOscilloscope(VirtualInstrument):
         self._signals = signals
         self.acquisition = Acquisition(self._plan, keeps_old=self.keeps_old, switched_on=clock.now())
         self._restoring = False
-        self._kept: dict[int, str] = {}
         super().__init__(clock, identity=identity, numbered=self.channels)
 
     # --- what a subclass says of its numbers and its scaling ---
@@ -203,15 +202,6 @@ class VirtualOscilloscope(VirtualInstrument):
                 self.parser.run(line.partition(";")[0])
         finally:
             self._restoring = False
-
-    def keep(self, parameters: list[str]) -> None:
-        """*SAV: the setup in one of ten places."""
-        self._kept[_place(parameters)] = self.setup().decode("latin-1")
-
-    def recall(self, parameters: list[str]) -> None:
-        """*RCL: the setup of a place, if there is one."""
-        if (where := _place(parameters)) in self._kept:
-            self.restore(self._kept[where])
 
     # --- acquiring ---
 
@@ -364,14 +354,6 @@ class VirtualOscilloscope(VirtualInstrument):
 
     # --- settings from the signal ---
 
-    def half_level(self) -> None:
-        """Return the trigger level half way between the lowest and the highest voltage on the screen."""
-        channel = self.source_channel()
-        if channel is not None:
-            trace, name = self.on_screen(channel), self.level_name(channel)
-            self.settings[name] = float(trace.volts.max() + trace.volts.min()) / 2
-            self.on_change(name)
-
     def autoscale(self) -> None:
         """Fit scale, offset, time base and level to the signals at the inputs."""
         for n in self.channels:
@@ -394,17 +376,12 @@ class VirtualOscilloscope(VirtualInstrument):
         self.run()
 
 
-def _place(parameters: list[str]) -> int:
-    return int(number(parameter(parameters), low=0, high=9, default=0))
-
-
-#: The setup as a block, and setups in ten places.
+#: The setup as a block.
 SETUP = Both(
     "SYSTem:SETup",
     lambda s, p: s.restore(block_content(parameter(p)).decode("latin-1")),
     lambda s, _p: s.block(s.setup()),
 )
-PRESETS = (Both("*SAV", lambda s, p: s.keep(p)), Both("*RCL", lambda s, p: s.recall(p)))
 
 
 def at_input(lowest: float, highest: float) -> Callable[[VirtualOscilloscope, int], tuple[float, float]]:

@@ -18,7 +18,7 @@ from instruments.virtual.core.parameters import choice, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Tell, Word, short_header
 from instruments.virtual.oscilloscope.record import Record
-from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, levels, one_two_five
+from instruments.virtual.oscilloscope.scope import VirtualOscilloscope, at_input, levels, one_two_five
 
 _COLUMNS = 14
 #: The fastest rate [1/s] and the points of the memory, where one channel of a pair is on; half of both with two.
@@ -99,7 +99,7 @@ class VirtualSDS1000XE(VirtualOscilloscope):
     identity = "Siglent Technologies,SDS1104X-E,VIRTUAL,8.2.6.1.37R9"
     columns, lowest, digits, keeps_old = _COLUMNS, 0, 9, True
     path_memory = False
-    ROWS: ClassVar = (*_REST, *PRESETS)
+    ROWS: ClassVar = _REST
     CHANNEL_ROWS: ClassVar = _CHANNEL
     DEFAULTS: ClassVar = {"trigger_source": "C1"}
 

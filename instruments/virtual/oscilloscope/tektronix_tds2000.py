@@ -16,7 +16,7 @@ from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Number, Own, Row, Switch, Word, short_header, whole
 from instruments.virtual.oscilloscope.acquisition import LOOK_AHEAD
 from instruments.virtual.oscilloscope.record import Record
-from instruments.virtual.oscilloscope.scope import PRESETS, VirtualOscilloscope, at_input, levels
+from instruments.virtual.oscilloscope.scope import VirtualOscilloscope, at_input, levels
 
 _POINTS, _COLUMNS, _CODES = 2500, 10, 25
 _PROBES = (1.0, 10.0, 20.0, 50.0, 100.0, 500.0, 1000.0)
@@ -122,7 +122,6 @@ _ROWS: tuple[Row, ...] = (
     LongWord("MEASUrement:IMMed:TYPe", "wav_measurement", " ".join(_MEASUREMENTS)),
     Ask("MEASUrement:IMMed:UNIts", lambda s: s.reply("MEASUrement:IMMed:UNIts", f'"{s.measurement()[1]}"')),
     Ask("MEASUrement:IMMed:VALue", lambda s: s.reply("MEASUrement:IMMed:VALue", s.measured_value())),
-    *PRESETS,
 )
 
 
@@ -225,11 +224,9 @@ class VirtualTDS2000(VirtualOscilloscope):
             self.stop()
 
     def act_on_trigger(self, parameters: list[str]) -> None:
-        """TRIGger FORCe, or SETLevel to the middle of the signal.  Raises ScpiError."""
-        if choice(parameter(parameters), ("FORCe", "SETLevel")) == "FORC":
-            self.force()
-        else:
-            self.half_level()
+        """TRIGger FORCe.  Raises ScpiError."""
+        choice(parameter(parameters), ("FORCe",))
+        self.force()
 
     def state(self) -> str:
         """TRIGger:STATE?: ARMED, READY, TRIGGER, AUTO or SAVE."""

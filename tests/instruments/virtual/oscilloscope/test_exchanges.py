@@ -165,10 +165,6 @@ MEASURED = {
     },
     "what a trace does not show, the Rigol": (of(rigol, constant(0.0)), (":MEAS:ITEM? FREQ,CHAN1", 9.9e37)),
     "what a trace does not show, the Keysight": (of(keysight, constant(0.0)), (":MEAS:FREQ? CHAN1", 9.9e37)),
-    "measurements that were installed can be cleared": (
-        *(READY, ":MEAS:VMAX", ":MEAS:VMIN", lambda device: device.execute(":MEAS:RES?").data.count(b",") == 1),
-        *(":MEAS:CLE", (":MEAS:RES?", "NONE")),
-    ),
 }
 
 WRONG = (
@@ -236,9 +232,6 @@ WAITING = {
     "the operation register shows running and waiting": (  # at first the part before the trigger is filled
         *(of(keysight, pulses, *HIGH, ":SING"), (":OPER:COND?", "+8"), 1.0, (":OPER:COND?", "+40")),
         *((":AER?", "+1"), (":AER?", "+0"), ":STOP", (":OPER:COND?", "+0")),
-    ),
-    "the trigger event is answered once": (
-        *(of(keysight, pulses, *KEYSIGHT_READY, ":SING"), (":TER?", "+0"), 1.0, (":TER?", "+1"), (":TER?", "+0")),
     ),
     **{
         f"there is no record in the mode {mode}": (
