@@ -290,29 +290,16 @@ class Ask(Row):
 
 
 @dataclass(frozen=True)
-class Tell(Ask):
-    """A command that is answered, without parameters; its query is the same."""
-
-    def has(self, *, query: bool) -> bool:
-        """See the base."""
-        return True
-
-    def set(self, device: Any, parameters: list[str]) -> Steps[str] | str:
-        """See the base."""
-        return self.ask(device, parameters)
-
-
-@dataclass(frozen=True)
 class Both(Row):
     """A command, a query or both, whose functions read the parameters themselves.
 
     Attributes:
-        act: the command, given the device and the parameters; None: there is no command.
+        act: the command, given the device and the parameters, which may be answered, too; None: there is no command.
         answer: the same for the query.
         keeps: the setting behind it, where it has one, with its default.
     """
 
-    act: Callable[..., Steps[None] | None] | None = field(default=None, repr=False)
+    act: Callable[..., Steps[Any] | str | None] | None = field(default=None, repr=False)
     answer: Callable[..., Steps[str] | str] | None = field(default=None, repr=False)
     keeps: tuple[str, Value] | None = None
 
@@ -324,7 +311,7 @@ class Both(Row):
         """See the base."""
         return {self.keeps[0].format(n=self.of[0] if self.of else 0): self.keeps[1]} if self.keeps else {}
 
-    def set(self, device: Any, parameters: list[str]) -> Steps[None] | None:
+    def set(self, device: Any, parameters: list[str]) -> Steps[Any] | str | None:
         """See the base."""
         assert self.act
         return self.act(device, *self.of, parameters)

@@ -6,7 +6,7 @@ from collections.abc import Generator
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from instruments.ieee488 import INFINITY, NOT_A_NUMBER
+from instruments.ieee488 import INFINITY
 from instruments.virtual.core.parameters import block_text, choice, number, parameter
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Word
@@ -155,9 +155,8 @@ class _Pacing:
 class VirtualCNT91(VirtualCounter):
     """Pendulum CNT-91, sold as Tektronix FCA3100 as well.
 
-    native: what has no result is answered with an empty line or a binary not-a-number, and not with 9.91E37 (the GPIB
-    modes native and compatible, handbook, 8-36).  The inputs 1 and 2 are called A and B on the front.  Widths of pulses
-    and duty cycles are missing.
+    What has no result is answered with 9.91E37, as in the GPIB mode compatible (handbook, 8-36).  The inputs 1 and 2 are
+    called A and B on the front.  Widths of pulses and duty cycles are missing.
 
     Sources: Programmer's Handbook of the CNT-90 series, 4031 600 90201 (pages as cited); PyMeasure's CNT91, QMI's
     Tektronix_FCA3000 and QCoDeS's FCA3100 for what programs send.  What follows no source: the order of the limits
@@ -169,7 +168,6 @@ class VirtualCNT91(VirtualCounter):
     FUNCTIONS: ClassVar = _FUNCTIONS
     CHANNEL_ROWS: ClassVar = _INPUT
     ROWS: ClassVar = (*SHARED, *SYSTEM, *_MEASURING, *_FETCHING, *_ARMING, *_FORMAT, *_CALCULATION, *_SYSTEM)
-    native = False
 
     def abandon(self) -> None:
         """ABORt, and device clear; a free-running counter begins again."""
@@ -406,17 +404,11 @@ class VirtualCNT91(VirtualCounter):
         stamped = bool(self.settings["stamps"])
         numbers = [number for pair in pairs for number in pair[: 1 + stamped]]
         if kind == "ASC":
-            return ",".join(self._missing(value) for value in numbers)
-        missing = math.nan if self.native else NOT_A_NUMBER
+            return ",".join(map(number_text, numbers))
         if kind == "REAL":
-            reals = (missing if value == NOT_A_NUMBER else value for value in numbers)
-            return ",".join(block_text(struct.pack(order + "d", value)) for value in reals)
+            return ",".join(block_text(struct.pack(order + "d", value)) for value in numbers)
         data = b"".join(
-            struct.pack(order + "d", missing if value == NOT_A_NUMBER else value)
-            + (struct.pack(order + "q", round(stamp * 1e12)) if stamped else b"")
+            struct.pack(order + "d", value) + (struct.pack(order + "q", round(stamp * 1e12)) if stamped else b"")
             for value, stamp in pairs
         )
         return block_text(data) if size_known else f"#6{len(data):06d}" + data.decode("latin-1")
-
-    def _missing(self, value: float) -> str:
-        return "" if self.native and value == NOT_A_NUMBER else number_text(value)

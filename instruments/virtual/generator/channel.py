@@ -293,10 +293,6 @@ class Channel:
         """Set the period, of all waveforms but samples [s]."""
         self["frequency"] = 1 / value
 
-    def square_periods(self) -> tuple[float, float]:
-        """Return the limits of the period of a square wave [s]."""
-        return 1 / self.family.waveform("SQU").top, 1e6
-
     def square_duties(self) -> tuple[float, float]:
         """Return the limits of the duty cycle of a square wave [%]."""
         return self.family.square(self.number("frequency"))
@@ -417,10 +413,6 @@ class Channel:
     def set_pulse_duty(self, duty: float) -> None:
         """Set the duty cycle of pulses [%], and with it their width."""
         self["pulse_duty"], self["pulse_width"] = duty, duty / 100 / self.number("frequency")
-
-    def set_edges(self, time: float) -> None:
-        """Set both edges of pulses [s]."""
-        self["pulse_leading"] = self["pulse_trailing"] = time
 
     # --- triggers ---
 

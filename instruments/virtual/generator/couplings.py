@@ -93,10 +93,9 @@ def _fit_pulse(channel: Channel, cause: str) -> None:
         channel.set_width(min(max(width, low), high))
         channel.conflict(f"pulse width {'decreased' if width > high else 'increased'} due to period")
     edge = channel.family.edge_part * min(channel.number("pulse_width"), 1 / frequency - channel.number("pulse_width"))
-    for name in ("pulse_leading", "pulse_trailing"):
-        if channel.number(name) > edge * (1 + 1e-9):
-            channel[name] = max(edge, channel.family.shortest_edge)
-            channel.conflict("edge time decreased due to pulse width")
+    if channel.number("pulse_edge") > edge * (1 + 1e-9):
+        channel["pulse_edge"] = max(edge, channel.family.shortest_edge)
+        channel.conflict("edge time decreased due to pulse width")
 
 
 def _fit_bursts(channel: Channel) -> None:

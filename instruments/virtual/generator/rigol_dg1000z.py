@@ -43,7 +43,7 @@ _BURST, _SOURCES = "[SOURce[n]:]BURSt", "INTernal EXTernal MANual"
 
 #: The rows that this language shares with Keysight's; the settings of the others stay as they are after ``*RST``.
 _SHARED = (
-    *("FREQuency[:CW|:FIXed]", "SQUare:PERiod", "PHASe[:ADJust]", "SQUare:DCYCle", "RAMP:SYMMetry", "[:AMPLitude]"),
+    *("FREQuency[:CW|:FIXed]", "PHASe[:ADJust]", "SQUare:DCYCle", "RAMP:SYMMetry", "[:AMPLitude]"),
     *("VOLTage:UNIT", "[:IMMediate]:OFFSet", "[:IMMediate]:HIGH", "[:IMMediate]:LOW", "APPLy", "[FUNCtion:]PULSe"),
     *("OUTPut[n][:STATe]", "OUTPut[n]:LOAD", "OUTPut[n]:POLarity", "BURSt:STATe", "BURSt:INTernal:PERiod"),
 )

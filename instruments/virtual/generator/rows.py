@@ -84,12 +84,6 @@ CHANNEL: tuple[Row, ...] = (
         get=lambda c: c.frequency,
         keep=Channel.set_frequency,
     ),
-    Quantity(
-        *("[SOURce[n]:]FUNCtion:SQUare:PERiod", "{n}:frequency", 1e-3, Channel.square_periods, "S"),
-        get=Channel.period,
-        keep=Channel.set_period,
-        alias=True,
-    ),
     Quantity("[SOURce[n]:]PHASe[:ADJust]", "{n}:phase", 0.0, _TURN, angle=True),
     Do("[SOURce[n]:]PHASe:REFerence", lambda _s, _n: None),
     Quantity("[SOURce[n]:]FUNCtion:SQUare:DCYCle", "{n}:duty", 50.0, Channel.square_duties, "PCT"),
@@ -182,7 +176,6 @@ def waveforms(family: Family) -> tuple[Row, ...]:
 
 def pulses(periods: tuple[float, float], edges: tuple[float, float], edge: float) -> tuple[Row, ...]:
     """Return the rows of the times of pulses.  periods, edges: their limits [s]; edge: after ``*RST`` [s]."""
-    edge_of = f"{_PULSE}TRANsition"
     return (
         Quantity(
             *(f"{_PULSE}PERiod", "{n}:frequency", 1e-3, periods, "S"),
@@ -190,9 +183,7 @@ def pulses(periods: tuple[float, float], edges: tuple[float, float], edge: float
             keep=Channel.set_period,
             alias=True,
         ),
-        Quantity(f"{edge_of}:LEADing", "{n}:pulse_leading", edge, edges, "S"),
-        Quantity(f"{edge_of}:TRAiling", "{n}:pulse_trailing", edge, edges, "S"),
-        Quantity(f"{edge_of}[:BOTH]", "{n}:pulse_leading", edge, edges, "S", keep=Channel.set_edges, alias=True),
+        Quantity(f"{_PULSE}TRANsition[:BOTH]", "{n}:pulse_edge", edge, edges, "S"),
     )
 
 

@@ -1,6 +1,5 @@
 """A virtual Lake Shore 475 or 455.  Sources: see lakeshore.py."""
 
-from dataclasses import replace
 from typing import ClassVar
 
 from instruments.virtual.core.line import LineSettings
@@ -39,7 +38,6 @@ _OWN: tuple[Row, ...] = (
     Ask("RDGTEMP", lambda d: field_text(23.0 if d.value("temperature_unit") == 1 else 296.15)),
     Ask("RDGOHM", lambda d: field_text(d.field())),
     Fields("TUNIT", (Field("temperature_unit", 1, 2, 1),)),
-    Fields("BAUD", (Field("baud", 0, 3, 0),)),
     Fields("MODE", (Field("remote", 0, 2, 0),)),
     Fields("CMODE", (Field("control", 0, 1, 0),)),
     Fields("CSETP", (Field("setpoint", -3.5e9, 3.5e9, 0, whole=False),)),
@@ -61,7 +59,6 @@ class Virtual475(VirtualGaussmeter):
         "HST": (3.5e-3, 35e-3, 0.35, 3.5, 35.0),
         "UHS": (3.5e-6, 35e-6, 350e-6, 3.5e-3),
     }
-    _BAUD_RATES = (9600, 19200, 38400, 57600)
     #: Time constant and readings per second by digits less 3 (455 manual, section 1.2, after a public driver).
     _TIME_CONSTANTS, _RATES = (0.01, 0.1, 1.0), (30.0, 30.0, 10.0)
 
@@ -71,10 +68,8 @@ class Virtual475(VirtualGaussmeter):
     ROWS: ClassVar = (*FAMILY, *_OWN)
 
     def on_change(self, name: str) -> None:
-        """BAUD sets this end of the line."""
-        if name == "baud":
-            self.serial_settings = replace(self.serial_settings, baud_rate=self._BAUD_RATES[int(self.value("baud"))])
-        elif name in {"event_enable", "request_enable"}:
+        """Set the masks of the status."""
+        if name in {"event_enable", "request_enable"}:
             setattr(self.status, name, int(self.value(name)))
 
     def reset(self) -> None:

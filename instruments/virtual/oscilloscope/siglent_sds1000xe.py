@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 from instruments.virtual.core.parameters import choice, parameter
 from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.core.rows import Ask, Both, Do, Number, Row, Switch, Tell, Word, short_header
+from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Word, short_header
 from instruments.virtual.oscilloscope.record import Record
 from instruments.virtual.oscilloscope.scope import VirtualOscilloscope, at_input, levels, one_two_five
 
@@ -88,7 +88,7 @@ _REST: tuple[Row, ...] = (
     Both("(SANU|SAMPLE_NUM)", answer=lambda s, p: s.sample_number(p)),
     Ask("(SAST|SAMPLE_STATUS)", lambda s: s.reply("SAST", s.state())),
     Ask("INR", lambda s: s.reply("INR", str(s.internal_state()))),
-    Tell("(SCDP|SCREEN_DUMP)", lambda s: s.picture()),
+    Own("(SCDP|SCREEN_DUMP)", lambda s, _p: s.picture(), lambda s: s.picture()),
     Switch("(BUZZ|BUZZER)", "buzzer", default=True, words=("OFF", "ON")),
 )
 

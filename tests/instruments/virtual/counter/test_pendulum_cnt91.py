@@ -41,12 +41,11 @@ def ready():
 LIGHT = pulses(40.0)
 
 
-def of(*messages, signal=LIGHT, native=False):
+def of(*messages, signal=LIGHT):
     """What makes a counter that looks at this light, after these messages."""
 
     def make(clock):
         device = VirtualCNT91(clock, signal=signal)
-        device.native = native
         for message in messages:
             send(device, message.encode() + b"\n")
         return device
@@ -115,7 +114,6 @@ ROWS = {
     "with a time-out it says that there was nothing": (
         *((of(FIXED_LEVEL, HIGH),), ("READ?", "+9.9100000000000E+37"), took(2.0, 2.03)),
     ),
-    "a native one says so with an empty line": ((of(FIXED_LEVEL, HIGH, native=True),), ("READ?", ""), took(2.0, 2.03)),
     "a time-out shorter than the gate cuts it off": (READY, ("SYST:TOUT 1;TOUT:TIME 0.05;:READ?", 9.91e37)),
     "the automatic level is right at 200 Hz": (
         *((of(signal=pulses(200.0)),), "INP:COUP DC", "ACQ:APER 0.5", ("READ?", pytest.approx(200.0, rel=1e-3))),

@@ -32,17 +32,6 @@ def test_settings_may_be_put_right_while_the_port_is_open():
     assert line.query("*IDN?") == "LSCI,MODEL425,VIRTUAL,1.0"
 
 
-def test_a_command_changes_the_baud_rate_of_the_475():
-    device = meter(Virtual475)
-    line = resource(device, baud_rate=9600)
-    line.write("BAUD 3")
-    with pytest.raises(pyvisa.VisaIOError):
-        line.query("*IDN?")
-    line.baud_rate = 57600
-    line.write("")  # ends what it heard of the last question
-    assert line.query("*IDN?") == "LSCI,MODEL475,VIRTUAL,01012020"
-
-
 def test_bytes_take_their_time_on_the_line():
     device = meter(Virtual475, pace=0.0)
     line = resource(device, baud_rate=9600)
