@@ -155,8 +155,8 @@ class _Pacing:
 class VirtualCNT91(VirtualCounter):
     """Pendulum CNT-91, sold as Tektronix FCA3100 as well.
 
-    What has no result is answered with 9.91E37, as in the GPIB mode compatible (handbook, 8-36).  The inputs 1 and 2 are
-    called A and B on the front.  Widths of pulses and duty cycles are missing.
+    What has no result is answered with 9.91E37, as in the GPIB mode compatible (handbook, 8-36).  The inputs 1 and 2
+    are called A and B on the front.  Widths of pulses and duty cycles are missing.
 
     Sources: Programmer's Handbook of the CNT-90 series, 4031 600 90201 (pages as cited); PyMeasure's CNT91, QMI's
     Tektronix_FCA3000 and QCoDeS's FCA3100 for what programs send.  What follows no source: the order of the limits
