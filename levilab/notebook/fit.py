@@ -30,6 +30,11 @@ def axes_of(frame: pd.DataFrame, residual: str) -> tuple[str, str]:
     return names[0], next(name for name in names[1:] if split(name)[1] == unit and "_u_" not in name)
 
 
+def coverage(sigma: float) -> float:
+    """Return the coverage of a number of standard deviations; one below 1 is the coverage itself, as for lmfit."""
+    return sigma if 0 < sigma < 1 else math.erf(abs(sigma) / math.sqrt(2))
+
+
 def _statistic(name: str) -> Callable[[FittedModel], Any]:
     return lambda of: of.statistics.get(name)
 
@@ -185,7 +190,8 @@ class FittedModel(Named[Quantity]):
         Args:
             x: as of `eval`.
             t: as of `eval`.
-            sigma: standard deviations of a normal number with the same coverage: 1 is 68.3 %, 2 is 95.4 %.
+            sigma: standard deviations of a normal number with the same coverage: 1 is 68.3 %, 2 is 95.4 %; below 1 the
+                coverage.
 
         Raises:
             UsageError: there is no curve.
@@ -235,9 +241,9 @@ class FittedModel(Named[Quantity]):
 
     def _half_width(self, sigma: float) -> float:
         """Return half the width of an interval with the coverage of `sigma`, in u."""
-        from scipy.special import ndtr, stdtrit
+        from scipy.special import stdtrit
 
-        return float(stdtrit(self.freedom, float(ndtr(float(sigma))))) if self.freedom > 0 else math.nan
+        return float(stdtrit(self.freedom, 0.5 + coverage(sigma) / 2)) if self.freedom > 0 else math.nan
 
     @bare
     def conf_interval(self, sigmas: Sequence[float] = (1, 2, 3)) -> dict[str, list[tuple[float, float]]]:
@@ -247,9 +253,10 @@ class FittedModel(Named[Quantity]):
         χ² is traced, which lmfit does: where a parameter is known to some per cent the two agree.
 
         Args:
-            sigmas: standard deviations of a normal number with the same coverage: 1 is 68.3 %, 2 is 95.4 %.
+            sigmas: standard deviations of a normal number with the same coverage: 1 is 68.3 %, 2 is 95.4 %; one below 1
+                is the coverage.
         """
-        sides = [(math.erf(abs(one) / math.sqrt(2)), self._half_width(abs(one))) for one in sorted(sigmas)]
+        sides = sorted((coverage(one), self._half_width(one)) for one in sigmas)
         ends = [*((p, -k) for p, k in reversed(sides)), (0.0, 0.0), *sides]
         return {name: [(p, one.n + k * one.s if k else one.n) for p, k in ends] for name, one in self.items()}
 

@@ -34,9 +34,13 @@ def test_a_law_that_fits_has_the_numbers_of_lmfit(result):
     # lmfit multiplies the stated u by √redchi; here they count as 8 readings beside the 18
     scale = (8 + theirs.chisqr) / (8 + 18) / theirs.redchi
     assert ours.covar == pytest.approx(scale * theirs.covar, rel=0.2)  # and the correlation adds to it
-    assert ours.eval_uncertainty(t) == pytest.approx(np.sqrt(scale) * theirs.eval_uncertainty(t=t), rel=0.1)
+    for sigma in (1, 0.95):
+        theirs_u = np.sqrt(scale) * theirs.eval_uncertainty(t=t, sigma=sigma)
+        assert ours.eval_uncertainty(t, sigma=sigma) == pytest.approx(theirs_u, rel=0.1)
     wide = theirs.conf_interval()["c32"]
     ends = ours.conf_interval()["c32"]
+    lowest = [one.conf_interval(sigmas=[0.95])["c32"][0] for one in (ours, theirs)]
+    assert [p for p, _ in lowest] == [0.95, 0.95]
     assert [p for p, _ in ends] == pytest.approx([p for p, _ in wide])
     half = (wide[4][1] - wide[2][1]) / 2
     assert (ends[4][1] - ends[2][1]) / 2 == pytest.approx(np.sqrt(scale) * half, rel=0.1)
