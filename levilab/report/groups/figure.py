@@ -17,8 +17,8 @@ from levilab.texts.text import in_language
 _LEFT, _RIGHT, _GAP, _HEAD, _FOOT, _ROW = 1.75, 6.85, 0.25, 0.85, 0.55, 0.135
 #: Panels beside each other at most, the distances from the truth included.
 _MOST_PANELS = 3
-#: Of the name of a group, that have room at the left.
-_LETTERS = 26
+#: Of the name of a group, that have room at the left, and those at its end, in which runs of one group differ.
+_LETTERS, _END = 26, 9
 #: Distances from the truth beyond it are arrows at the edge [u].
 _FARTHEST = 4.7
 
@@ -52,7 +52,7 @@ def class_figure(of: Class) -> Figure:
 
 def _label(group: Group) -> str:
     name = label_of_run(group.source.name, 0, 2, "") or ""
-    return name if len(name) <= _LETTERS else f"{name[: _LETTERS - 1]}…"
+    return name if len(name) <= _LETTERS else f"{name[: _LETTERS - _END - 1]}…{name[-_END:]}"
 
 
 def _draw_values(axes: Axes, of: Compared) -> None:

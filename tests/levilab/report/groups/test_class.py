@@ -96,6 +96,13 @@ def test_two_runs_of_a_group_are_no_two_groups(of_three, tmp_path):
     assert "3 runs of 2 groups" in finding(compared(with_changes(of_three, tmp_path, "Group 10", {"group": "Group 2"})))
 
 
+def test_two_runs_of_a_group_have_two_names_in_the_figure(of_three, tmp_path):
+    of = compared(with_changes(of_three, tmp_path, "Group 10", {"group": "Group 2"}))
+    names = [label.get_text() for label in class_figure(of).axes[0].get_yticklabels()]
+    assert len(set(names)) == 3
+    assert sum(name.startswith("Group 2") for name in names) == 2
+
+
 def test_a_folder_is_the_group_of_its_files(tmp_path):
     """Also of a file with several runs, and of one that cannot be read, where all files have the same name."""
     folders = [tmp_path / "class" / name for name in ("Anna", "Ben", "Carl", "Dora")]
