@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from levilab.pipelines.tune.owner import Owner
 
 T = TypeVar("T")
+#: What to type for options that are needed.
+_EXAMPLES = {"top": "24.9g", "temperature": "21.5"}
 _RESULT = "What did it do: floats, rises, sinks, sideways?  A new temperature, as 22 C?  [Enter ends]"
 
 
@@ -157,7 +159,8 @@ def _answer(
         except ValueError as error:
             raise UsageError(name, text_of(error), value=given) from error
     if not asks:
-        raise UsageError(name, "is needed, or `ask` = True to be asked for it")
+        text = "is needed, such as {example:s}, or `ask` = True to be asked for it"
+        raise UsageError(name, Text(text, example=_EXAMPLES[name]))
     while True:
         message(prompt)
         line = sys.stdin.readline()

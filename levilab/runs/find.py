@@ -56,11 +56,19 @@ def _identity(folder: str) -> object:
     return (there.st_dev, there.st_ino) if there.st_ino else os.path.realpath(folder)
 
 
+#: Parts of a correction that a shell took for paths, and what to do.
+_NO_PATHS = (
+    (r"\[[^\[\]]+\]",
+     '{part:s}: is no path; a unit stands with its column in quotation marks: `columns` = "f=2 {part:s}"'),
+    (r"\w+=[\w ]+", "{part:s}: is no path; columns stand together, with a comma: `columns` = t=1,{part:s}"),
+)  # fmt: skip
+
+
 def no_such_path(path: Path) -> DataError:
     """Return the error for a path that does not exist, with a name beside it that is nearly the same."""
-    if re.fullmatch(r"\[[^\[\]]+\]", str(path)):
-        said = '{unit:s}: is no path; a unit stands with its column in quotation marks: `columns` = "f=2 {unit:s}"'
-        return DataError(Text(said, unit=path))
+    for pattern, said in _NO_PATHS:
+        if re.fullmatch(pattern, str(path)):
+            return DataError(Text(said, part=path))
     folder = next(place for place in (path.parent, *path.parent.parents) if place.is_dir())
     wanted = path.relative_to(folder).parts[0] if folder != path.parent else path.name
     near = difflib.get_close_matches(wanted, sorted(one.name for one in folder.iterdir()), n=1, cutoff=0.8)

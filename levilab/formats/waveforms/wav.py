@@ -34,8 +34,19 @@ def read_wav(path: Path) -> Waveform:
         with warnings.catch_warnings(action="ignore"):  # chunks that are not samples
             rate, data = wavfile.read(path, mmap=True)
     except (ValueError, struct.error, EOFError, TypeError, ArithmeticError, UnboundLocalError) as error:
+        whole, there = _riff_size(path), path.stat().st_size
+        if there < whole:
+            what = "is cut off: it holds {there} of {whole} bytes; copy it again, or open it in Audacity and save it"
+            raise TableError(path, what, there, whole) from error
         raise TableError(path, _UNREADABLE, _ADVICE) from error
     return _waveform(path, rate, data)
+
+
+def _riff_size(path: Path) -> int:
+    """Return the size of a file by its header; big-endian files, which are rare, have none here."""
+    with path.open("rb") as stream:
+        head = stream.read(8)
+    return 8 + int.from_bytes(head[4:], "little") if head.startswith(b"RIFF") else 0
 
 
 def _waveform(path: Path, rate: int, data: NDArray[Any]) -> Waveform:

@@ -81,8 +81,8 @@ def test_the_end_of_input_ends_as_enter_does(answers):
 
 
 @pytest.mark.parametrize(("options", "words"), [
-    ((), "levilab: --top: is needed, or --ask to be asked for it"),
-    ((*BENCH,), "levilab: --temperature: is needed, or --ask to be asked for it"),
+    ((), "levilab: --top: is needed, such as 24.9g, or --ask to be asked for it"),
+    ((*BENCH,), "levilab: --temperature: is needed, such as 21.5, or --ask to be asked for it"),
     ((*BENCH, "--temperature", "21,5"), "--temperature 21,5: a temperature of a room such as"),
     ((*BENCH, "--temperature", "21", "--trial", "25 g, rises"), "levilab: --trial 25 g, rises: a mass or washers, "),
     ((*BENCH, "--temperature", "21", "--device", "x"), "levilab: --device: goes with --scan"),

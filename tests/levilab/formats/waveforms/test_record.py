@@ -395,6 +395,13 @@ def test_a_given_rate_goes_before_that_of_a_wav(sample_data, write):
     assert "8000 Hz takes the place of 4000 Hz" in record.warnings[0]
 
 
+def test_a_recording_that_is_cut_off_says_so(sample_data, tmp_path):
+    whole = (sample_data / "scope-files" / "recording.wav").read_bytes()
+    (path := tmp_path / "cut.wav").write_bytes(whole[:1000])
+    with pytest.raises(TableError, match=f"is cut off: it holds 1000 of {len(whole)} bytes; copy it again"):
+        read_record(path)
+
+
 @pytest.mark.parametrize("bits", [8, 16, 24, 32])
 def test_wav_of_every_width(bits, tmp_path):
     samples = np.array([0.0, 0.5, -0.5, 0.25] * 8)
