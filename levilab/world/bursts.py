@@ -89,35 +89,6 @@ def _turns_per_burst(length: float, jitter: float) -> float:
     return 1 + sum(0.5 * math.erfc((k - length) / spread) for k in later)
 
 
-def gated_trains(start: float, period: float, closes: Array, opens: Array, *, closed: bool) -> tuple[Array, Array]:
-    """Return the trains of cycles behind a gate that pulses close: a cycle ends, and the next one waits for the gate.
-
-    Args:
-        start: of the first cycle [s].
-        period: of a cycle [s].
-        closes: when pulses close the gate, shape (n,), increasing [s].
-        opens: when they open it again, shape (m,), increasing [s].
-        closed: whether a pulse keeps the gate closed before the first cycle, which then waits for it to open.
-
-    Returns:
-        When trains start and when they end [s], shape (k,) each; the last one has no end yet, ∞.
-
-    >>> starts, ends = gated_trains(0.0, 1.0, np.array([1.2, 1.9]), np.array([1.4, 2.5]), closed=False)
-    >>> starts.tolist(), ends.tolist()
-    ([0.0, 2.5], [2.0, inf])
-    >>> gated_trains(0.0, 1.0, np.array([1.7]), np.array([0.5, 2.6]), closed=True)[0].tolist()
-    [0.5, 2.6]
-    """
-    opens = np.append(opens[opens > start], np.inf)
-    starts, ends = [float(opens[0]) if closed else start], []
-    for close, again in zip(closes.tolist(), opens[np.searchsorted(opens, closes, side="right")].tolist(), strict=True):
-        end = starts[-1] + period * max(math.ceil((close - starts[-1]) / period), 1)
-        if end < again:
-            ends.append(end)
-            starts.append(again)
-    return np.array(starts), np.array([*ends, np.inf])
-
-
 def burst_starts(edges: Array, length: float) -> Array:
     """Return those of the edges that start a burst: none that comes before the last burst has ended.
 

@@ -2,19 +2,17 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from analysis.arrays import Array
 from instruments.virtual.generator.channel import Output
 from instruments.virtual.generator.voltage import voltage
-from levilab.world.bursts import burst_starts, gated_trains
+from levilab.world.bursts import burst_starts
 from levilab.world.timeline import Timeline
 
 Edges = Callable[[float, float, bool], Array]
-#: A top that floats passes its tape in less: the edges before show whether a pulse is under way [s].
-_PULSE_S = 0.2
 
 
 @dataclass(frozen=True)
@@ -24,21 +22,16 @@ class _Stretch:
     Attributes:
         output: amplitude and offset in T.
         origin: when its phase was turns [s].
-        cycles: behind a gate: at each time that was asked for, the start of the cycle under way, or of the last one
-            [s]: a cycle's place depends on all pulses before.
     """
 
     output: Output
     origin: float
     turns: float
-    cycles: Timeline[float] = field(default_factory=lambda: Timeline(-math.inf, -math.inf), compare=False)
 
     def field(self, times: Array, edges: Edges | None) -> Array:
         """Return the field at times within it [T]."""
         if self.output.triggered and edges:
             return self._triggered_field(times, edges)
-        if self.output.closes is not None and edges:
-            return self._gated_field(times, edges)
         since, burst = times - self.origin, self.output.burst
         if burst is None or burst.period is None:
             return voltage(self.output, self.turns + self.output.frequency * since, times)
@@ -62,36 +55,9 @@ class _Stretch:
         signal = voltage(replace(self.output, amplitude=bursts.amplitude), turns, times)
         return np.where(playing, signal, self.output.offset)
 
-    def trains(self, first: float, last: float, edges: Edges) -> tuple[Array, Array]:
-        """Return when trains of cycles behind a gate start and end [s], with those from first to last."""
-        rate, delay = self.output.frequency, self.output.closes or 0.0
-        start = max(self.cycles.at(first), self.origin - self.turns % 1.0 / rate)
-        since = max(start, self.origin) - delay
-        closes, opens = (edges(since, last, rising) + delay for rising in (True, False))
-        before = [edges(since - _PULSE_S, since, rising).max(initial=-math.inf) for rising in (True, False)]
-        # a cycle that is under way is completed; one that begins needs an open gate
-        return gated_trains(start, 1 / rate, closes, opens, closed=start == self.origin and before[0] > before[1])
-
-    def _gated_field(self, times: Array, edges: Edges) -> Array:
-        """Return the field of cycles behind a gate that pulses at the trigger input close."""
-        rate, first = self.output.frequency, float(times[0])
-        starts, ends = self.trains(first, float(times[-1]), edges)
-        train = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
-        begun, until = float(starts[train[0]]), min(first, float(ends[train[0]]))
-        if begun <= first:
-            self.cycles.cut(first)
-            self.cycles.append(first, begun + max(math.ceil((until - begun) * rate - 1e-9) - 1, 0) / rate)
-        playing = (times >= starts[train]) & (times < ends[train])
-        turns = rate * np.where(playing, times - starts[train], 0.0)
-        return np.where(playing, voltage(self.output, turns, times), self.output.offset)
-
-    def turns_at(self, time: float, edges: Edges | None) -> float:
-        """Return the turns that the waveform has made; of one that waits for its gate none."""
-        if self.output.closes is None or edges is None:
-            return self.turns + self.output.frequency * (time - self.origin)
-        starts, ends = self.trains(time, time, edges)
-        k = max(int(np.searchsorted(starts, time, side="right")) - 1, 0)
-        return self.output.frequency * (time - float(starts[k])) if starts[k] <= time < ends[k] else 0.0
+    def turns_at(self, time: float) -> float:
+        """Return the turns that the waveform has made."""
+        return self.turns + self.output.frequency * (time - self.origin)
 
 
 class Coil:
@@ -131,12 +97,11 @@ class Coil:
             same = (last.output.burst, last.output.frequency) == (burst, output.frequency)
             return _Stretch(output, last.origin if same else time, 0.0)
         # the random bits repeat after 127 turns, all others after one
-        return _Stretch(output, time, last.turns_at(time, self._edges) % 127.0)
+        return _Stretch(output, time, last.turns_at(time) % 127.0)
 
     def turns(self, time: float) -> float:
         """Return the turns that the waveform has made at this time, without the phase that it is set to."""
-        now = self.history.at(time)
-        return now.turns + now.output.frequency * (time - now.origin)
+        return self.history.at(time).turns_at(time)
 
     def field(self, times: Array) -> Array:
         """Return the field at these times, shape (n,) [T]."""

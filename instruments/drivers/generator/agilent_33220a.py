@@ -28,7 +28,6 @@ class Agilent33220A(drive.DriveGenerator):
     load = drive.LoadSetting("OUTP:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = drive.OutputSwitch("OUTP", bool)
     burst_cycles = drive.burst_setting("BURS:NCYC", 1.0, 50_000.0)
-    gate_polarity = drive.burst_word("BURS:GATE:POL", "NORMal", "INVerted")
     trigger_source = drive.burst_word("TRIG:SOUR", "IMMediate", "EXTernal", "BUS")
     trigger_slope = drive.burst_word("TRIG:SLOP", "POSitive", "NEGative")
     trigger_delay = drive.burst_setting("TRIG:DEL", 0.0, 85.0, unit="s")

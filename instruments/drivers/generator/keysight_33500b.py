@@ -32,7 +32,6 @@ class Keysight33500B(drive.DriveGenerator):
     load = drive.LoadSetting("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = drive.OutputSwitch("OUTP1", bool)
     burst_cycles = drive.burst_setting("BURS:NCYC", 1.0, 1e8)
-    gate_polarity = drive.burst_word("BURS:GATE:POL", "NORMal", "INVerted")
     trigger_source = drive.burst_word("TRIG:SOUR", "IMMediate", "EXTernal", "TIMer", "BUS")
     trigger_slope = drive.burst_word("TRIG:SLOP", "POSitive", "NEGative")
     trigger_delay = drive.burst_setting("TRIG:DEL", 0.0, 1000.0, unit="s")

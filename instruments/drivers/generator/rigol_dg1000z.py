@@ -34,7 +34,6 @@ class RigolDG1000Z(drive.DriveGenerator):
     load = drive.LoadSetting("OUTP1:LOAD", float, unit="ohm", low=1.0, high=INFINITY)
     output = drive.OutputSwitch("OUTP1", bool)
     burst_mode = drive.burst_word("BURS:MODE", "TRIGgered", "INFinity", "GATed")
-    gate_polarity = drive.burst_word("BURS:GATE:POL", "NORMal", "INVerted")
     burst_phase = drive.burst_setting("BURS:PHAS", 0.0, 360.0, unit="deg")
     #: The guides print an answer of this one in either form.
     burst_cycles = drive.burst_setting("BURS:NCYC", 1.0, 1e6, form=Form(r"\d+|\d\.\d{6}E[+-]\d{2}", "10"))

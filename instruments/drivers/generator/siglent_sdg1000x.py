@@ -109,7 +109,6 @@ class SiglentSDG1000X(drive.DriveGenerator):
     output = drive.OutputSwitch("C1:OUTP", bool)
     burst = Setting("C1:BTWV", bool, key="STATE", on_demand=True)
     burst_mode = drive.burst_word("C1:BTWV", "GATE", "NCYC", key="GATE_NCYC")
-    gate_polarity = drive.burst_word("C1:BTWV", "POS", "NEG", key="PLRT")
     burst_cycles = _Whole("C1:BTWV", float, low=1.0, high=1e6, key="TIME", on_demand=True)
     burst_phase = drive.burst_setting("C1:BTWV", 0.0, 360.0, unit="deg", key="STPS")
     trigger_source = drive.burst_word("C1:BTWV", "EXT", "INT", "MAN", key="TRSR")

@@ -157,8 +157,6 @@ class Output:
         burst: None where the waveform runs on.
         samples: of an arbitrary waveform, −1 to 1, shape (n,).
         triggered: the bursts that an edge at the trigger input would start, of this waveform, frequency and phase.
-        closes: latency with which a pulse at the trigger input closes the gate while it lasts, at the end of a cycle;
-            None: no gate is open without a pulse [s].
     """
 
     waveform: str
@@ -172,7 +170,6 @@ class Output:
     burst: Burst | None = None
     samples: NDArray[np.float64] | None = field(default=None, compare=False, repr=False)
     triggered: Triggered | None = None
-    closes: float | None = None
 
     def times(self, factor: float) -> Output:
         """Return the output in another unit, of a quantity that is `factor` per volt."""
@@ -453,7 +450,7 @@ class Channel:
         """Return the voltage at the open terminals at this time [s]."""
         on = bool(self["output"])
         start, end = self.under_way
-        silent = bool(self["burst"]) and (self._gate == "NORM" or (self.waits and not start <= time < end))
+        silent = bool(self["burst"]) and (self._is_gated or (self.waits and not start <= time < end))
         short, inverted = str(self["waveform"]), self["polarity"] == "INV"
         volt = 1 / self.load_factor
         swing = 0.0 if silent or not on or short == "DC" else self.number("amplitude_vpp") / 2 * volt
@@ -469,7 +466,6 @@ class Channel:
             burst=self._burst(),
             samples=self.samples if short in _ARBITRARY else None,
             triggered=self._triggered() if on and silent else None,
-            closes=self.family.latency if on and self["burst"] and self._gate == "INV" else None,
         )
 
     def _triggered(self) -> Triggered | None:
@@ -478,7 +474,7 @@ class Channel:
         A gate stops at the end of a cycle (33500 guide, page 177), so the tape's pulse, which is shorter than one,
         leads to a whole cycle; the count of cycles and the trigger's source do not matter then.
         """
-        gated = self._gate == "NORM"
+        gated = self._is_gated
         if not gated and (not self.waits or self["trigger_source"] != "EXT"):
             return None
         return Triggered(
@@ -490,9 +486,9 @@ class Channel:
         )
 
     @property
-    def _gate(self) -> str:
-        """The polarity of the gate: NORM is open while the pulse is high, INV while it is low; empty: there is none."""
-        return str(self["gate_polarity"]) if self["burst_mode"] == "GAT" else ""
+    def _is_gated(self) -> bool:
+        """Whether a gate is closed without a pulse; an inverted one counts as open: pulses of a tape are short."""
+        return self["burst_mode"] == "GAT" and self["gate_polarity"] == "NORM"
 
     def _burst(self) -> Burst | None:
         if not self["burst"]:

@@ -380,5 +380,4 @@ class VirtualSDG1000X(VirtualInstrument):
             inverted=self.settings[_key(n, "polarity")] == "INVT",
             burst=Burst(cycles, None if waits else self._number(n, "burst_period")) if bursts else None,
             triggered=Triggered(amplitude, 1.0 if gated else cycles, rising, delay, _JITTER) if armed else None,
-            closes=_LATENCY if amplitude and bursts and gated and not closed and source == "EXT" else None,
         )

@@ -29,7 +29,6 @@ WIRE = [
     (Keysight33500B, "amplitude", 10.0, "VOLT 10.0", "+1.000000000000000E+01"),
     (Keysight33500B, "offset", 0.5, "VOLT:OFFS 0.5", "+5.000000000000000E-01"),
     (Keysight33500B, "load", 50.0, "OUTP1:LOAD 50.0", "+5.000000000000000E+01"),
-    (Keysight33500B, "gate_polarity", "NORM", "BURS:GATE:POL NORM", "NORM"),
     (Keysight33500B, "output", True, "OUTP1 ON", "1"),
     (Keysight33500B, "burst_cycles", 3.0, "BURS:NCYC 3.0", "+3.000000000000000E+00"),
     (Keysight33500B, "trigger_source", "EXT", "TRIG:SOUR EXT", "EXT"),

@@ -12,9 +12,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from instruments.clock import VirtualClock
-from instruments.virtual.generator.channel import Burst, Output, Triggered
+from instruments.virtual.generator.channel import Output, Triggered
 from levilab.world.bursts import TriggerWire, burst_starts, mean_pull
-from levilab.world.coil import Coil
 from levilab.world.spin_world import SpinScene, SpinWorld
 
 #: Pull of a sine of 0.4 mT in phase with the top [Hz/s] (PHYSICS, drive: μδB₀/2I₃).
@@ -154,70 +153,6 @@ def test_the_coil_has_a_cycle_for_each_pulse_of_the_tape():
     assert np.mean(field == 0.0) == pytest.approx(1 - 30 / 40, abs=0.02)
     pieces = np.concatenate([world.coil_field(1.0 + 0.1 * k, 1e-5, 10_000) for k in range(10)])
     assert pieces == pytest.approx(field, abs=2e-6)  # of a sample's place
-
-
-def test_a_pulse_closes_an_inverted_gate_at_the_end_of_a_cycle():
-    # true-low logic (33500 guide, page 177); the cycle is completed before the output stops (DG2000 guide, page 2-57)
-    world = SpinWorld(SpinScene(jitter=0.0), VirtualClock())
-    open_gate = replace(bursts(frequency=40.0), amplitude=4e-4, triggered=None, burst=Burst(math.inf, None), closes=0.0)
-    world.drive(0.0, open_gate)
-    silent, light = world.coil_field(2.0, 1e-5, 50_000) == 0.0, world.light(2.0, 1e-5, 50_000)
-    ends = np.flatnonzero(silent[1:] & ~silent[:-1]) + 1
-    begins = np.flatnonzero(silent[:-1] & ~silent[1:]) + 1
-    begins = begins[begins > ends[0]]
-    assert begins.size > 2
-    assert light[ends].min() > 0.35  # a pulse, by a comparator of 0.6 V with a hysteresis of 0.2 V
-    assert light[begins - 30].min() > 0.35  # it is over where the next cycle begins
-    assert light[begins + 30].max() < 0.45
-    cycles = (ends[1:] - begins[: ends.size - 1]) * 40e-5
-    assert cycles == pytest.approx(np.rint(cycles), abs=1e-3)  # whole ones, to samples of 10 µs
-    whole = world.coil_field(10.0, 1e-4, 10_000)  # a cycle's place depends on all pulses since 0 s
-    blocks = np.concatenate([world.coil_field(10.0 + 0.05 * k, 1e-4, 500) for k in range(20)])
-    assert blocks == pytest.approx(whole, abs=1e-3 * 4e-4)  # an edge's place is interpolated, to a microsecond
-
-
-def test_a_gated_field_is_the_same_in_blocks_of_all_phases_of_a_pulse():
-    def edges(start, stop, rising):  # pulses of 20 ms
-        times = np.arange(-7.0, 100.0) / 7 + (0.0 if rising else 0.02)
-        return times[(times >= start) & (times <= stop)]
-
-    coil = Coil(edges)
-    coil.change(0.0, Output("SIN", 30.0, 1.0, 0.0, burst=Burst(math.inf, None), closes=0.0))
-    whole = coil.field(np.arange(12_000) / 1000)
-    assert np.mean(whole == 0.0) > 0.05
-    for first in range(10_003, 12_000, 23):  # ms
-        assert coil.field(np.arange(first, 12_000) / 1000) == pytest.approx(whole[first:], abs=1e-9)
-
-
-def gate_of(*pulses):
-    """Return the edges of pulses from and to some times [s]."""
-    return lambda start, stop, rising: np.array([p[not rising] for p in pulses if start <= p[not rising] <= stop])
-
-
-def test_no_cycle_passes_a_gate_that_is_closed_at_the_start():
-    times = np.arange(1000) / 1000
-    coil = Coil(gate_of((-0.05, 0.13), (0.5, 0.6)))
-    coil.change(0.0, Output("SQU", 10.0, 1.0, 0.0, burst=Burst(math.inf, None), closes=0.0))
-    for field in (coil.field(times), np.concatenate([coil.field(part) for part in np.split(times, 100)])):
-        assert np.flatnonzero(field)[0] == 130
-        assert not field[(times > 0.5305) & (times < 0.5995)].any()  # the cycle that began at 0.43 s is completed
-        assert field[(times > 0.1305) & (times < 0.5295)].all()
-
-
-def test_a_change_of_frequency_keeps_the_phase_that_the_waits_of_a_gate_leave():
-    times = np.arange(1000) / 1000
-    gated = Output("SIN", 10.0, 1.0, 0.0, burst=Burst(math.inf, None), closes=0.0)
-    coil = Coil(gate_of((0.05, 0.13), (0.50, 0.60)))  # cycles from 0.13 s on, then from 0.6 s on
-    coil.change(0.0, gated)
-    coil.change(0.345, replace(gated, frequency=20.0))  # at 0.15 turns of a cycle
-    field = coil.field(times)
-    after = (times > 0.3455) & (times < 0.5)
-    assert field[after] == pytest.approx(np.sin(2 * np.pi * (0.15 + 20.0 * (times[after] - 0.345))), abs=1e-9)
-    coil.change(0.55, replace(gated, frequency=25.0))  # while it waits
-    field = coil.field(times)
-    assert not field[(times > 0.5505) & (times < 0.5995)].any()
-    late = times > 0.6005
-    assert field[late] == pytest.approx(np.sin(2 * np.pi * 25.0 * (times[late] - 0.6)), abs=1e-9)
 
 
 def test_an_edge_doubled_within_a_burst_starts_none():
