@@ -38,6 +38,7 @@ export function numberField(id, take, mayBeEmpty = false) {
     pass();
   }
 
+  field.addEventListener("input", () => refuse(""));  // else it goes at a click on a button, which moves away from under it
   field.addEventListener("change", pass);
   if (step) {
     field.addEventListener("keydown", (event) => {

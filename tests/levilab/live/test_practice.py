@@ -119,6 +119,8 @@ def type_into_the_fields(page):
         until(page, f"levilab.frames > {frames} + 2")
         assert page.get_attribute(f"#{field}", "aria-invalid") == "true"
         assert page.input_value(f"#{field}") == typed  # and not what the bench has
+    page.fill("#seed", "0")  # else a task would wait
+    page.fill("#frequency", "30")
     for typed, vpp in (("9,5", 9.5), ("9.75", 9.75)):
         page.fill("#amplitude", typed)
         page.keyboard.press("Enter")
@@ -312,6 +314,29 @@ def test_a_task_opens_the_control_that_it_needs_and_leads_to_the_next(starting, 
     assert page.inner_text("#next-task") == "Hold it for three minutes"
     assert page.locator("#guide").is_visible()  # its steps are not done
     assert page.inner_text("#tasks-done") == "2/6"
+
+
+def test_a_run_and_a_task_wait_until_no_field_is_wrong(starting, page):
+    asked, wrong = [], "First correct this: Seed, a whole number from 0 to 999999999, not x"
+
+    def take(route):
+        asked.append(route.request.post_data_json["do"])
+        route.fulfill(json={"number": 1})
+
+    show_a_top(starting, page)
+    page.route("**/do?*", take)
+    page.fill("#seed", "x")
+    for tab, button in (("Measure", "#record"), ("Tasks", "#task-list button >> nth=0")):
+        page.evaluate("document.getElementById('said').textContent = ''")
+        page.get_by_role("tab", name=tab).click()
+        page.click(button)
+        until(page, f"document.getElementById('said').textContent === '{wrong}'")
+    assert asked == []
+    page.get_by_role("tab", name="Measure").click()
+    page.fill("#seed", "7")
+    with page.expect_request(lambda one: "record a run" in (one.post_data or "")):
+        page.click("#record")
+    assert page.inner_text("#said") == ""
 
 
 def test_after_a_run_the_last_minutes_show_what_a_person_does(starting, page, tmp_path):
