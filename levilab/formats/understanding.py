@@ -71,7 +71,7 @@ from levilab.texts.text import text_of, verbatim
 TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: No such top floats far below or above these [Hz], linear theory says 21.65 to 80.6: the unit is in doubt there.
 #: 20 to 60 turns a second are 126 to 377 rad/s: taken for turns, they lie above.
-SLOWEST_SPIN_HZ, FASTEST_SPIN_HZ = 10.0, 100.0
+SLOWEST_SPIN_HZ, FASTEST_SPIN_HZ = 15.0, 100.0
 #: Air takes 0.003 of a top's spin in a second [1/s]: times in minutes that pass for seconds make it 0.2, seconds that
 #: pass for minutes 5e-5, times in ms 3e-6; a brake of eddy currents lies between.
 FASTEST_LOSS_PER_S, USUAL_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 0.003, 1e-4

@@ -195,6 +195,12 @@ class Limits:
         return tuple(one for one in self.comparisons if one.name not in {SIMON, *_REACHED})
 
     @property
+    def is_doubtful(self) -> bool:
+        """Whether tops that nothing stops would have floated on for long."""
+        edge = next((one for one in self.comparisons if one.name == LOWER_EDGE), None)
+        return edge is not None and (edge.difference.value or 0.0) > STOPPED_ABOVE_HZ - FALLS_BETWEEN_HZ[1]
+
+    @property
     def conditions_text(self) -> str:
         """The conditions in words."""
         made_up = "SYNTHETIC" if self.conditions.synthetic else "not known to be SYNTHETIC"
@@ -253,8 +259,11 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
                 yield from warnings_of(replace(group.statistics, outliers=()) if of_runs else group.statistics)
 
     def about_run(self, run: Limits) -> Iterable[str]:
-        """Return what to know of one run."""
-        return warnings_of(run.statistics)
+        """Yield what to know of one run."""
+        if run.is_doubtful:
+            text = "{spin:n} is no lower limit of a top that is left to itself: was it stopped, or held by a drive?"
+            yield Note("stopped", Text(text, spin=with_uncertainty(run.statistics.mean)), weight="doubt")
+        yield from warnings_of(run.statistics)
 
 
 def limits_of(source: Source[LimitReadings], options: LimitOptions) -> Limits:
@@ -476,8 +485,8 @@ def _beside_theory(limits: Limits) -> Iterable[str]:
     if (off > 0) == lower:
         other = set(limits.causes) - {Cause.OUT_OF_WINDOW, Cause.NOT_KNOWN}
         why = "" if other else ", likely because a tilted top moves, and is lost sooner"
-        if lower and off > STOPPED_ABOVE_HZ - FALLS_BETWEEN_HZ[1]:
-            why = ", more than a tilt explains: was the top stopped?"
+        if limits.is_doubtful:
+            why = ", more than a tilt explains"
         elif lower and one:
             why = ", likely because a tilted top leans ever more towards {hz:.2f} Hz, the {name}, and falls sooner"
             why = Text(why, hz=one.expected, name=one.name)

@@ -98,6 +98,12 @@ def test_a_count_that_ends_at_twice_the_lower_limit_is_doubted(first, last, asks
     assert halved.column("spin_frequency_hz")[-1] == last / 2
 
 
+def test_spins_with_which_no_top_floats_are_doubted(tmp_path):
+    readings = spin_readings(table_of(tmp_path, "t,f\n0,19\n90,13.5\n180,10.5\n"))  # each second turn was counted
+    assert readings.doubtful
+    assert "the spin is about 13.5 Hz, a Levitron spins at 20 to 60 Hz" in readings.warnings[0]
+
+
 def test_readings_between_two_spins_are_fitted_and_the_result_says_so(tmp_path):
     path = spin_down_csv(tmp_path / "a.csv")
     whole = SPINDOWN.analyze([path], SpinDownOptions(tilt="none"))
