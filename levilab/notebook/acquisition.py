@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from contextlib import suppress
+from numbers import Integral
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import ExperimentFailed
 from levilab.acquisition.table import EXPERIMENTS
 from levilab.bench.person import Task
-from levilab.errors import DataError, UsageError
+from levilab.errors import DataError, UsageError, list_known
 from levilab.notebook.result import AnalysisResult
 from levilab.notebook.run import RecordedRun
 from levilab.pipelines.recall import recall_suiting
@@ -26,7 +27,10 @@ from levilab.simulator.keys import plain
 def acquire_run(experiment: str, options: AcquisitionOptions) -> RecordedRun:
     """Run an experiment without a word on the terminal; see `levilab.acquire`."""
     if experiment not in EXPERIMENTS:
-        raise UsageError("experiment", f"{', '.join(EXPERIMENTS)} are known", value=experiment)
+        raise UsageError("experiment", list_known(experiment, EXPERIMENTS), value=experiment)
+    seed: object = options.seed
+    if seed is not None and not (isinstance(seed, Integral) and int(seed) >= 0):
+        raise UsageError("seed", "a whole number of 0 or more is expected", value=seed)
     return RecordedRun.of(acquire(request_for(experiment, options), Display()))
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from levilab.errors import DataError, DoesNotSuit, DoubtWarning, LevilabError, UsageError, unquote
+from levilab.errors import DataError, DoesNotSuit, DoubtWarning, LevilabError, UsageError, list_known, unquote
 from levilab.notebook.frame import (
     FRAME,
     are_arrays,
@@ -135,7 +135,7 @@ def _check_kind(kind: object) -> None:
         expected = "two lists go into one pair, analyze(([…], […])), or by name, analyze(time=[…], frequency=[…])"
         raise UsageError("kind", f"the name of an analysis is expected; {expected}", value=kind)
     if kind is not None and kind not in ANALYSES:
-        raise UsageError("kind", f"{', '.join(ANALYSES)} or None is expected", value=kind)
+        raise UsageError("kind", list_known(kind, ANALYSES), value=kind)
 
 
 def _is_one(data: object) -> bool:

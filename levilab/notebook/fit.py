@@ -15,7 +15,7 @@ from levilab.notebook.quantity import Named, Quantity
 from levilab.present.units import split
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Mapping
 
     import pandas as pd
     from numpy.typing import ArrayLike
@@ -246,7 +246,7 @@ class FittedModel(Named[Quantity]):
         return float(stdtrit(self.freedom, 0.5 + coverage(sigma) / 2)) if self.freedom > 0 else math.nan
 
     @bare
-    def conf_interval(self, sigmas: Sequence[float] = (1, 2, 3)) -> dict[str, list[tuple[float, float]]]:
+    def conf_interval(self, sigmas: ArrayLike = (1, 2, 3)) -> dict[str, list[tuple[float, float]]]:
         """Return intervals in lmfit's form: parameter → (probability, end), from the lowest end to the highest.
 
         Symmetric about the value: u times Student's factor for the degrees of freedom of u (`freedom`).  No profile of
@@ -256,11 +256,15 @@ class FittedModel(Named[Quantity]):
             sigmas: standard deviations of a normal number with the same coverage: 1 is 68.3 %, 2 is 95.4 %; one below 1
                 is the coverage.
         """
-        sides = sorted((coverage(one), self._half_width(one)) for one in sigmas)
+        try:
+            wanted = np.atleast_1d(np.asarray(sigmas, dtype=float)).tolist()
+        except (TypeError, ValueError):
+            raise UsageError("sigmas", "numbers are expected, as conf_interval([1, 2])['c32']", value=sigmas) from None
+        sides = sorted((coverage(one), self._half_width(one)) for one in wanted)
         ends = [*((p, -k) for p, k in reversed(sides)), (0.0, 0.0), *sides]
         return {name: [(p, one.n + k * one.s if k else one.n) for p, k in ends] for name, one in self.items()}
 
-    def ci_report(self, sigmas: Sequence[float] = (1, 2, 3)) -> str:
+    def ci_report(self, sigmas: ArrayLike = (1, 2, 3)) -> str:
         """Return the intervals of `conf_interval` as a table: the value, and the ends' distances from it."""
         found = self.conf_interval(sigmas)
         heads = [f"{p:.2%}" if p else "value" for p, _ in next(iter(found.values()), [])]

@@ -190,15 +190,15 @@ def _frame_of_mapping(data: Mapping[Any, Any]) -> pd.DataFrame:
 
     try:
         return pd.DataFrame(data)
-    except ValueError as error:
+    except ValueError:
         expected = "columns of one length are expected, as {'time_s': […], 'spin_frequency_hz': […]}"
         given = f"a dictionary with {', '.join(map(str, data))}"
-        raise UsageError("data", f"{expected} ({error})", value=given) from None
+        raise UsageError("data", expected, value=given) from None
 
 
 def _frame_of_series(data: Any, names: tuple[str, ...]) -> pd.DataFrame:
     """Return a Series: its index, and its values; values alone where the index only counts."""
-    if type(data.index).__name__ == "RangeIndex":
+    if type(data.index).__name__ == "RangeIndex" and data.index.name is None:
         return frame_of_arrays(data.to_numpy(), None if names == ARRAYS[""] else "limit")
     titles = data.index.name or names[0], data.name or names[1]
     return frame_of_arrays((data.index, data.to_numpy()), "").set_axis([*titles], axis=1)

@@ -24,6 +24,8 @@ _OTHERS = {
     **dict.fromkeys(("f", "y", "freq", "frequency"), ("frequency", "spin_frequency_hz")),
     **dict.fromkeys(("model", "law"), ("laws",)),
     "n": ("exponent",),
+    "correlation": ("correl",),
+    **dict.fromkeys(("ci", "confidence", "confidence_interval"), ("conf_interval", "interval")),
 }
 #: The same, where the value is another one.
 _OTHER_VALUES = {"weights": ("reading_u", "the standard uncertainty, 1/weights, or a third array")}
@@ -41,8 +43,8 @@ class NoSuchAttribute(LevilabError, AttributeError):
     """An attribute that an object lacks; the text has the name that was probably meant."""
 
 
-def meant(name: str, known: Iterable[str]) -> str:
-    """Return the question after what was meant, or all names where none is like it.
+def meant(name: str, known: Iterable[str], lists: str = "dir()") -> str:
+    """Return the question after what was meant, or names where none is like it, and which function lists them all.
 
     >>> meant("law", ["model", "input"]), meant("modle", ["model", "input"])
     ('known are model, input', 'did you mean model?')
@@ -56,7 +58,7 @@ def meant(name: str, known: Iterable[str]) -> str:
     near = others or whole or get_close_matches(name, names, n=3, cutoff=_ALIKE)
     if near:
         return f"did you mean {' or '.join(near)}?"
-    more = f" and {len(names) - _MOST_NAMES} more, which dir() lists" * (len(names) > _MOST_NAMES)
+    more = f" and {len(names) - _MOST_NAMES} more, which {lists} lists" * (len(names) > _MOST_NAMES)
     return f"known are {', '.join(names[:_MOST_NAMES])}{more}"
 
 
@@ -98,7 +100,8 @@ def _refuse_unknown(function: str, named: Iterable[str], names: Iterable[str]) -
     known = [name for name in names if name != "self"]
     for name in named:
         if name not in known:
-            advice = f"leave it out: {_NEEDLESS[name]}" if name in _NEEDLESS else meant(name, known)
+            why, lists = _NEEDLESS.get(name), f"help({function})"
+            advice = f"leave it out: {why}" if why else meant(name, known, lists)
             raise UsageError(name, f"is no option of {function}; {advice}")
 
 

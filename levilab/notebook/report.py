@@ -8,11 +8,11 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from levilab.errors import DataError, UsageError, check_language
+from levilab.errors import DataError, UsageError, check_ending, check_language
 from levilab.notebook.motion import SimulatedMotion
 from levilab.notebook.result import AnalysisResult
 from levilab.notebook.sweep import SimulatedMap
-from levilab.report.page import write_report
+from levilab.report.page import FORMATS, write_report
 from levilab.runs.find import find_run
 from levilab.runs.run import Run
 from levilab.texts.text import speaking
@@ -30,7 +30,7 @@ def report_on(data: Any, output: str | PathLike[str], language: str, **how: Any)
         DataError: there is nothing to report.
     """
     check_language(language)
-    output = Path(output)
+    check_ending(output := Path(output), FORMATS)
     several = isinstance(data, list | tuple | set)
     items = [*data] if several else [data]
     if not items:

@@ -88,6 +88,7 @@ class AnalysisResult(Exportable):
 
     also: ClassVar[Mapping[str, str]] = {
         **{name: f"fit.{name}" for name in (*FIT, *METHODS)},
+        "residual": "residuals",
         "df": "to_dataframe()",
         "message": "verdict",
         "to_netcdf": "export",
@@ -98,6 +99,8 @@ class AnalysisResult(Exportable):
         "to_pandas": "to_dataframe()",
         "savefig": "plot().savefig(path)",
         "laws": "models",
+        "compare": "to_dataframe('models'), with the weight of each law",
+        "quantities": "values",
         "units": "the unit of a quantity, as result['c32'].unit, or to_dataframe()",
         "version": "document['software']['levilab']",
         "provenance": "document, with inputs, options and software",

@@ -40,6 +40,9 @@ class _Readings:
     def __call__(self) -> Table:
         return self.read()
 
+    def __repr__(self) -> str:
+        return "<readings of a run: call readings() for a table, or take df>"
+
     @bare
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):

@@ -12,7 +12,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from levilab.errors import UsageError
+from levilab.errors import UsageError, list_known
 from levilab.formats.ranges import WithUnit, problem_of
 
 if TYPE_CHECKING:
@@ -109,7 +109,9 @@ def _read_laws(given: str | Sequence[str]) -> tuple[str, ...]:
     from analysis.spindown.drag import LAWS
 
     names = {name.strip() for name in (given.split(",") if isinstance(given, str) else given)}
-    if not names or not names <= LAWS.keys():
+    if unknown := sorted(names - LAWS.keys() - {""}):
+        raise UsageError("laws", list_known(unknown[0], LAWS), value=given)
+    if not names & LAWS.keys():
         raise UsageError("laws", "some of {names:s} are expected, as disc,stokes", ", ".join(LAWS), value=given)
     return tuple(name for name in LAWS if name in names)
 

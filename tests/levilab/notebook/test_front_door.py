@@ -376,6 +376,16 @@ def test_a_wrong_call_names_the_argument_or_the_kind_of_failure(case):
     (lambda: levilab.load("nowhere"), "^nowhere: there is no such file or folder in .*levilab runs lists"),
     (lambda: levilab.load(SAMPLE_DATA / "student-files" / "columns.json"), "is a file; a run folder is expected"),
     (lambda: levilab.analyze(levilab), "^data = the module levilab: a run,"),
+    (lambda: levilab.analyze(spin_down(), "spindwon"), "^kind = spindwon: did you mean spindown"),
+    (lambda: levilab.analyze(spin_down(), laws=["disk"]), "^laws = .*: did you mean disc"),
+    (lambda: levilab.analyze({"a": spin_down(), "b": spin_down()}), r"'spin_frequency_hz': \[…\]}$"),
+    (lambda: levilab.acquire("spni", mock=True), "^experiment = spni: did you mean spin"),
+    (lambda: levilab.acquire("spin", mock=True, seed=-1), "^seed = -1: a whole number"),
+    (lambda: levilab.acquire("spin", mock=True, progress=1), r"which help\(acquire\) lists$"),
+    (lambda: levilab.analyze(spin_down()).conf_interval("c32"), "^sigmas = c32: numbers are expected"),
+    (lambda: levilab.analyze(spin_down()).compare(), "take to_dataframe"),
+    (lambda: levilab.analyze(spin_down()).correlation, "did you mean correl"),
+    (lambda: levilab.analyze(spin_down()).values["c1"].ci, "did you mean interval"),
 ])  # fmt: skip
 def test_a_natural_but_wrong_call_is_told_how_to_call(call, said):
     with pytest.raises(levilab.LevilabError, match=said):
