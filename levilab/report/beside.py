@@ -7,6 +7,7 @@ import statistics
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import compress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -64,13 +65,12 @@ class Compared:
         name: as in result.json.
         symbol: for people.
         unit: of results.
-        estimates: of each group, whose u is widened where it is known from few repetitions alone; None where it has no
-            value with u.
+        estimates: of each group, as its analysis has them; None where it has no value with u.
+        widths: factors of their u where groups are compared: above 1 where u is of few repetitions alone.
         truths: of each group; None where it is not known.
         mean: of those that are used, by the rule of several runs in a report; None where there are none.
         together: whether those agree; None where there are none.
         used: whether a group has a value that is neither doubtful nor far from its truth, or no group has.
-        widened: whether u of any group is.
         apart: why the groups have no common value, and so no mean; empty: they have.
     """
 
@@ -78,11 +78,11 @@ class Compared:
     symbol: str
     unit: str
     estimates: tuple[Estimate | None, ...]
+    widths: tuple[float, ...]
     truths: tuple[float | None, ...]
     mean: Estimate | None
     together: Comparison | None
     used: tuple[bool, ...]
-    widened: bool
     apart: str = ""
 
     @property
@@ -101,12 +101,18 @@ class Compared:
         return None if value is None else Estimate(value * factor, None if u is None else u * factor, text)
 
     @property
+    def widened(self) -> list[Estimate | None]:
+        """The estimates with the u by which groups are compared."""
+        pairs = zip(self.estimates, self.widths, strict=True)
+        return [replace(one, u=one.u * width) if one and one.u else None for one, width in pairs]
+
+    @property
     def truth(self) -> tuple[float, float, float] | None:
         """The mean of the truths, the distance of the mean from it in u, and this u; None where a truth is not known.
 
         How one top differs from another is in neither.
         """
-        rows = zip(self.estimates, self.truths, self.used, strict=True)
+        rows = zip(self.widened, self.truths, self.used, strict=True)
         used = [(one, truth) for one, truth, use in rows if use and one]
         if self.mean is None or any(truth is None for _, truth in used):
             return None
@@ -122,10 +128,10 @@ class Compared:
 
     @cached_property
     def from_truth(self) -> tuple[float | None, ...]:
-        """The distance of each group from its truth, in its u."""
+        """The distance of each group from its truth, in its widened u."""
         return tuple(
             None if one is None or truth is None else (one.value - truth) / one.u  # type: ignore[operator]
-            for one, truth in zip(self.estimates, self.truths, strict=True)
+            for one, truth in zip(self.widened, self.truths, strict=True)
         )
 
 
@@ -251,28 +257,24 @@ def _quantity(
 ) -> Compared:
     found = [_model(part, model).get("parameters", {}).get(name) or part["values"].get(name) for part in parts]
     good = [one if one and _has_u(one) else None for one in found]
-    widths = tuple(_width((part.get("result", {}).get("statistics") or {}).get("freedom")) for part in parts)
     of = Compared(
         name,
         analysis.symbols.get(name, name.replace("_", " ")),
         next((one["unit"] for one in good if one), "1"),
-        tuple(
-            Estimate(one["value"], one["u"] * width, one["unit"]) if one else None
-            for one, width in zip(good, widths, strict=True)
-        ),
+        tuple(Estimate(one["value"], one["u"], one["unit"]) if one else None for one in good),
+        tuple(_width((part.get("result", {}).get("statistics") or {}).get("freedom")) for part in parts),
         tuple(truth.values.get(name) if truth.model in {"", model} else None for truth in truths),
         None,
         None,
         tuple(one is not None for one in good),
-        max(widths) > 1,
     )
     far = [distance is not None and abs(distance) > FAR for distance in of.from_truth]
     used = tuple(bool(one) and not (doubt or off) for one, doubt, off in zip(good, doubts, far, strict=True))
     used = used if any(used) else of.used
-    known = [one for one, use in zip(of.estimates, used, strict=True) if one and use]
+    known, widened = ([*filter(None, compress(each, used))] for each in (of.estimates, of.widened))
     if not known:
         return replace(of, used=used)
-    together = compare(*np.array([(one.value, one.u) for one in known], float).T)
+    together = compare(*np.array([(one.value, one.u) for one in widened], float).T)
     return replace(of, used=used, mean=mean(known), together=together)
 
 

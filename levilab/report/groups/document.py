@@ -282,8 +282,8 @@ def _values(of: Class, quantity: Compared) -> Tabular:
     rows = [Row(cells, kind) for kind, cells in zip(kinds, zip(names, *columns, strict=True), strict=True)]
     rows = rows if len(of.groups) > 1 and mean else rows[:-1]
     note = "value(u): the digits in parentheses are u of the last digits."
-    if quantity.widened:
-        note = Sentences(note, "u is larger than in levilab report, as few repetitions give it (Student's t).")
+    if max(quantity.widths) > 1:
+        note = Sentences(note, "Groups are compared with a larger u, as few repetitions give it (Student's t).")
     if quantity.truth and len(of.groups) > 1:
         note = Sentences(
             note, "The distance of the mean from the truth is in its u without the differences of the tops."
