@@ -137,11 +137,12 @@ def observables() -> str:
 
 
 def fit() -> str:
-    """Return the names of a fit, which are lmfit's, with their meanings, in Markdown."""
+    """Return the class of a fit with an entry for each of its names, which are lmfit's, as a block."""
     from levilab.notebook.fit import FIT
 
-    rows = (f"| `{name}` | {meaning} |\n" for name, (meaning, _) in FIT.items())
-    return "| name | meaning |\n|---|---|\n" + "".join(rows)
+    entries = (f"   .. attribute:: {name}\n\n      {meaning}\n" for name, (meaning, _) in FIT.items())
+    heads = ".. autoclass:: levilab.notebook.fit.FittedModel\n   :members:"
+    return "\n".join(["```{eval-rst}", f"{heads}\n", *entries, "```\n"])
 
 
 def scene() -> str:
@@ -234,7 +235,7 @@ MADE = {
     **{page: {"<!-- commands -->": partial(reference, page)} for page in PAGES},
     "data": {"<!-- all columns -->": columns, "<!-- all laws -->": laws},
     "glossary": {"<!-- all laws -->": laws},
-    "notebook": {"<!-- all names of a fit -->": fit},
+    "reference/python-results": {"<!-- a fit -->": fit},
     "simulator": {"<!-- all keys -->": scene},
     "sweeps": {"<!-- all observables -->": observables},
 }

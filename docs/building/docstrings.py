@@ -18,6 +18,9 @@ def as_markup(lines: list[str]) -> list[str]:
     ['each with `help`::', '', '    run = load()', '', 'Those are `Failure`\\ s.']
     """
     made = [re.sub(r"(`[^`]+`)(?=\w)", r"\1\\ ", line) for line in lines]
+    if "Attributes:" in made:  # a comma would part the names of one field
+        names = re.compile(r"^    \w+(, \w+)+(?=: )")
+        made = [names.sub(lambda found: found[0].replace(", ", ",\u200b"), line) for line in made]
     for k in range(len(made) - 2):
         here, gap, block = made[k : k + 3]
         indent = len(here) - len(here.lstrip())
@@ -27,11 +30,46 @@ def as_markup(lines: list[str]) -> list[str]:
     return made
 
 
-def _process(_app: Sphinx, _what: str, _name: str, _thing: Any, _options: Any, lines: list[str]) -> None:
+def _process(_app: Sphinx, what: str, _name: str, _thing: Any, _options: Any, lines: list[str]) -> None:
     lines[:] = as_markup(lines)
+    if what in {"attribute", "data", "property"}:
+        # napoleon takes what stands before a colon in the first line for a type: that line is empty, to docutils, too
+        lines.insert(0, "\\")
+
+
+def shorten(signature: str, names: dict[str, str]) -> str:
+    """Return a signature with the names of types, without their checks, and with ... for a value that a factory makes.
+
+    >>> shorten("(mass_kg: ~typing.Annotated[float, Gt(gt=1e-09)] = 0.1, t: list[int] = <factory>)", {"list[int]": "A"})
+    '(mass_kg: float = 0.1, t: A = ...)'
+    """
+    short = signature.replace("~typing.Annotated", "Annotated").replace("<factory>", "...")
+    for text, name in names.items():
+        short = short.replace(text, name)
+    while (start := short.find("Annotated[")) >= 0:
+        end = inside = start + len("Annotated[")
+        commas, depth = [], 1
+        while depth:
+            commas += [end] * (short[end] == "," and depth == 1)
+            depth += (short[end] in "[(") - (short[end] in "])")
+            end += 1
+        short = short[:start] + short[inside : commas[0]] + short[end:]
+    return short
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
     """Sphinx calls this."""
+    from numpy.typing import ArrayLike
+    from sphinx.util.typing import stringify_annotation
+
+    from analysis.arrays import Array
+
+    kinds = {"ArrayLike": ArrayLike, "Array": Array}
+    names = {stringify_annotation(kind, "smart"): f"~numpy.typing.{name}" for name, kind in kinds.items()}
+
+    def sign(*of: Any) -> tuple[str | None, ...]:
+        return tuple(text and shorten(text, names) for text in of[-2:])
+
+    app.connect("autodoc-process-signature", sign)
     app.connect("autodoc-process-docstring", _process, priority=100)  # before napoleon
     return {"parallel_read_safe": True, "parallel_write_safe": True}

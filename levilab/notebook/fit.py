@@ -71,23 +71,23 @@ def _correlation(of: FittedModel) -> Array | None:
     return None if table is None else table / np.sqrt(np.outer(np.diagonal(table), np.diagonal(table)))
 
 
-#: lmfit's name → its meaning here, and how it is found.  docs/notebook.md has this table.
+#: lmfit's name → its meaning here, and how it is found.  The reference has them.
 FIT: Mapping[str, tuple[str, Callable[[FittedModel], Any]]] = MappingProxyType({
     "redchi": ("χ² per degree of freedom; None where no u is stated", _statistic("reduced_chi_square")),
     "chisqr": ("χ², the sum of (residual/u)²", _chi_square),
     "aic": ("Akaike's criterion, of the likelihood of noise with unknown size and correlation", _aic),
-    "aicc": ("the same, corrected for few readings", _statistic("aicc")),
+    "aicc": ("`aic`, corrected for few readings", _statistic("aicc")),
     "bic": ("Schwarz's criterion", _statistic("bic")),
     "ndata": ("readings in the fit", _statistic("n")),
     "nvarys": ("parameters of the law; priors take away as readings do", _count),
     "nfree": ("ndata less nvarys", _statistic("degrees_of_freedom")),
-    "dof": ("the same", _statistic("degrees_of_freedom")),
+    "dof": ("`nfree`", _statistic("degrees_of_freedom")),
     "covar": ("covariance of `var_names`, an array", _covariance),
-    "correl": ("their correlations, an array", _correlation),
+    "correl": ("correlations of `var_names`, an array", _correlation),
     "var_names": ("names of the parameters", lambda of: [*of]),
     "params": ("parameter → quantity", lambda of: of),
     "best_values": ("parameter → number", lambda of: {name: one.n for name, one in of.items()}),
-    "valuesdict": ("a function that returns the same", lambda of: lambda: {name: one.n for name, one in of.items()}),
+    "valuesdict": ("a function that gives `best_values`", lambda of: lambda: {name: one.n for name, one in of.items()}),
     "best_fit": ("the curve at the readings, in SI", lambda of: of.eval()),
     "success": ("whether the fit converged", lambda of: bool(getattr(of._entry, "converged", True))),
     "priors": ("names of parameters to which the readings add little", lambda of: getattr(of._entry, "priors", [])),
@@ -113,9 +113,7 @@ INSTEAD: Mapping[str, str] = MappingProxyType({
 
 
 class FittedModel(Named[Quantity]):
-    """Parameter → quantity of one model, and its fit; `FIT` lists the names of the statistics.
-
-    Parameters are correlated as the fit says.
+    """Parameter → quantity of one model, and its fit with lmfit's names: `result.fit`, `result.models[NAME]`.
 
     Attributes:
         name: of the model.
@@ -214,7 +212,7 @@ class FittedModel(Named[Quantity]):
         self._curve("readings", self._of.analysis.curve)
         frame = self._of.to_dataframe("readings")
         frame = frame[frame["input"] == self._of.inputs[self._number or 0]]
-        residual = self._of.residual_column(frame)
+        residual = self._of._residual_column(frame)
         x, y = axes_of(frame, residual)
         return frame[x].to_numpy(float), frame[y].to_numpy(float), frame[residual].notna().to_numpy()
 

@@ -156,7 +156,7 @@ class AnalysisResult(Exportable):
 
     @property
     def kind(self) -> str:
-        """The analysis: spindown, spin, field, limit or precession."""
+        """Name of the analysis: an argument `kind` of `levilab.analyze`."""
         return self.analysis.name
 
     @property
@@ -441,9 +441,9 @@ class AnalysisResult(Exportable):
     def residuals(self) -> np.ndarray:
         """Reading less the best model, shape (n,), in SI; NaN for readings that are not used.  Raises UsageError."""
         frame = self.to_dataframe("readings")
-        return frame[self.residual_column(frame)].to_numpy()
+        return frame[self._residual_column(frame)].to_numpy()
 
-    def residual_column(self, frame: pd.DataFrame) -> str:
+    def _residual_column(self, frame: pd.DataFrame) -> str:
         """Return the name of the residuals' column in the table of readings.  Raises UsageError."""
         for name in frame.columns:
             if name.startswith("residual"):
@@ -549,7 +549,7 @@ class AnalysisResult(Exportable):
     def _panel(self, model: str | None) -> tuple[pd.DataFrame, str, dict[str, Any]]:
         """Return the readings with a model's residuals, their column, and its curves.  Raises UsageError."""
         frame, curve, chosen = self.data, self.analysis.curve, model or self.best_model
-        residual = self.residual_column(frame)
+        residual = self._residual_column(frame)
         if model is not None and (curve is None or model not in self.models):
             raise UsageError("model", f"known are {', '.join(self.models) or 'none'}", value=model)
         curves = {name: curve(self.found, k, chosen) if curve else None for k, name in enumerate(self.inputs)}

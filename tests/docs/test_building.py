@@ -1,10 +1,12 @@
 """What is done to the pages when they become a site; the site itself is built by `make site`."""
 
+import re
+
 import pytest
 import typer.main
 
 from building.commands import MADE, PAGES, checks, columns, fit, observables, overview, reference, scene
-from building.docstrings import as_markup
+from building.docstrings import as_markup, shorten
 from building.outside_pages import lead_to_site
 from building.requests import loaded_from_elsewhere
 from building.wrapping import keep_options_whole
@@ -32,7 +34,7 @@ def test_the_page_of_data_has_each_column_and_each_mark_stands_in_its_page():
     for page, marks in MADE.items():
         text = (DOCS / f"{page}.md").read_text(encoding="utf-8")
         assert [mark for mark in marks if text.count(mark) != 1] == []
-    assert "| `redchi` | χ² per degree" in fit()
+    assert "   .. attribute:: redchi\n\n      χ² per degree" in fit()
     assert "\nmass_kg = " in scene()
     assert "| `survived` | Whether" in observables()
     assert "| `spin`, 1000 | frequency | 200 |" in checks()
@@ -54,6 +56,19 @@ def test_an_indented_block_of_a_docstring_is_code_and_doctests_stay():
     lines = ["", "    run()", "As:", "", "    >>> 1"]
     assert as_markup(["As:", *lines]) == ["As::", *lines]
     assert as_markup(["of `Error`s"]) == ["of `Error`\\ s"]
+
+
+def test_names_of_one_attribute_stay_together_and_a_signature_has_no_checks():
+    assert as_markup(["Attributes:", "    a, b: [m]."])[1] == "    a,\u200bb: [m]."
+    assert as_markup(["Raises:", "    A, B: no data."])[1] == "    A, B: no data."
+    assert shorten("(a: Annotated[list[int], Gt(gt=[0])] = [])", {"list[int]": "Array"}) == "(a: Array = [])"
+
+
+def test_the_reference_names_its_members():
+    """So that no helper of a module and no constant stands there."""
+    for page in sorted((DOCS / "reference").glob("python*.md")):
+        blocks = page.read_text(encoding="utf-8").split(".. automodule:: ")[1:]
+        assert [block for block in blocks if not re.match(r"[\w.]+\n   :members: \w", block)] == [], page
 
 
 @pytest.mark.parametrize(("name", "text", "found"), [

@@ -1,0 +1,26 @@
+"""The pages of the Python API as they are built: `make site` runs it on the new site."""
+
+import html
+import re
+
+import pytest
+
+from support.paths import ROOT
+
+PAGES = sorted((ROOT / "build/site/reference").glob("python*.html"))
+
+
+@pytest.mark.skipif(not PAGES, reason="make site makes them")
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_docstrings_are_whole_and_signatures_are_short(page):
+    """A field "Type" is the half of a sentence before its colon, "b (a,)" were the names of one attribute."""
+    text = html.unescape(re.sub(r"<[^>]+>", "", page.read_text(encoding="utf-8")))
+    torn = re.findall(r"\nType:|^.*\w \(\w+,\) .*|Alias for field|model_config|Annotated\[|_Buffer|<factory>|~\w", text)
+    assert torn == []
+
+
+@pytest.mark.skipif(not PAGES, reason="make site makes them")
+def test_a_fit_has_an_entry_for_each_of_its_names():
+    names = "redchi", "covar", "correl", "best_fit", "eval", "eval_uncertainty", "conf_interval", "ci_report"
+    text = (ROOT / "build/site/reference/python-results.html").read_text(encoding="utf-8")
+    assert [name for name in names if f'id="levilab.notebook.fit.FittedModel.{name}"' not in text] == []
