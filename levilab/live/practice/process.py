@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from levilab.world.motion_world import MotionWorld
 
 #: Experiments for which a top has to be up when they begin; for `limit` the virtual person puts one back.
-NEED_A_TOP = frozenset({"spin", "precession", "trace"})
+NEED_A_TOP = frozenset({"spin", "hold", "precession", "trace"})
 #: Commands that are carried out while a run is recorded, too.
 ALWAYS = (ask.SetSpeed, ask.Pause, ask.StopRun)
 #: Failures of a run after which a person can do this here: there is no bench file, and the settings are the page's.
