@@ -332,7 +332,7 @@ class PracticeProcess:
     def _stop_run(self, _: ask.StopRun) -> None:
         if self._wanted is None:
             raise CommandRefused("no run is being recorded: nothing to stop")
-        self._stop("the stop button")
+        self._stop(Text("the button End run"))
 
     def _want_run(self, command: ask.RecordRun) -> None:
         plan = plan_of(command)

@@ -203,9 +203,9 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Weighed] = MappingProxyType(
             factor=digits(math.sqrt(reduced), 3),
         ),
         "scan overstated": Weighed(
-            "the readings scatter far less than their stated uncertainties (χ²/dof = {chi:n}): what is "
-            "common to all of them, such as the scale of the instrument, belongs into gain_u and "
-            "background_u_t",
+            "the readings scatter far less than their stated uncertainties (χ²/dof = {chi:n}): an "
+            "error that all of them share, such as that of the instrument's scale or zero, is not part of the "
+            "uncertainty of each",
             "advice",
         ),
         "contradicts": _contradicts,

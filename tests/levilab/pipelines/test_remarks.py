@@ -44,7 +44,7 @@ OF_SWEEP = {
 }
 OF_FIELD = {
     of("scan scatters", 4.0): "(χ²/dof = 4): all uncertainties are enlarged by 2",
-    of("scan overstated", 0.1): "the readings scatter far less than their stated uncertainties (χ²/dof = 0.1)",
+    of("scan overstated", 0.1): "(χ²/dof = 0.1): an error that all of them share, such as that of the instrument's",
     of(
         "contradicts", 0.0021, 0.0, 5e-4, name="inner_radius"
     ): "the scan wants inner radius = 2.1 mm, which lies 4.2 u from the stated 0 mm (u = 0.5 mm)",

@@ -36,6 +36,7 @@ from levilab.pipelines.spindown.readings import release_of
 from levilab.runs.run import Run
 from levilab.simulator.scene import read_scene
 from levilab.telemetry.publisher import Publisher
+from levilab.texts.text import in_language, text_from
 from levilab.world.bench import scene_world, virtual_wiring
 from levilab.world.spin_world import random_scene
 from support.acquisitions import events
@@ -563,7 +564,9 @@ def test_a_run_that_is_stopped_is_kept_and_the_bench_goes_on(session):
     assert run.count() > 3
     assert run.record.configuration["scene"]["name"] == "practice"
     assert run.record.instruments["generator"]["settings_end"]["output"] is False
-    assert [event["text"] for event in run.events()][-1] == "interrupted by the stop button, outputs are off"
+    last = [*run.events()][-1]
+    assert last["text"] == "interrupted by the button End run, outputs are off"
+    assert in_language(text_from(last["says"], ""), "de").startswith("abgebrochen durch den Knopf Beenden, ")
     assert session.spins(156.0, 157.0)[-1][2] > 20
     # a drive feeds the nutation of a top, which the next run has to know; this one began with a top that was put back
     assert not events(run, "driven before")
