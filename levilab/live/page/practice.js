@@ -35,6 +35,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
   async function send(what, values = {}, field = null) {
     const wrongs = what === "record a run" || values.task ? document.querySelector("#controls [aria-invalid=true]") : null;
     if (wrongs) return write("said", phrase("First correct this: {field}, {why}", {field: wrongs.ariaLabel || wrongs.labels[0].firstChild.data.trim(), why: by(`${wrongs.id}-wrong`).textContent}));
+    if (values.task) await command({do: "set the speed", speed: 1});  // at 10 × the top is down before a person has read the task
     if (allowed) write("said", "");  // and not later: what the bench says may come before the answer
     const wrong = await command({do: what, ...values});
     if (!allowed || !wrong) return;

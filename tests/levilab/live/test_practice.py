@@ -146,6 +146,8 @@ def change_what_if(page):
     page.get_by_role("button", name="Count the stem").click()
     until(page, "document.getElementById('guide').hidden && !levilab.data.bench.drive.output")  # each begins without it
     assert page.input_value("#experiment") == "precession", "what the task asks for"
+    until(page, "document.getElementById('speed').value === '1'")
+    page.select_option("#speed", "10")
     page.select_option("#experiment", "spin")
     page.click("#leave-task")
     until(page, "!document.getElementById('guide').hidden && document.getElementById('task').hidden")
@@ -320,7 +322,7 @@ def test_a_run_and_a_task_wait_until_no_field_is_wrong(starting, page):
     asked, wrong = [], "First correct this: Seed, a whole number from 0 to 999999999, not x"
 
     def take(route):
-        asked.append(route.request.post_data_json["do"])
+        asked.append(route.request.post_data_json)
         route.fulfill(json={"number": 1})
 
     show_a_top(starting, page)
@@ -337,6 +339,10 @@ def test_a_run_and_a_task_wait_until_no_field_is_wrong(starting, page):
     with page.expect_request(lambda one: "record a run" in (one.post_data or "")):
         page.click("#record")
     assert page.inner_text("#said") == ""
+    page.get_by_role("tab", name="Tasks").click()
+    with page.expect_request(lambda one: "begin a task" in (one.post_data or "")):
+        page.click("#task-list button >> nth=0")
+    assert {"do": "set the speed", "speed": 1} in asked  # at 10 × it would be down before the task is read
 
 
 def test_after_a_run_the_last_minutes_show_what_a_person_does(starting, page, tmp_path):
