@@ -161,7 +161,8 @@ def drive_of(bench: Bench) -> Drive | None:
         return None
     commanded: dict[str, Any] = bench.generator.last_set
     names = {"waveform": "", "frequency_hz": 0.0, "amplitude_vpp": 0.0, "offset_v": 0.0, "output": False}
-    return Drive(**{name: commanded.get(name, missing) for name, missing in names.items()})
+    known = {name: commanded.get(name, missing) for name, missing in names.items()}
+    return Drive(**known, triggered=commanded.get("burst", False))
 
 
 def counting_of(bench: Bench) -> Counting | None:

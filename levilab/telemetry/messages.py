@@ -55,6 +55,7 @@ class Drive:
         amplitude_vpp: peak to peak [V].
         offset_v: [V].
         output: whether the signal is on the terminals.
+        triggered: whether each turn of the top starts a cycle: the frequency is then that of a cycle alone.
     """
 
     __pydantic_config__: ClassVar[ConfigDict] = _READ
@@ -64,6 +65,7 @@ class Drive:
     amplitude_vpp: float = 0.0
     offset_v: float = 0.0
     output: bool = False
+    triggered: bool = False
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ export function openHistory(kept = "{}") {
   return {
     /** As text, for the page that is loaded next; what is no number is null there. */
     get kept() { return JSON.stringify({drives, counts, marks, turns}); },
-    /** Each [time, drive]; NaN while it is off. */
+    /** Each [time, drive]; NaN while it is off, or the top triggers it. */
     get drives() { return drives; },
     /** Each [time, spin, drive of that time, end of the gate]; NaN where there is a gap, or the drive was off. */
     get counts() { return counts; },
@@ -45,7 +45,7 @@ export function openHistory(kept = "{}") {
     add(bench, isDown = false) {
       const now = bench.time_s, last = drives.at(-1);
       if (last && now < last[0]) [drives, counts, marks, turns] = [[], [], [], []];  // another bench
-      const drive = bench.drive?.output ? bench.drive.frequency_hz : NaN;
+      const drive = bench.drive?.output && !bench.drive.triggered ? bench.drive.frequency_hz : NaN;
       countTurns(now, drive);
       const rested = rests;
       rests = isDown && !Number.isFinite(drive) && now - counts.at(-1)?.[3] > RESTS_S;

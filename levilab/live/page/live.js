@@ -349,7 +349,7 @@ function showGenerator(bench, last) {
   by("drive-on").classList.toggle("on", Boolean(drive?.output));
   write("signal", drive?.waveform ? `${drive.waveform}, ${short(drive.amplitude_vpp)} ${phrase("Vpp")}${drive.offset_v ? phrase(", offset {volts} V", {volts: short(drive.offset_v)}) : ""}` : "–");
   const [, spin, then] = drive?.output && history.latest || [], off = spin - then;  // of a count and its own time
-  write("lock", Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? (practice && !bench.busy && !bench.took_hold ? phrase("takes hold") : phrase("follows")) : Math.abs(off) < SWINGS_HZ ? phrase("nearly") : phrase("does not follow")}, ${off >= 0 ? "+" : ""}${fixed(off, 3)} Hz` : drive?.output && history.age ? phrase("not counted now") : "–");
+  write("lock", drive?.output && drive.triggered ? phrase("triggers its drive") : Number.isFinite(off) ? `${Math.abs(off) < SLIP_HZ ? (practice && !bench.busy && !bench.took_hold ? phrase("takes hold") : phrase("follows")) : Math.abs(off) < SWINGS_HZ ? phrase("nearly") : phrase("does not follow")}, ${off >= 0 ? "+" : ""}${fixed(off, 3)} Hz` : drive?.output && history.age ? phrase("not counted now") : "–");
   write("generator-model", modelOf("generator"));
 }
 

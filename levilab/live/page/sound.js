@@ -34,7 +34,7 @@ export function openSound() {
     follow(bench) {
       if (context?.state !== "running") return;
       const still = !bench || bench.silent || bench.paused;
-      const heard = {spin: bench?.last.spin_frequency_hz, drive: bench?.drive?.output ? bench.drive.frequency_hz : undefined};
+      const heard = {spin: bench?.last.spin_frequency_hz, drive: bench?.drive?.output && !bench.drive.triggered ? bench.drive.frequency_hz : undefined};
       for (const [name, {source, loud}] of Object.entries(voices)) {
         const is = !still && heard[name] > 0;
         loud.gain.setTargetAtTime(is ? LOUD[name] : 0, context.currentTime, GLIDE_S);

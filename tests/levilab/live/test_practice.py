@@ -280,6 +280,10 @@ def test_nothing_can_be_pressed_before_the_bench_is_there(starting, watched):
     until(page, "document.getElementById('lock').textContent.startsWith('takes hold')")
     publish(starting.watches[""], replace(counted, took_hold=True))
     until(page, f"document.getElementById('lock').textContent.startsWith('follows') && {DONE} === 'drive'")
+    held = replace(counted, time_s=4.0, drive=Drive("SQU", 33.3, 10.0, output=True, triggered=True))
+    publish(starting.watches[""], held)  # 33.3 Hz is that of a cycle, and no drive is 3.3 Hz beside the top
+    until(page, "document.getElementById('lock').textContent === 'triggers its drive'")
+    until(page, "Number.isNaN(levilab.history.drives.at(-1)[1])")
     page.locator("#group").press_sequentially("d?")
     assert page.input_value("#group") == "d?"
     assert not page.locator("#keys").is_visible()

@@ -199,6 +199,9 @@ def test_each_experiment_can_be_recorded_and_takes_as_long_as_is_said(tmp_path, 
     run, plan = Run.load(Path(ended["folder"])), PRACTICE[name]
     assert run.status == "finished"
     assert run.count() > 0
+    drives = [state.drive for state in script.states if state.drive]
+    assert any(drive.output and drive.triggered for drive in drives) == (name in {"triggered", "hold"})
+    assert not drives[-1].triggered
     # a seed moves the end of a run by the fall of its tops, some seconds
     assert ended["time_s"] - began["time_s"] == pytest.approx(plan.length_s, rel=0.1, abs=2.0)
     assert run.record.configuration["scene"]["name"] == began["scene"]["name"] == (plan.scene or "practice")
