@@ -11,8 +11,8 @@ const NOTED_S = 1;
 const LEAST_HZ = 2, LEAST_OFF_HZ = 0.2;
 /** The frequencies that are shown while there is neither a top nor a drive [Hz]. */
 const USUAL_HZ = [20, 35];
-/** A count is shown until the next should be there, a gate and this time after its own gate [s]; then, and after a jump
- * that no top makes [Hz], there is a gap. */
+/** A count is shown until the next should be there, a gate and this time after its own gate [s]; then, after a fall,
+ * and after a jump that no top makes [Hz], there is a gap. */
 const COUNTED_S = 2, JUMP_HZ = 1;
 /** The counts whose slope is shown [s]: a free top's is then known to some percent. */
 const TREND_S = 12;
@@ -101,7 +101,8 @@ export function openHistory(kept = "{}") {
     if (!count || count.end_s === last?.[3]) return false;
     const middle = count.end_s - count.gate_s / 2;
     if (last && middle <= last[0]) return false;
-    if (last && (middle - last[0] > count.gate_s + COUNTED_S + elapsed || Math.abs(count.frequency_hz - last[1]) > JUMP_HZ)) counts.push([middle, NaN, NaN, NaN]);
+    const fell = marks.at(-1)?.[0];  // then this is another top
+    if (last && (fell > last[0] && fell < middle || middle - last[0] > count.gate_s + COUNTED_S + elapsed || Math.abs(count.frequency_hz - last[1]) > JUMP_HZ)) counts.push([middle, NaN, NaN, NaN]);
     counts.push([middle, count.frequency_hz, driveAt(middle), count.end_s]);
     return true;
   }

@@ -478,7 +478,7 @@ def test_the_curve_of_a_top_that_fell_is_whole_and_stays(shown):
 
 
 #: What is kept of a top that follows a ramp of 0.1 Hz/s, counted at first, then not, at states of a bench at 10x; then
-#: a top that was put back, without a drive.
+#: a top that was put back, without a drive, and one more after a fall.
 RAMP = """async () => {
   const {openHistory} = await import("/page/history.js");
   const history = openHistory(), here = [];
@@ -493,6 +493,8 @@ RAMP = """async () => {
   }
   add(21, 28.3, 21, false);
   add(22, 29.95, 22, false);
+  history.mark(22.2, "fell");
+  add(23, 29.9, 23, false);
   return [history.counts, here];
 }"""
 
@@ -500,13 +502,13 @@ RAMP = """async () => {
 def test_a_count_is_compared_with_the_drive_of_its_own_time(shown):
     """On a ramp a count that is kept would fall behind a drive that the top follows."""
     counts, latest = shown.evaluate(RAMP)
-    *of_ramp, gap, low, jump, high = counts  # 28.3 and 29.95 Hz are two tops, and no line joins them
+    *of_ramp, gap, low, jump, high, fall, back = counts  # 28.3 to 29.9 Hz are three tops, and no line joins them
     ramp = np.array([row for row in of_ramp if np.isfinite(row[2])])
     assert len(ramp) >= 10
     np.testing.assert_allclose(ramp[:, 1], ramp[:, 2], atol=1e-9)
     assert [latest[20], latest[26], latest[27]] == [9.5, 9.5, None]  # 3 s after the gate of 1 s: a gate, and 2 s
-    assert all(np.isnan([gap[1], jump[1]]))
-    assert [low[:2], high[:2]] == [[20.5, 28.3], [21.5, 29.95]]
+    assert all(np.isnan([gap[1], jump[1], fall[1]]))
+    assert [low[:2], high[:2], back[:2]] == [[20.5, 28.3], [21.5, 29.95], [22.5, 29.9]]
 
 
 #: What stands on the chart of the last minutes: of a top that spins by 3.5 Hz less than its drive.
