@@ -98,20 +98,16 @@ class Generator(Instrument, Protocol):
         frequency_hz: float,
         amplitude_vpp: float,
         phase_deg: float,
-        cycles: int = 1,
         rising: bool = True,
-        delay_s: float = 0.0,
     ) -> None:
-        """Set bursts, each started by an edge at the trigger input; the output is off afterwards.
+        """Set bursts of a cycle, each started by an edge at the trigger input; the output is off afterwards.
 
         Args:
-            waveform: of the cycles, as of `prepare`.
-            frequency_hz: of the cycles.
-            amplitude_vpp: of the cycles.
+            waveform: of the cycle, as of `prepare`.
+            frequency_hz: of the cycle.  Edges that come before it has ended are ignored.
+            amplitude_vpp: of the cycle.
             phase_deg: where in its cycle a burst starts; 0 is where a sine rises through its middle.
-            cycles: of a burst.  Edges that come before it has ended are ignored.
             rising: whether rising edges start it, or falling ones.
-            delay_s: from the edge to the start.
 
         Raises OutOfRange beyond the limits, with nothing sent.
         """

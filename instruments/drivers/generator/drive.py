@@ -177,26 +177,22 @@ class DriveGenerator(ScpiInstrument):
         frequency_hz: float,
         amplitude_vpp: float,
         phase_deg: float,
-        cycles: int = 1,
         rising: bool = True,
-        delay_s: float = 0.0,
     ) -> None:
         """Set bursts that an edge at the trigger input starts, from a reset as `prepare`; see :class:`Generator`."""
-        address, rows = self.transport.address, type(self)
-        asked = ((rows.burst_phase, phase_deg), (rows.burst_cycles, cycles), (rows.trigger_delay, delay_s))
-        for row, value in asked:
-            if not row.low <= value <= row.high:
-                raise OutOfRange(address, row.name, value, f"{row.low:g} to {row.high:g} {row.unit}".rstrip())
+        row = type(self).burst_phase
+        if not row.low <= phase_deg <= row.high:
+            raise OutOfRange(self.transport.address, row.name, phase_deg, f"{row.low:g} to {row.high:g} {row.unit}")
         self.prepare(waveform=waveform, frequency_hz=frequency_hz, amplitude_vpp=amplitude_vpp)
         self.prepared_here = False
-        self._set_burst(phase_deg=phase_deg, cycles=cycles, rising=rising, delay_s=delay_s)
+        self._set_burst(phase_deg, rising=rising)
         self.prepared_here = True
 
-    def _set_burst(self, *, phase_deg: float, cycles: int, rising: bool, delay_s: float) -> None:
+    def _set_burst(self, phase_deg: float, *, rising: bool) -> None:
         """Set what a burst is like and what starts it, and then choose bursts."""
         self.burst_mode, self.trigger_source = self.BURST[:2]
-        self.burst_cycles, self.burst_phase = float(cycles), phase_deg
-        self.trigger_slope, self.trigger_delay = self.BURST[2 + rising], delay_s
+        self.burst_cycles, self.burst_phase = 1.0, phase_deg
+        self.trigger_slope, self.trigger_delay = self.BURST[2 + rising], 0.0
         self.burst = True
 
     def _reset(self) -> None:

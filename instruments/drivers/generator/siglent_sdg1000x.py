@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from instruments.drivers.generator import OPEN_V, drive
 from instruments.drivers.setting import Setting
@@ -134,10 +134,10 @@ class SiglentSDG1000X(drive.DriveGenerator):
         """Ask for answers with headers; there is no error queue."""
         self.transport.write("CHDR SHORT")
 
-    def _set_burst(self, **burst: Any) -> None:
+    def _set_burst(self, phase_deg: float, *, rising: bool) -> None:
         """Choose bursts first: before, the instrument takes none of their fields."""
         self.burst = True
-        super()._set_burst(**burst)
+        super()._set_burst(phase_deg, rising=rising)
 
     def _reset(self) -> None:
         self.command("*RST")

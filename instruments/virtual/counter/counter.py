@@ -278,29 +278,23 @@ class VirtualCounter(VirtualInstrument):
         self._memory = Memory()
         self._function, self._channels = name, channels
 
-    def select_function(self, words: list[str]) -> None:
-        """Select a function and its channels, as FUNCtion "FREQ 1" does; keep the settings.
+    def function(self) -> str:
+        """Answer FUNCtion? with the function that is set."""
+        return f'"{self._function}"'
 
-        Args:
-            words: of the string.
+    def set_function(self, parameters: list[str]) -> None:
+        """Execute FUNCtion "FREQ (@1)": select a function and its channels, and keep the settings.
 
         Raises:
             ScpiError: the counter does not have this function or channel.
         """
+        words = re.sub(r"[(@),]", " ", parameter(parameters).strip("\"'")).split()
         headers = ((name, "[:][SENSe[1]:]" + function.header) for name, function in self.functions.items())
         found = next((name for name, header in headers if words and header_pattern(header).fullmatch(words[0])), None)
         if found is None or not all(word in map(str, self.numbered) for word in words[1:]):
             raise ScpiError(-224, words[0][:20] if words else "")
         self.choose(found, tuple(map(int, words[1:])) or self._channels[:1])
         self.on_change("function")
-
-    def function(self) -> str:
-        """Answer FUNCtion? with the function that is set."""
-        return f'"{self._function}"'
-
-    def set_function(self, parameters: list[str]) -> None:
-        """Execute FUNCtion "FREQ (@1)"; see `select_function`.  Raises ScpiError."""
-        self.select_function(re.sub(r"[(@),]", " ", parameter(parameters).strip("\"'")).split())
 
     def configure(self, name: str, parameters: list[str]) -> None:
         """CONFigure: a function, its channels, what is expected and how finely.  Raises ScpiError."""

@@ -134,10 +134,6 @@ class Virtual34461A(VirtualCounter):
         low = self.value("slowest") if self._function == "FREQ" else 1 / self.value("slowest")
         return f'"{self._function} {low:+.8E},{part * low:+.8E}"'
 
-    def set_function(self, parameters: list[str]) -> None:
-        """Execute FUNCtion "FREQ"; see `select_function`."""
-        self.select_function([parameter(parameters).strip("\"'")])
-
     def set_automatic_range(self, parameters: list[str]) -> None:
         """RANGe:AUTO: ON, OFF, or ONCE, which finds the range and then keeps it.  Raises ScpiError."""
         text = parameter(parameters)
