@@ -274,8 +274,9 @@ def _quantity(
     known, widened = ([*filter(None, compress(each, used))] for each in (of.estimates, of.widened))
     if not known:
         return replace(of, used=used)
+    shared = [one.u or 0.0 for one in known] if analysis.common else []
     together = compare(*np.array([(one.value, one.u) for one in widened], float).T)
-    return replace(of, used=used, mean=mean(known), together=together)
+    return replace(of, used=used, mean=mean(known, shared), together=together)
 
 
 def _width(freedom: float | None) -> float:
@@ -415,7 +416,12 @@ def agreement(of: Class) -> str:
 def statistics_of_agreement(of: Class) -> str:
     """Return the statistics behind the agreement; empty where no groups were compared."""
     compared = [(one, one.together) for one in of.quantities if one.together and one.together.freedom]
-    rule = "The mean is unweighted, as in levilab report; its u comes from the standard deviation of the values."
+    rule = (
+        "The mean is unweighted; its u is that of one group and, over √N, the standard deviation of the values."
+        if of.analysis.common
+        else "The mean is unweighted, as in levilab report; its u comes from the standard deviation of the values, or "
+        "is larger by the u of the groups."
+    )
     meaning = [rule] if compared else []
     return Sentences(*meaning, *(_chi_square(one, together) for one, together in compared))
 

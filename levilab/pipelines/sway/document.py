@@ -84,4 +84,6 @@ SWAY = Analysis(
     columns=sway_columns,
     row=SWAY_ROW,
     symbols=symbols_of(QUANTITIES),
+    common="χ²/dof is that of a run's windows: above 1 they differ by more than their u, nearly alike in all runs, so "
+    "u is larger, and the mean keeps the u of one group.",
 )

@@ -324,6 +324,7 @@ def _groups(of: Class) -> Tabular:
     full = [k for k in range(len(heads)) if any(row[k] not in {"", "—"} for row in rows)]
     heads, rows = [heads[k] for k in full], [tuple(row[k] for k in full) for row in rows]  # type: ignore[misc]
     note = Text("Residuals are those of the law {law}, whose constants are compared.", law=of.model) if of.model else ""
+    note = of.analysis.common or note
     if of.others:
         laws = enumeration([Text("{name:s} ({law})", name=name, law=law) for name, law in of.others.items()])
         other = Text("The seeds of these groups have another law, and so no truth to compare with: {laws}.", laws=laws)

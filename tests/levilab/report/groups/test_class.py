@@ -150,6 +150,12 @@ def test_a_value_without_a_finite_u_is_not_compared(value, u):
     assert quantity.mean.value == 1.0
 
 
+def test_no_number_of_groups_makes_the_u_of_the_sway_smaller_which_is_common_to_them():
+    parts = [{"values": {"ratio": {"value": 1.0028 + k * 1e-4, "u": 0.0018, "unit": "1"}}} for k in range(8)]
+    of = [_quantity("ratio", ANALYSES["sway"], "", parts[:n], [Truth()] * n, doubts=[False] * n) for n in (1, 2, 8)]
+    assert [one.mean.u for one in of] == pytest.approx([0.0018] * 3, rel=0.01)
+
+
 @pytest.mark.parametrize(("experiment", "names"), [("field", ["strength", "origin", "thickness"]), ("limit", ["mean"])])
 def test_other_experiments_have_their_truths_too(experiment, names, tmp_path):
     settings = {"field": ("field.settle_s=0",), "limit": ("limit.repetitions=3", "limit.hold_s=0")}
@@ -218,6 +224,7 @@ def test_every_analysis_can_be_compared(sample, tmp_path):
     page = write_class([SAMPLE_DATA / sample], tmp_path / "class.html").read_text(encoding="utf-8")
     assert ">Result<" in page
     assert (">Figure<" in page) is (sample == "hold") or "alone measured this:" in page
+    assert ("the mean keeps the u of one group" in page) is (sample == "sway")
 
 
 def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
