@@ -167,6 +167,8 @@ def _unpacked(file: Path) -> tuple[Text, ...]:
     try:
         with zipfile.ZipFile(file) as archive:
             members = [member for member in archive.infolist() if not member.is_dir()]
+            if runs := [member.filename for member in members if Path(member.filename).name == "run.json"]:
+                raise TableError(file, "holds a run of levilab ({run:s}): unpack it, and name its folder", runs[0])
             workbook = bool({"xl/workbook.xml", "content.xml"} & {member.filename for member in members})
             taken = members if workbook else [member for member in members if _may_be_table(member.filename)]
             seen = sum(member.file_size for member in taken)

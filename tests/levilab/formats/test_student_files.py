@@ -475,6 +475,14 @@ def test_a_damaged_locked_or_foreign_file_says_what_to_do(tmp_path):
         read_table(tmp_path / "pictures.zip")
 
 
+def test_a_run_in_a_zip_is_no_table_as_it_would_lose_its_mark_of_a_virtual_bench(tmp_path):
+    with zipfile.ZipFile(tmp_path / "run.zip", "w") as out:
+        out.writestr("a-spin/run.json", "{}")
+        out.writestr("a-spin/readings.csv", "t,f\n0,38\n10,37.9\n20,37.8\n")
+    with pytest.raises(TableError, match=r"holds a run of levilab \(a-spin/run.json\): unpack it"):
+        read_table(tmp_path / "run.zip")
+
+
 @pytest.mark.parametrize("name", ["excel.xlsx", "libreoffice.ods", "phyphox.zip"])
 def test_a_file_with_wrong_bytes_is_read_or_refused(name, tmp_path):
     rng = np.random.default_rng(5)
