@@ -69,7 +69,6 @@ _INPUT: tuple[Row, ...] = (
     Switch("INPut[n]:NREJect", "noise_rejection{n}"),
     Own("INPut[n]:LEVel[1]:AUTO", lambda d, n, p: d.set_automatic(n, p), lambda d, n: d.automatic(n), AUTOMATIC),
     Both("INPut[n]:LEVel[1][:ABSolute]", lambda d, n, p: d.set_level(n, p), lambda d, n, p: d.level(n, p), LEVEL),
-    Count("INPut[n]:LEVel[1]:RELative", "relative{n}", 50.0, (10, 90)),
 )
 _TRIGGERING: tuple[Row, ...] = (
     Count("SAMPle:COUNt", "samples", 1.0, (1, 1e6)),
@@ -157,7 +156,6 @@ class Virtual53230A(VirtualCounter):
         self.settings |= {"gate_source": "TIME", "gate": gate, "mode": "AUTO"}
         self.settings |= {"samples": 1.0, "triggers": 1.0, "trigger_source": "IMM", "trigger_delay": 0.0}
         self.settings |= {f"automatic{channel}": True for channel in self._channels}
-        self.settings |= {f"relative{channel}": 50.0 for channel in self._channels}
 
     def _gate_for(self, name: str, plain: list[str]) -> float:
         """Return the gate that resolves this [s].  Raises ScpiError."""
@@ -242,14 +240,11 @@ class Virtual53230A(VirtualCounter):
     def trigger_input(self, channel: int) -> TriggerInput:
         """See the base.  A probe's factor is in the levels, not in the voltage at the input."""
         setting = {name: self.settings[f"{name}{channel}"] for name in ("automatic", "level", "probe_factor")}
-        relative = self.value(f"relative{channel}") / 100
         noisy = 2.0 if self.settings[f"noise_rejection{channel}"] else 1.0
         return TriggerInput(
             level=None if setting["automatic"] else float(setting["level"]) / float(setting["probe_factor"]),
             hysteresis=_HYSTERESIS * self._wide(channel) * noisy,
             window=1 / self.value("slowest"),
-            upper=relative,
-            lower=relative,
             alternating=self.settings[f"coupling{channel}"] == "AC",
             falling=self.is_falling(channel),
         )

@@ -95,7 +95,6 @@ _INPUT: tuple[Row, ...] = (
     Word("INPut[n]:SLOPe", "slope{n}", "POSitive NEGative"),
     Own("INPut[n]:LEVel:AUTO", lambda d, n, p: d.set_automatic(n, p), lambda d, n: d.automatic(n), AUTOMATIC),
     Both("INPut[n]:LEVel", lambda d, n, p: d.set_level(n, p), lambda d, n, p: d.level(n, p), LEVEL),
-    Number("INPut[n]:LEVel:RELative", "relative{n}", 70.0, (0, 100)),
 )
 _ARMING: tuple[Row, ...] = (
     Count("ARM[:SEQuence[1]][:STARt][:LAYer[1]]:COUNt", "armings", 1.0, (1, 2**31 - 1), endless=True),

@@ -239,10 +239,6 @@ class Channel:
             return limit(text, low=low, high=high, default=default)
         return self.clip(quantity_of(text, (unit,))[0], low, high)
 
-    def degrees_per_unit(self) -> float:
-        """Return the size of the unit of UNIT:ANGLe [°]."""
-        return math.degrees(1) if self._settings["angle_unit"] == "RAD" else 1.0
-
     # --- frequency ---
 
     @property
@@ -302,25 +298,20 @@ class Channel:
         load = self.number("load")
         return 1.0 if load >= INFINITE else load / (load + SOURCE_OHM)
 
-    def voltage_limits(self) -> tuple[float, float]:
-        """Return the lowest and the highest voltage that there can be [V]."""
-        top = OPEN_V * self.load_factor
-        if self["limits_on"]:
-            return max(-top, self.number("limit_low")), min(top, self.number("limit_high"))
-        return -top, top
+    @property
+    def top(self) -> float:
+        """The highest voltage that there can be [V]; the lowest is its negative."""
+        return OPEN_V * self.load_factor
 
     def amplitude_limits(self) -> tuple[float, float]:
-        """Return the limits of the peak-to-peak voltage [V]; the upper one is never below the lower one."""
-        low, high = self.voltage_limits()
-        least = 2 * self.family.least_vpp * self.load_factor
-        return least, max(least, high - low)
+        """Return the limits of the peak-to-peak voltage [V]."""
+        return 2 * self.family.least_vpp * self.load_factor, 2 * self.top
 
     def offset_limits(self) -> tuple[float, float]:
         """Return the limits of the offset at the present amplitude [V]; a DC voltage has no amplitude."""
-        low, high = self.voltage_limits()
         half = 0.0 if self["waveform"] == "DC" else self.number("amplitude_vpp") / 2
-        middle = (low + high) / 2  # where there is no room for the amplitude
-        return min(middle, low + half), max(middle, high - half)
+        reach = max(0.0, self.top - half)
+        return -reach, reach
 
     def from_vpp(self, vpp: float, unit: str) -> float:
         """Return a peak-to-peak voltage [V] in this unit."""
@@ -351,13 +342,11 @@ class Channel:
 
     def high_limits(self) -> tuple[float, float]:
         """Return the limits of the high level [V]."""
-        low, high = self.voltage_limits()
-        return low + self._step(), high
+        return self._step() - self.top, self.top
 
     def low_limits(self) -> tuple[float, float]:
         """Return the limits of the low level [V]."""
-        low, high = self.voltage_limits()
-        return low, high - self._step()
+        return -self.top, self.top - self._step()
 
     def set_high(self, high: float) -> None:
         """Set the high level [V]; the low one stays, or gives way by the smallest step."""

@@ -73,7 +73,7 @@ _CHANNEL: tuple[Row, ...] = (
     Switch("OUTPut[n]:SYNC[:STATe]", "{n}:sync", default=True, words=("OFF", "ON")),
     Word(f"{_BURST}:MODE", "{n}:burst_mode", "TRIGgered GATed"),
     Word(f"{_BURST}:GATE:POLarity", "{n}:gate_polarity", "NORMal INVerted"),
-    Quantity(f"{_BURST}:PHASe", "{n}:burst_phase", 0.0, (0.0, 360.0), angle=True),
+    Quantity(f"{_BURST}:PHASe", "{n}:burst_phase", 0.0, (0.0, 360.0), "DEG"),
     burst_cycles(1e6),
     Word(f"{_BURST}:TRIGger:SOURce", "{n}:trigger_source", _SOURCES, default="INT"),
     Word(f"{_BURST}:TRIGger:SLOPe", "{n}:trigger_slope", "POSitive NEGative"),
@@ -95,7 +95,6 @@ class VirtualDG1000Z(VirtualGenerator):
     numbered = (1, 2)
     CHANNEL_ROWS: ClassVar = _CHANNEL
     DEFAULTS: ClassVar = {
-        "angle_unit": "DEG",
         **{name.format(n=n): value for n in (1, 2) for name, value in _OFF.items()},
     }
 

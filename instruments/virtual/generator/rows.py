@@ -3,7 +3,6 @@
 Sources: Keysight 33500 Series Operating and Service Guide; Agilent 33220A User's Guide, chapter 4.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -22,13 +21,11 @@ class Quantity(Number):
         get: returns the number, where it is not kept as sent.
         keep: keeps it, in the same case.
         endless: whether it may be infinite.
-        angle: whether it is a phase, kept in degrees; UNIT:ANGLe says the unit on the wire.
     """
 
     get: Callable[[Channel], float] | None = field(default=None, repr=False)
     keep: Callable[[Channel, float], None] | None = field(default=None, repr=False)
     endless: bool = False
-    angle: bool = False
 
     def _channel(self, device: VirtualGenerator) -> Channel:
         return device.channel(*self.of)
@@ -49,10 +46,6 @@ class Quantity(Number):
         channel, limits = self._channel(device), self.range(device)
         if self._is_infinite(text):
             return INFINITE
-        if self.angle and not text[:1].isalpha():
-            value, unit = quantity_of(text, ("", "DEG", "RAD"))
-            degrees = {"": channel.degrees_per_unit(), "DEG": 1.0, "RAD": math.degrees(1)}
-            return channel.clip(value * degrees[unit], *limits)
         return channel.read(text, *limits, self.default, self.unit)
 
     def put(self, device: VirtualGenerator, value: Value) -> None:
@@ -67,10 +60,6 @@ class Quantity(Number):
         """See the base."""
         return self.get(self._channel(device)) if self.get else super().value(device)
 
-    def format_value(self, device: VirtualGenerator, value: float) -> str:
-        """See the base."""
-        return device.spell(value / self._channel(device).degrees_per_unit() if self.angle else value)
-
 
 _PULSE = "[SOURce[n]:][FUNCtion:]PULSe:"
 _LEVEL = "[SOURce[n]:]VOLTage[:LEVel][:IMMediate]"
@@ -84,7 +73,7 @@ CHANNEL: tuple[Row, ...] = (
         get=lambda c: c.frequency,
         keep=Channel.set_frequency,
     ),
-    Quantity("[SOURce[n]:]PHASe[:ADJust]", "{n}:phase", 0.0, _TURN, angle=True),
+    Quantity("[SOURce[n]:]PHASe[:ADJust]", "{n}:phase", 0.0, _TURN, "DEG"),
     Do("[SOURce[n]:]PHASe:REFerence", lambda _s, _n: None),
     Quantity("[SOURce[n]:]FUNCtion:SQUare:DCYCle", "{n}:duty", 50.0, Channel.square_duties, "PCT"),
     Quantity("[SOURce[n]:]FUNCtion:RAMP:SYMMetry", "{n}:symmetry", 100.0, (0, 100), "PCT"),
@@ -114,9 +103,6 @@ CHANNEL: tuple[Row, ...] = (
         keep=Channel.set_low,
         alias=True,
     ),
-    Switch("[SOURce[n]:]VOLTage:LIMit:STATe", "{n}:limits_on"),
-    Quantity("[SOURce[n]:]VOLTage:LIMit:HIGH", "{n}:limit_high", 5.0, (-10, 10), "V"),
-    Quantity("[SOURce[n]:]VOLTage:LIMit:LOW", "{n}:limit_low", -5.0, (-10, 10), "V"),
     Switch("[SOURce[n]:]VOLTage:RANGe:AUTO", "{n}:automatic_range", default=True),
     Switch("OUTPut[n][:STATe]", "{n}:output"),
     Quantity("OUTPut[n]:LOAD", "{n}:load", 50.0, (1, 1e4), "OHM", keep=Channel.set_load, endless=True),
@@ -129,7 +115,7 @@ CHANNEL: tuple[Row, ...] = (
     Switch("[SOURce[n]:]BURSt:STATe", "{n}:burst"),
     Word("[SOURce[n]:]BURSt:MODE", "{n}:burst_mode", "TRIGgered GATed"),
     Word("[SOURce[n]:]BURSt:GATE:POLarity", "{n}:gate_polarity", "NORMal INVerted"),
-    Quantity("[SOURce[n]:]BURSt:PHASe", "{n}:burst_phase", 0.0, _TURN, angle=True),
+    Quantity("[SOURce[n]:]BURSt:PHASe", "{n}:burst_phase", 0.0, _TURN, "DEG"),
     Quantity("[SOURce[n]:]BURSt:INTernal:PERiod", "{n}:burst_period", 1e-2, Channel.burst_periods, "S"),
     Word("TRIGger[n]:SLOPe", "{n}:trigger_slope", "POSitive NEGative"),
     Do("TRIGger[n][:IMMediate]", lambda s, n: s.start(n)),
@@ -153,7 +139,6 @@ SHARED: tuple[Row, ...] = (
     Switch("OUTPut[1|2]:SYNC[:STATe]", "sync", default=True),
     Switch("OUTPut:TRIGger[:STATe]", "trigger_out"),
     Word("OUTPut:TRIGger:SLOPe", "trigger_out_slope", "POSitive NEGative"),
-    Word("UNIT:ANGLe", "angle_unit", "DEGree RADian SECond"),
     Word("FORMat:BORDer", "byte_order", "NORMal SWAPped"),
     Switch("SYSTem:BEEPer:STATe", "beeper", default=True),
     Word("SYSTem:COMMunicate:RLSTate", "remote", "LOCal REMote RWLock"),
