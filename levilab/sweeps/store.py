@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from levilab.computer import computer, utc_now
 from levilab.errors import DataError
 from levilab.files import CannotWrite, locked, make_folder, writing
+from levilab.interruption import interruption_postponed
 from levilab.simulator.keys import short_text
 from levilab.software import software_versions
 from levilab.sweeps.plan import Axis, Chunk, Plan, unit_of
@@ -108,7 +109,7 @@ class Store:
         if path.exists():
             raise CannotWrite(taken)
         part = path.with_name(f".{path.name}.{computer().process}.part")
-        with writing(f"{path} cannot be made"):
+        with interruption_postponed(), writing(f"{path} cannot be made"):  # zarr's tasks would outlive it
             try:
                 make_folder(path.parent)
                 cls._in(DurableStore(part), part, plan, begin)

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import signal
 
 import numpy as np
 import pytest
@@ -27,6 +28,19 @@ def test_a_store_that_is_opened_again_has_the_plan_and_the_values(tmp_path):
     assert np.array_equal(found.values["lifetime_s"][found.computed], expected()[found.computed])
     assert np.all(np.isnan(found.values["lifetime_s"][~found.computed]))
     assert np.count_nonzero(~found.computed) == np.prod(last.part.shape)
+
+
+def test_a_store_is_made_whole_before_an_interruption_counts(tmp_path):
+    begun = []
+
+    def begin(store):
+        signal.raise_signal(signal.SIGINT)
+        begun.append(store)
+
+    with pytest.raises(KeyboardInterrupt):
+        Store.create(tmp_path / "map.zarr", plan(), begin)
+    assert begun
+    assert Store.open(tmp_path / "map.zarr").done == 0
 
 
 def test_plain_zarr_reads_arrays_coordinates_and_units(tmp_path):
