@@ -446,6 +446,18 @@ def find_column(path: Path, header: Sequence[str], key: str, title: str) -> tupl
     return index, unit
 
 
+def _units_once(kind: str) -> list[str]:
+    """Return the first name of each unit of a dimension.
+
+    >>> _units_once("frequency")
+    ['Hz', 'kHz', 'MHz', 'mHz', 'μHz', 'rpm', 'rad/s', '°/s', 'krpm']
+    """
+    names: dict[float, str] = {}
+    for name, factor in UNITS[kind].items():
+        names.setdefault(factor, name)
+    return [*names.values()]
+
+
 def _stated_unit(path: Path, name: str, unit: str) -> str:
     kind = dimension(name)
     turns = kind == "frequency" and name in QUANTITIES
@@ -454,7 +466,7 @@ def _stated_unit(path: Path, name: str, unit: str) -> str:
     if not (_is_unit_of(unit, name) or (turns and unit_factor(unit, "time"))):
         of_turns = ", s and ms of a turn, turns in 10 s, turns since the start as turns" if turns else ""
         what = "`columns`: '{unit:s}' is no unit of {kind}; known are {known:s}{of_turns}"
-        raise TableError(path, what, shorten(unit), kind, ", ".join(UNITS[kind]), of_turns)
+        raise TableError(path, what, shorten(unit), kind, ", ".join(_units_once(kind)), of_turns)
     return unit
 
 
@@ -508,5 +520,5 @@ def _taken_in_si(path: Path, name: str, label: str, unit: str | None) -> str:
 def _unknown_unit(path: Path, label: str, title: Title) -> str:
     kind = dimension(title.column or "")
     said = "{path:s}: column '{label:s}' is not used: '{unit:s}' is no unit of {kind} known here ({known:s} …)"
-    values = shorten(str(path), 200), shorten(label), shorten(title.unit or ""), kind, ", ".join(list(UNITS[kind])[:8])
+    values = shorten(str(path), 200), shorten(label), shorten(title.unit or ""), kind, ", ".join(_units_once(kind)[:8])
     return of_file("unknown unit", Text(said, *values))

@@ -316,6 +316,7 @@ def _question(
     if numbers and not total and (per_reading := _turns_per_reading(layout, numbers, time)):
         units = [per_reading, *units]
     spins = {unit: total or [number * (unit_factor(unit, "frequency") or 1.0) for number in numbers] for unit in units}
+    spins = spins or _likely(_spins_of_periods(numbers))
     said = what or "no unit", _ranges(spins), ("rpm", "Hz")
     return _ask(layout, index, "f", {**_at(time), **given}, numbers=numbers, said=said) if spins else None
 
@@ -366,11 +367,20 @@ def _ask(
 def _question_of_period(plan: "Plan", column: Column) -> Doubt | None:
     """Return the question in which unit the times of turns are: of ms and s that in which a top can have them."""
     numbers = [number for number in _numbers(plan.layout, column.index) if number > 0]
-    spins = {unit: [1 / (column.factor * size * one) for one in numbers] for unit, size in (("ms", 1e-3), ("s", 1.0))}
-    likely = {unit: of for unit, of in spins.items() if of and is_possible_spin(median(of))}
+    spins = _spins_of_periods(numbers, column.factor)
+    likely = _likely(spins)
     said = "no unit", _ranges(likely), () if likely else (*spins,)
     given = {**_at(plan.column("time_s")), **plan.request.columns}
     return _ask(plan.layout, column.index, "f", given, numbers=numbers, said=said) if numbers else None
+
+
+def _spins_of_periods(numbers: Sequence[float], turns: float = 1.0) -> dict[str, list[float]]:
+    """Return spins [Hz] by the unit in which numbers are the times of a turn, or of its share `turns`."""
+    return {unit: [1 / (turns * size * n) for n in numbers if n > 0] for unit, size in (("ms", 1e-3), ("s", 1.0))}
+
+
+def _likely(spins: Mapping[str, list[float]]) -> dict[str, list[float]]:
+    return {unit: of for unit, of in spins.items() if of and is_possible_spin(median(of))}
 
 
 def _spins_of_total(layout: Layout, numbers: Sequence[float], time: Column | None) -> list[float]:

@@ -92,7 +92,7 @@ class Owner:
         """Return the owner with these washers [kg].  Raises ValueError where one is as heavy as a top."""
         heaviest = max(masses, default=0.0)
         if self.top is not None and heaviest >= _WHOLE * self.top:
-            said = "a washer of {washer:n} on a top of {top:n}? mg are typed as 60 mg"
+            said = "a washer of {washer:n} on a top of {top:n}? mg are typed as 60 mg, kg as 0.0249 kg"
             raise ValueError(Text(said, washer=in_grams(heaviest), top=in_grams(self.top)))
         return replace(self, washers=tuple(sorted(masses)))
 
@@ -112,7 +112,7 @@ class Owner:
         if len(typed) == 1 and typed[0] >= _WHOLE * self.top:
             return Attempt(typed[0], degrees, outcomes[0])
         if sum(typed) >= _WHOLE * self.top:
-            said = "washers of {washers:n} on a top of {top:n}? mg are typed as 60 mg"
+            said = "washers of {washers:n} on a top of {top:n}? mg are typed as 60 mg, kg as 0.0249 kg"
             raise ValueError(Text(said, washers=in_grams(sum(typed)), top=in_grams(self.top)))
         return Attempt(self.top + sum(typed), degrees, outcomes[0], tuple(sorted(typed)))
 

@@ -65,7 +65,7 @@ def test_what_was_typed_is_kept_where_a_later_question_ends_it(answers, tmp_path
 def test_washers_without_commas_or_as_heavy_as_a_top_are_asked_again(answers):
     asked = answers("24.9", "0.06 0.1", "60", "60 mg", "21", "").err.splitlines()
     assert asked[2] == "a comma is expected between two masses, as 0.06, 0.1 g"
-    assert asked[4] == "a washer of 60 g on a top of 24.9 g? mg are typed as 60 mg"
+    assert asked[4] == "a washer of 60 g on a top of 24.9 g? mg are typed as 60 mg, kg as 0.0249 kg"
 
 
 def test_washers_with_an_outcome_are_no_temperature(answers):

@@ -599,6 +599,18 @@ def test_a_path_into_no_file_stays_a_path():
     assert texts.locate(FILES / "excel.xlsx" / "Messung") == (FILES / "excel.xlsx", "Messung")
 
 
+def test_times_of_a_turn_without_a_unit_are_a_question(tmp_path):
+    (path := tmp_path / "periods.csv").write_text(
+        "t,T\n" + "".join(f"{10 * k},{0.0263 + k / 1000}\n" for k in range(20))
+    )
+    (run,) = understand(path, columns={"t": "1", "f": "2"}).runs
+    (doubt,) = run.doubts
+    assert doubt.choices[0].text == "s (38 to 22.1 Hz)"
+    assert read_table(path, columns=doubt.choices[0].columns).column("spin_frequency_hz")[0] == pytest.approx(
+        38, abs=0.1
+    )
+
+
 def test_turns_since_the_start_are_a_question_whose_first_answer_gives_the_mean_spins(tmp_path):
     """Against the counts themselves: differences over time, with u of two counts cut to whole turns."""
     t, n = np.arange(0.0, 200.0, 10.0), np.floor(390 * np.arange(20) - 3.0 * np.arange(20) ** 2)
