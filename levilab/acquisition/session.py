@@ -248,7 +248,7 @@ class Session(Generic[S]):
     # --- display and record ---
 
     def event(self, kind: RunEvent, text: str, **data: Any) -> None:
-        """Record and show an event."""
+        """Record and show an event; `time_s` among the data is its time where that is not now [s]."""
         if not self._replaying:
             self._write_event(kind, text, **data)
             self.doing.text = text
@@ -256,7 +256,8 @@ class Session(Generic[S]):
             self.look()
 
     def _write_event(self, kind: RunEvent, text: str, **data: Any) -> None:
-        self.writer.event(None if self.zero is None else self.now(), kind, text, **data)
+        now = None if self.zero is None else self.now()
+        self.writer.event(data.pop("time_s", now), kind, text, **data)
 
     def warn(self, text: str, **values: object) -> None:
         """Record and show a warning about the readings, with values in it; every result of the run repeats it."""

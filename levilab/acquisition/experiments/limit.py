@@ -258,7 +258,7 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
     # make it swing about the drive, until it is lost early.  A counter that is reached again must not make it jump.
     every, longest_step_s = max(1, round(settings.interval_s / settings.gate_s)), 2 * settings.gate_s
     held = start
-    seen: list[tuple[float, float]] = []
+    seen: list[tuple[float, float, float]] = []  # end [s], spin, drive [Hz] of counts that were looked at
     counts: list[tuple[float, float, float]] = []  # end [s], spin, drive [Hz] of each step: their sum is the phase
     for k in itertools.count(1):
         spin = spin_now(session) if k % every else None
@@ -276,7 +276,7 @@ def _creep_up(session: Session[LimitSettings], keep: Callable[[Row], None]) -> N
                     counts.append((session.now(), lost.spin, drive))
                 _say_how_it_was_lost(session, lost, limit, seen, counts)
                 return
-            seen.append((spin, drive))
+            seen.append((session.now(), spin, drive))
             if is_over(session):
                 return
         counts.append((session.now(), spin, drive))
@@ -366,12 +366,18 @@ def _say_how_it_was_lost(
     session: Session[LimitSettings],
     lost: NotHeld,
     limit: Row,
-    seen: list[tuple[float, float]],
+    seen: list[tuple[float, float, float]],
     counts: list[tuple[float, float, float]],
 ) -> None:
-    """Record whether the top is still up, why it was lost, and whether its tape slipped; once the limit is kept."""
+    """Record whether its tape slipped, whether the top is still up, and why it was lost; once the limit is kept."""
     kind, what = _end_of(session, lost)
     spin, held = limit["spin_frequency_hz"], limit["drive_frequency_hz"]
+    safely_held = [one for one in seen if one[2] < held - _BELOW_HZ][-_COMPARED:]
+    if len(safely_held) > 1:
+        ends, spins, drives = zip(*safely_held, strict=True)
+        # each step makes the top swing, and the counts see the swing at the same phase
+        step = session.settings.creep_hz_per_s * RAMP_STEP_S
+        compare_with_drive(session, slip_of(spins, drives, least=2 * step), time_s=ends[-1])
     lag = lag_before_loss(*zip(*counts, strict=True)) if counts else math.nan
     cause = cause_of_loss(lag, fell=kind is RunEvent.TOP_LOST)
     known = {} if math.isnan(lag) else {"lag_turns": lag}
@@ -381,12 +387,6 @@ def _say_how_it_was_lost(
         kind, text,
         spin_frequency_hz=spin, drive_frequency_hz=lost.drive, top=len(session.rows), cause=cause, **known,
     )  # fmt: skip
-    safely_held = [(spin, drive) for spin, drive in seen if drive < held - _BELOW_HZ][-_COMPARED:]
-    if len(safely_held) > 1:
-        spins, drives = zip(*safely_held, strict=True)
-        # each step makes the top swing, and the counts see the swing at the same phase
-        step = session.settings.creep_hz_per_s * RAMP_STEP_S
-        compare_with_drive(session, slip_of(spins, drives, least=2 * step))
 
 
 EXPERIMENT = Experiment(

@@ -67,8 +67,9 @@ def test_the_upper_limit_is_where_drag_takes_all_that_the_drive_can_give(tmp_pat
     ends = [((most - left) / c) ** (2 / 3) / 2 / math.pi for left in (2 * math.pi * 0.05, 0.0)]
     # lost is a top that is 1 Hz beside: at 0.05 Hz/s, of which most is made up for, that takes less than 2 Hz of creep
     assert ends[0] - 0.5 < limit < ends[1]
-    assert kinds(run)[-1] == "held"
-    assert "lock lost" in kinds(run)
+    held, lost = [*run.events()][-2:]
+    assert (held["kind"], lost["kind"]) == ("held", "lock lost")
+    assert held["time_s"] < lost["time_s"] - 5.0 / 0.05  # from 5 Hz below the limit, on a creep of 0.05 Hz/s
     assert (causes(run), "warning" in kinds(run)) == (["left behind by the drive"], False)
 
 
