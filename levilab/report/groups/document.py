@@ -66,7 +66,7 @@ from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
 from levilab.runs.find import RECORD
 from levilab.runs.run import read_record
-from levilab.texts.note import of_file
+from levilab.texts.note import kind_of, of_file
 from levilab.texts.text import Sentences, Text, spoken, verbatim
 
 if TYPE_CHECKING:
@@ -139,6 +139,13 @@ def _left_out(results: Results) -> tuple[dict[Path, str], str]:
     about = Text("without readings: {kinds} ({names:s})", number_by_kind(others), names) if others else ""
     left_out_paths = {one.path for one in others}
     return {path: unread[path] for path in sorted(unread) if path not in used | left_out_paths}, about
+
+
+def _copies(results: Results) -> dict[Path, Path]:
+    """Return the inputs that were left out as they hold the readings of another one, and that."""
+    notes = [text for _, found in results for text in found.warnings if kind_of(text) == "same readings"]
+    said = [note.values["text"].values for note in notes if isinstance(note, Text)]
+    return {Path(values["path"]): Path(values["other"]) for values in said}
 
 
 def _with_folders_as_groups(results: Results, folder_of: Callable[[Path], str]) -> Results:
@@ -250,7 +257,7 @@ def _marks(of: Class) -> Iterator[Tabular]:
         for group, mark in zip(of.groups, of.marks, strict=True)
         if mark.word != GOOD
     ]
-    rows += [Row((name, REPEAT, Text("not read: {problem}", why)), _ROWS[REPEAT]) for name, why in of.unread.items()]
+    rows += [Row((name, REPEAT, why), _ROWS[REPEAT]) for name, why in of.unread.items()]
     note = Text(
         "repeat: not read, no value, or one more than {far:.0f} u from its truth, or a doubt about the "
         "readings; look: a warning, or, where no truth is known, more than {far:.0f} u from the "
@@ -393,17 +400,22 @@ def write_class(
         check_writable(output)
     results = _each_reading_once(recall_suiting(paths, given or {}, skips=True))
     unread, others = _left_out(results)
-    folder_of = _folders_of_groups(results, unread)
+    copies = _copies(results)
+    folder_of = _folders_of_groups(results, [*unread, *copies, *copies.values()])
     results = _with_folders_as_groups(results, folder_of)
     classes = [class_of(analysis, found) for analysis, found in results]
     classes.sort(key=lambda of: -len(of.groups))  # what one group alone measured comes last
-    of_inputs = dict(
-        zip(_names_of_unread([*unread], results, folder_of), map(plain_text, unread.values()), strict=True)
-    )
-    classes[0] = replace(classes[0], unread=of_inputs)
+    missing = {path: Text("not read: {problem}", plain_text(why)) for path, why in unread.items()}
+    names = {source.path: source.name for _, found in results for source in found.sources}
+    for path, first in copies.items():
+        if (folder_of(path) or path.name) != (folder_of(first) or first.name) and first in names:
+            said = "holds the same readings as {other:s}: a group needs a seed or a file of its own"
+            missing[path] = Text(said, names[first])
+    named = _names_of_unread([*missing], results, folder_of)
+    classes[0] = replace(classes[0], unread=dict(zip(named, missing.values(), strict=True)))
     date = newest_of(results)
     if form:
-        groups = [folder_of(path) or path.name for path in unread]
+        groups = [folder_of(path) or path.name for path in missing]
         document = (heading or Heading()).above(class_document(classes, paths, output.name, others, groups))
         content = form.content(in_language_of_reader(replace(document, date=date, language=spoken())))
     else:

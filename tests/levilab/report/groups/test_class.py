@@ -124,7 +124,21 @@ def test_files_of_one_folder_and_runs_of_no_group_are_each_by_itself(tmp_path):
         spin_down_csv(tmp_path / f"{name}.csv", seed=len(name))
         shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / name)
     page = Page(write_class([tmp_path], tmp_path / "class.html").read_text(encoding="utf-8")).text
-    assert "Class of 3 runs" in page  # one of the two copies
+    assert "Class of 4 runs" in page
+    assert re.search(r"2 of 4 results .* To repeat: ben.*ben repeat holds the same readings as anna", page, re.DOTALL)
+
+
+def test_a_group_with_the_seed_of_another_one_is_named_and_two_copies_of_a_run_are_not(of_three, tmp_path):
+    root = with_changes(of_three, tmp_path, "Group 2", {})
+    for name, group in (("again", "Group 2"), ("seed", "Group 3")):
+        (run,) = (one for one in root.glob("2*") if '"group": "Group 2"' in (one / RECORD).read_text(encoding="utf-8"))
+        shutil.copytree(run, root / name)
+        record = json.loads((run / RECORD).read_text(encoding="utf-8"))
+        (root / name / RECORD).write_text(json.dumps(record | {"group": group}), encoding="utf-8")
+    page = Page(write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")).text
+    assert "Class of 4 groups" in page
+    assert "3 of 4 results are good. To repeat: Group 3." in page
+    assert "Group 3 repeat holds the same readings as Group 2: a group needs a seed or a file of its own" in page
 
 
 def test_a_run_given_twice_is_named(of_three, tmp_path):
