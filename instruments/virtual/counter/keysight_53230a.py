@@ -29,8 +29,7 @@ from instruments.virtual.counter.run import Run
 
 #: From the end of a measurement to the beginning of the next, but for gap-free ones [s] (estimated).
 _DEAD = 1e-3
-#: Schmitt trigger of the input [V] (53230A data sheet: 20 mV, 40 mV typical); ten times that in the 50 V range,
-#: and about twice with noise rejection.
+#: Schmitt trigger of the input [V] (53230A data sheet: 20 mV, 40 mV typical); ten times that in the 50 V range.
 _HYSTERESIS = 0.04
 
 
@@ -66,7 +65,6 @@ _INPUT: tuple[Row, ...] = (
     Number("INPut[n]:PROBe", "probe_factor{n}", 1.0, (1, 10), values=(1, 10)),
     Number("INPut[n]:RANGe", "range{n}", 5.0, (5, 50), "V", values=(5, 50)),
     Word("INPut[n]:SLOPe[1]", "slope{n}", "POSitive NEGative"),
-    Switch("INPut[n]:NREJect", "noise_rejection{n}"),
     Own("INPut[n]:LEVel[1]:AUTO", lambda d, n, p: d.set_automatic(n, p), lambda d, n: d.automatic(n), AUTOMATIC),
     Both("INPut[n]:LEVel[1][:ABSolute]", lambda d, n, p: d.set_level(n, p), lambda d, n, p: d.level(n, p), LEVEL),
 )
@@ -240,10 +238,9 @@ class Virtual53230A(VirtualCounter):
     def trigger_input(self, channel: int) -> TriggerInput:
         """See the base.  A probe's factor is in the levels, not in the voltage at the input."""
         setting = {name: self.settings[f"{name}{channel}"] for name in ("automatic", "level", "probe_factor")}
-        noisy = 2.0 if self.settings[f"noise_rejection{channel}"] else 1.0
         return TriggerInput(
             level=None if setting["automatic"] else float(setting["level"]) / float(setting["probe_factor"]),
-            hysteresis=_HYSTERESIS * self._wide(channel) * noisy,
+            hysteresis=_HYSTERESIS * self._wide(channel),
             window=1 / self.value("slowest"),
             alternating=self.settings[f"coupling{channel}"] == "AC",
             falling=self.is_falling(channel),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from instruments.ieee488 import INFINITY
-from instruments.virtual.core.parameters import block_text, choice, number, parameter
+from instruments.virtual.core.parameters import block_text, number
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.rows import Ask, Both, Do, Number, Own, Row, Switch, Word
 from instruments.virtual.core.signal import Array
@@ -131,7 +131,6 @@ _SYSTEM: tuple[Row, ...] = (
     Ask("STATus:QUEStionable[:EVENt]"),
     Switch("DISPlay:ENABle", "display", default=True),
     Switch("CALibration:INTerpolator:AUTO", "calibrating", default=True),
-    Both("AUTO", lambda d, p: d.set_automatically(p)),
 )
 
 
@@ -277,11 +276,6 @@ class VirtualCNT91(VirtualCounter):
         return number_text(value) if value >= INFINITY else str(round(value))
 
     # --- inputs ---
-
-    def set_automatically(self, parameters: list[str]) -> None:
-        """AUTO ONCE, the AUTOSET key: levels are found by the counter."""
-        choice(parameter(parameters), ("ONCE", "PRESet"))
-        self.settings |= {"automatic1": True, "automatic2": True}
 
     def greatest_level(self, channel: int) -> float:
         """See the base."""

@@ -61,7 +61,6 @@ _CHANNEL: tuple[Row, ...] = (
     Quantity("TRIGger[n]:DELay", "{n}:trigger_delay", 0.0, (0, 1000), "S"),
     Quantity("TRIGger[n]:COUNt", "{n}:trigger_count", 1.0, (1, 1e6)),
     Quantity("TRIGger[n]:TIMer", "{n}:trigger_timer", 1.0, (1e-6, 8000), "S"),
-    Quantity("TRIGger[n]:LEVel", "{n}:trigger_level", 3.3, (0.9, 3.8), "V"),
     # arbitrary waveforms
     Own(_ARB, lambda s, n, p: s.select(n, p), lambda s, n: f'"{s.channel(n)["arb"]}"', keeps=("{n}:arb", _FIRST_ARB)),
     Quantity(f"{_ARB}:SRATe", "{n}:arb_rate", 40e3, _rates, "SA/S"),
@@ -76,15 +75,6 @@ _CHANNEL: tuple[Row, ...] = (
     Do("[SOURce[n]:]PHASe:SYNChronize", lambda _s, _n: None),
     Do("INITiate[n][:IMMediate][:ALL]", lambda _s, _n: None),
     Switch("INITiate[n]:CONTinuous", "{n}:continuous", default=True),
-    Word("OUTPut[n]:MODE", "{n}:output_mode", "NORMal GATed"),
-    Word("OUTPut[n]:SYNC:MODE", "{n}:sync_mode", "NORMal CARRier MARKer"),
-    Word("OUTPut[n]:SYNC:POLarity", "{n}:sync_polarity", "NORMal INVerted"),
-)
-_SHARED: tuple[Row, ...] = (
-    Word("OUTPut[1|2]:SYNC:SOURce", "sync_source", "CH1 CH2"),
-    Word("OUTPut:TRIGger:SOURce", "trigger_out_source", "CH1 CH2"),
-    Word("ROSCillator:SOURce", "clock_source", "INTernal EXTernal"),
-    Word("ROSCillator:SOURce:AUTO", "clock_automatic", "ON OFF"),
 )
 
 
@@ -98,7 +88,7 @@ class Virtual33500B(VirtualGenerator):
     family = _FAMILY
     numbered = (1, 2)
     CHANNEL_ROWS: ClassVar = (*CHANNEL, *_CHANNEL)
-    ROWS: ClassVar = (*SHARED, *_SHARED)
+    ROWS: ClassVar = (*SHARED, Word("OUTPut[1|2]:SYNC:SOURce", "sync_source", "CH1 CH2"))
 
     # --- arbitrary waveforms ---
 

@@ -20,7 +20,7 @@ from instruments.virtual.core.device import Answer, VirtualInstrument
 from instruments.virtual.core.line import LineSettings
 from instruments.virtual.core.parameters import no_parameters, number
 from instruments.virtual.core.parser import ScpiError, Value
-from instruments.virtual.core.rows import Ask, Both, Do, Own, Row
+from instruments.virtual.core.rows import Ask, Do, Own, Row
 from instruments.virtual.core.steps import Steps
 from instruments.virtual.magnetometer.hall_probe import HallProbe, Reading
 
@@ -114,15 +114,8 @@ FAMILY: tuple[Row, ...] = (
     Ask("RDGFIELD", lambda d: d.reading_text()),
     Ask("OPST", lambda d: f"{d.operational_status():03d}"),
     Ask("TYPE", lambda d: f"{_PROBE_TYPES.get(d.probe or '', 0):02d}"),
-    Ask("PRBSENS", lambda d: field_text(0.0 if d.probe is None else 1.0)),
-    Ask("PRBSNUM", lambda d: "" if d.probe is None else "H00001"),
     Do("ZPROBE", lambda d: d.begin_zeroing()),
     Do("ZCLEAR", lambda d: d.clear_zero()),
-    Fields("LOCK", (Field("locked", 0, 1, 0), Field("lock_code", 0, 999, 123))),
-    Fields("BEEP", (Field("beep", 0, 1, 1),)),
-    Fields("BRIGT", (Field("brightness", 0, 3, 2),)),
-    Ask("KEYST", lambda _d: "00"),
-    Both("DFLT", lambda d, p: d.restore_factory_settings(p)),
 )
 
 
@@ -175,11 +168,6 @@ class VirtualGaussmeter(VirtualInstrument):
 
     def _unit(self) -> float:
         return _UNITS_T[int(self.value("unit")) - 1]
-
-    def restore_factory_settings(self, parameters: list[str]) -> None:
-        """DFLT 99; the number keeps it from being sent by mistake."""
-        if parameters == ["99"]:
-            self.reset()
 
     # --- ranges ---
 

@@ -70,9 +70,6 @@ MESSAGES = {
     "a question mark alone asks again": (
         *(OLD, ("UNIT?", "1"), ("?", "1"), ("AUTO?", "1"), ("?", "1"), "UNIT 2", ("UNIT?", "2"), ("?", "2")),
     ),
-    "the factory settings come back only when meant": (
-        *(BOTH, ("UNIT 3;DFLT;UNIT?", "3"), ("DFLT 99;UNIT?;AUTO?", "1;1")),
-    ),
 }
 
 READINGS = {
@@ -94,9 +91,7 @@ READINGS = {
     "a mode set in part keeps the rest": (NEW, ("RDGMODE 2, 3;RDGMODE?", "2,3,1,1,1")),  # so does fsc2 with a 455
     "control, and the compensations of the probe": (  # both on, as the maker delivers it
         *(NEW, ("PRBFCOMP?;PRBTCOMP?", "1;1"), ("CPARAM 0.25,0.5,100,3;CPARAM?", [0.25, 0.5, 100, 3])),
-        ("PRBSENS?", 1),
     ),
-    "no probe has no sensitivity": ((meter(Virtual475, probe=None),), ("PRBSENS?", 0)),
     "without a probe there is no field": (
         *((meter(Virtual425, probe=None), meter(Virtual475, probe=None)), ("RDGFIELD?", "NO PROBE")),
         ("OPST?;TYPE?", "001;00"),
