@@ -20,7 +20,7 @@ from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.limit.readings import LimitReadings
 from levilab.pipelines.options import LimitOptions
 from levilab.pipelines.row import Quantity, columns_of, entry
-from levilab.present.numbers import with_uncertainty
+from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.runs.events import RunEvent
 from levilab.simulator.keys import SceneError
 from levilab.simulator.published.printed import published
@@ -411,8 +411,12 @@ def warnings_of(statistics: Statistics) -> list[Note]:
     """Return what to know before using the mean."""
     texts: dict[str, str] = {}
     if statistics.outliers:
-        numbers = tuple(i + 1 for i in statistics.outliers)
-        texts["outliers"] = Text("limits that do not belong to the others: {numbers}; the mean has them", numbers)
+        numbers = [str(i + 1) for i in statistics.outliers]
+        texts["outliers"] = (
+            Text("limit {number} does not belong to the others; the mean has it", *numbers)
+            if len(numbers) == 1
+            else Text("limits {numbers} do not belong to the others; the mean has them", enumeration(numbers))
+        )
     if statistics.drifts and statistics.trend:
         texts["drifts"] = Text(
             "the limit drifts by {trend:n} a repetition: the mean is of no fixed state of the top; look for its mass, "

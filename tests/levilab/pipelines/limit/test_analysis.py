@@ -65,7 +65,7 @@ def test_both_kinds_together_have_values_of_both(sample_data, tmp_path):
     assert [group["statistics"]["n"] for group in document["groups"]] == [10, 8, 8]
     off, warning, conditions = sorted(analysis.all_warnings)  # spin-downs are a remark
     assert "the upper limits are of 2 conditions" in conditions
-    assert off.startswith("loose-washers: limits that do not belong to the others: 1, 2")
+    assert off.startswith("loose-washers: limits 1 and 2 do not belong to the others; the mean has them")
     assert "LOOSE WASHERS" in warning
     assert warning.endswith("(the first of 16 such warnings)")
     assert SkippedRuns("spin", 4) in analysis.skipped
@@ -247,7 +247,7 @@ def test_a_repetition_far_off_is_numbered_in_its_run_and_the_page_shows_200(tmp_
         (tmp_path / f"{name}.csv").write_text("\n".join(f"{one:.3f}" for one in limits), encoding="utf-8")
     analysis = LIMIT.analyze([tmp_path / "one.csv", tmp_path / "two.csv"])
     (note,) = (text for text in analysis.all_warnings if "not belong to the others" in text)
-    assert note.startswith("two.csv: limits that do not belong to the others: 4;")
+    assert note.startswith("two.csv: limit 4 does not belong to the others; the mean has it")
     one, two = (part.blocks[0] for part in limit_part(analysis).inputs)
     assert isinstance(one, Listing)
     assert isinstance(two, Listing)
