@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from levilab.notebook.fit import axes_of
-from levilab.present.drawing import headline, new_figure, panel, run_look, synthetic_mark
+from levilab.present.drawing import SMALL, headline, new_figure, panel, run_look, synthetic_mark
 from levilab.present.looks import BLACK
-from levilab.present.style import STYLE, WIDE, as_png, for_notebooks
+from levilab.present.style import STYLE, WIDE, as_png, for_notebooks, label_of_run
 from levilab.present.units import shown_unit, split, u_of
 
 if TYPE_CHECKING:
@@ -61,12 +61,14 @@ def draw_fit(axes: Axes, kind: str, frame: pd.DataFrame, residual: str, curves: 
         if kind == "residuals":
             axes.errorbar(at, readings, yerr=_bars(own, y), elinewidth=0.8, **style)
             continue
-        axes.plot(at, readings, **style)
+        axes.plot(at, readings, label=label_of_run(name, k, len(curves), "readings"), **style)
         if curve and len(at):
             fine = np.linspace(own[x].min(), own[x].max(), _POINTS)
             axes.plot(fine * shown_unit(x).factor, curve(fine) * shown_unit(y).factor, color=look.colour, linewidth=1.0)
     if kind == "residuals":
         axes.axhline(0.0, color=BLACK, linewidth=0.7)
+    elif len(curves) > 1:
+        axes.legend(fontsize=SMALL)
     axes.set(xlabel=_label(x), ylabel=_label(column))
 
 

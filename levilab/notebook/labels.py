@@ -1,31 +1,17 @@
-"""Tables as a notebook shows them, and as Datasets of xarray, which is not installed with levilab."""
+"""Tables as Datasets of xarray, which is not installed with levilab."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
 from levilab.errors import LevilabError
-from levilab.present.html import table_as_html
 from levilab.report.export.contents import Contents, attributes_of, variables_of
 from levilab.software import how_to_install
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import pandas as pd
     import xarray
-
-
-def head_as_html(frame: pd.DataFrame, rows: int, texts: int = 1) -> str:
-    """Return the first rows of a table as HTML, numbers with six digits.
-
-    Args:
-        frame: the table.
-        rows: their number.
-        texts: of the first columns, whose cells are no numbers.
-    """
-    head = frame.head(rows).map(lambda cell: f"{cell:.6g}" if isinstance(cell, float) else str(cell))
-    return table_as_html([*map(str, head.columns)], head.to_numpy().tolist(), texts=texts)
 
 
 class MissingXarray(LevilabError):

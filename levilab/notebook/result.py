@@ -18,13 +18,13 @@ import levilab
 from levilab.errors import UsageError, unquote
 from levilab.files import CannotWrite, as_json, check_folder, replace_atomically
 from levilab.notebook.fit import FIT, INSTEAD, LEAST_CORRELATION, METHODS, FittedModel, axes_of
-from levilab.notebook.labels import dataset_of_contents, head_as_html
+from levilab.notebook.labels import dataset_of_contents
 from levilab.notebook.names import Exportable, bare, meant
 from levilab.notebook.quantity import Named, Quantity, correlate
 from levilab.pipelines.catalogue import ANALYSES, print_analysis
 from levilab.pipelines.result import Place, Result, Value
 from levilab.pipelines.suits import save as save_result
-from levilab.present.html import facts_as_html, fold, paragraphs, table_as_html
+from levilab.present.html import facts_as_html, fold, head_as_html, paragraphs, table_as_html
 from levilab.present.numbers import plain, without_unit
 from levilab.present.units import unit
 from levilab.report.export.contents import contents_of_readings, readings_of

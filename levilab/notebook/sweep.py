@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
 from levilab.errors import UsageError
-from levilab.notebook.labels import dataset_of, head_as_html
+from levilab.notebook.labels import dataset_of
 from levilab.notebook.names import Exportable, bare
 from levilab.notebook.quantity import Named
 from levilab.notebook.scene import chosen_scene, in_seconds, whole_key
-from levilab.present.html import facts_as_html, fold
+from levilab.present.html import facts_as_html, fold, head_as_html
 from levilab.report.export.contents import attributes_of, contents_of
 from levilab.sweeps.adaptive import is_adaptive, run_adaptive
 from levilab.sweeps.axes import axis_of, parse_axis

@@ -1,9 +1,16 @@
 """Facts, tables and parts that fold as HTML, for notebooks: plain elements, which take the notebook's own style."""
 
-from collections.abc import Iterable, Sequence
+from __future__ import annotations
+
 from html import escape
+from typing import TYPE_CHECKING
 
 from levilab.present.document.typesetting import typeset
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+    import pandas as pd
 
 #: Texts stand on the left and numbers on the right, with room between columns, whatever a page does with tables.
 _LEFT, _RIGHT = "text-align: left; padding: 0 1em 0 0", "text-align: right; padding: 0 1em 0 0"
@@ -49,6 +56,19 @@ def table_as_html(heads: Sequence[str], rows: Iterable[Sequence[str]], texts: in
 
     head = f"<thead>{line(heads, 'th')}</thead>" if heads else ""
     return f"<table>{head}<tbody>{''.join(line(row, 'td') for row in rows)}</tbody></table>"
+
+
+def head_as_html(frame: pd.DataFrame, rows: int, texts: int = 1) -> str:
+    """Return the first rows of a table as HTML, numbers with six digits, and a row of dots for the others.
+
+    Args:
+        frame: the table.
+        rows: their number.
+        texts: of the first columns, whose cells are no numbers.
+    """
+    head = frame.head(rows).map(lambda cell: f"{cell:.6g}" if isinstance(cell, float) else str(cell))
+    others = [["…"] * len(head.columns)] if len(frame) > rows else []
+    return table_as_html([*map(str, head.columns)], [*head.to_numpy().tolist(), *others], texts=texts)
 
 
 def fold(summary: str, inside: str, *, opened: bool = False) -> str:

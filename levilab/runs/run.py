@@ -18,7 +18,7 @@ from levilab.computer import computer
 from levilab.errors import DataError, as_typed
 from levilab.files import as_json, parse_json
 from levilab.formats.table import Table, read_run_readings
-from levilab.present.html import facts_as_html, table_as_html
+from levilab.present.html import facts_as_html, head_as_html
 from levilab.runs.events import RunEvent
 from levilab.runs.find import RECORD
 from levilab.runs.traces import StoredTrace, load_traces
@@ -128,7 +128,7 @@ class Run:
     def _repr_html_(self) -> str:
         """Return the HTML that a notebook shows."""
         frame, problem = self._frame_or_problem()
-        count = "" if frame is None else f"{len(frame)}, the first {min(len(frame), SHOWN_ROWS)} below"
+        count = "" if frame is None else str(len(frame))
         facts = [
             ("status", self.status),
             ("started", (self.record.started_utc or "").partition(".")[0]),
@@ -139,8 +139,7 @@ class Run:
             ("readings", problem or count),
         ]
         facts += [("warning", text) for text in ([] if problem else self.warnings())]
-        rows = [] if frame is None else frame.head(SHOWN_ROWS).astype(str).to_numpy().tolist()
-        below = "" if frame is None else table_as_html([*map(str, frame.columns)], rows, texts=0)
+        below = "" if frame is None else head_as_html(frame, SHOWN_ROWS, texts=0)
         return facts_as_html(f"{self.record.experiment} run", facts, below)
 
     def _frame_or_problem(self) -> tuple[pd.DataFrame | None, str]:

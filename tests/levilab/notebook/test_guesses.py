@@ -24,7 +24,7 @@ T = np.arange(0.0, 200.0, 10.0)
 #: What is typed → whether the answer is right.
 GUESSES = {
     # a run
-    "run._repr_html_()": lambda html: "spin run" in html,
+    "run._repr_html_()": lambda html: "spin run" in html and html.endswith(">…</td></tr></tbody></table></div>"),
     "run.to_dataframe()": lambda frame: len(frame) == 20,
     "run.df": lambda frame: list(frame.columns) == ["time_s", "spin_frequency_hz", "spin_frequency_u_hz"],
     "run['spin_frequency_hz']": lambda series: series.iloc[0] == 39.93,
@@ -67,6 +67,9 @@ GUESSES = {
     "result.residuals": lambda residuals: np.std(residuals) == pytest.approx(0.036, abs=0.002),
     "result.predict(0.0)": lambda f: f == pytest.approx(39.941, abs=0.001),
     "result.plot()": lambda figure: len(figure.axes) > 5,
+    "levilab.analyze([folder / f'spin-down-{k}' for k in (1, 2)]).plot('fit').axes[0].get_legend().get_texts()": (
+        lambda names: [name.get_text() for name in names] == ["spin-down-1", "spin-down-2"]
+    ),
     "result.plot('residuals')": lambda figure: len(figure.axes) == 2,
     "run.to_xarray().attrs['synthetic'] + result.to_xarray().attrs['synthetic']": lambda said: said == "truetrue",
     "result.to_xarray().result_spindown_disc_c32.item() == result.models['disc']['c32'].value": bool,
