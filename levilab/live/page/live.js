@@ -395,6 +395,8 @@ function showTop(bench) {
     fellAt = NaN;
     put(by("replay"), {hidden: false});
   }
+  put(by("played"), {hidden: !space?.replays});
+  if (space?.replays) by("played").value = space.played;
   sound.follow(bench);
   if (!pose) return;
   const said = space.replays ? phrase("falls, 20 times slower") : pose.up ? phrase("floats at {height} mm", {height: fixed(pose.place[2] * 1000, 1)}) : pose.there ? phrase("lies where it fell") : phrase("is taken away");
@@ -534,6 +536,7 @@ by("close").addEventListener("change", closeUp);
 by("lean").addEventListener("change", leanTop);
 by("strobe").addEventListener("change", strobe);
 by("replay").addEventListener("click", () => space?.replay?.());
+by("played").addEventListener("input", () => space.replay(Number(by("played").value)));
 if (matchMedia("(prefers-reduced-motion: reduce)").matches) by("motion").value = "0";
 by("sound").addEventListener("change", () => sound.play(by("sound").checked));
 const isSynthetic = () => !by("synthetic").hidden;

@@ -12,8 +12,8 @@ const KEPT = 8000;
 /** Least mean time between pictures without a graphics card [ms]: the screen's own times are 17 ms apart. */
 const LEAST_MS = SOFTWARE ? 46 : 0;
 
-/** A fall is kept from so long before it to so long after it [s of bench time], and played so much slower. */
-const BEFORE_S = 1, AFTER_S = 0.4, REPLAY_RATE = 0.05;
+/** A fall is kept from so long before it to so long after it, played from so long before it [s of bench time], and so much slower. */
+const BEFORE_S = 1, AFTER_S = 0.4, LEAD_S = 0.2, REPLAY_RATE = 0.05;
 /** Where less motion is wanted, a picture comes after this time [ms]. */
 const STILL_MS = 1000;
 /** The path of the axis' end is drawn over this time [s of bench time]: some turns of the nutation. */
@@ -68,9 +68,9 @@ export async function openSpace(canvas, description) {
     return true;
   }
 
-  /** Play the fall that was kept, and then go on with what is now. */
-  function replay() {
-    if (fall) [film, playhead] = [fall, fall.times[0]];
+  /** Play the fall that was kept from this share of it on, and then go on with what is now. */
+  function replay(share = (BEFORE_S - LEAD_S) / (BEFORE_S + AFTER_S)) {
+    if (fall) [film, playhead] = [fall, fall.times[0] + share * (fall.times.at(-1) - fall.times[0])];
   }
 
   /** Move the playhead on by these seconds on the wall [s]. */
@@ -162,6 +162,8 @@ export async function openSpace(canvas, description) {
     get fall() { return JSON.stringify(fall, (_, value) => ArrayBuffer.isView(value) ? [...value] : value); },
     setFall: (kept) => { fall = JSON.parse(kept); },
     get replays() { return film === fall && fall !== null; },
+    /** The share of the fall that was played. */
+    get played() { return (playhead - film.times[0]) / (film.times.at(-1) - film.times[0]); },
     get parts() { return parts; },
     setParts: (described) => {
       if (JSON.stringify(described) === JSON.stringify(parts)) return;

@@ -411,9 +411,12 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(served, watched, tmp_path
     assert page.inner_text("#top-text") == "lies where it fell"
     assert page.evaluate("levilab.history.marks.map(([, text]) => text)") == ["fell"]
     page.click("#replay")
-    until(page, "levilab.space.state.up && levilab.space.state.time < 1.5")  # and not 3 s, the newest
+    at = "levilab.space.state.time"  # 4 s of the replay before the fall, and not 3 s, the newest
+    until(page, f"levilab.space.state.up && {at} > 1.29 && {at} < 1.5")
     publish(watch, State(2.0, count=Count(22.6, 1.0, 0.5), virtual=True, speed=1.0))
     until(page, "document.getElementById('top-text').textContent === 'falls, 20 times slower'")
+    page.fill("#played", "0.1")  # of 1.4 s, which begin at 0.5 s
+    until(page, f"Math.abs({at} - 0.65) < 0.03 && levilab.space.played < 0.13")
     with page.expect_download() as saved:
         page.click("#csv")
     rows = saved.value.path().read_text().splitlines()
