@@ -3,7 +3,8 @@
 import json
 import os
 import re
-from collections.abc import Sequence
+import zipfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from levilab.formats.waveforms.record import SEARCHED
@@ -49,8 +50,30 @@ _OF_DESKTOPS = (".", "~$", "desktop.ini", "Thumbs.db", SKIP)
 _OF_FILM = re.compile(r"(.+)\.(tracks|spin|limit|precession)\.csv")
 _RESULT_OF_FILM, _RESULT_OF_FILMS = re.compile(r"(.+)\.\w+\.result\.video\.json"), "result.video.json"
 
+#: How an export begins, and the property of a spreadsheet of several inputs, which no analysis reads.
+_EXPORT, _OF_SEVERAL = b"analysis,model,name,value,u,unit", b"<cp:keywords>levilab<"
+
 #: How names of files end that levilab writes beside what it reads.
 _RESULT, _CORRECTION = re.compile(r"result(\.\w+)?\.json$"), ".levilab.toml"
+
+
+def _exports(folder: Path, files: Sequence[str]) -> Iterator[str]:
+    """Yield the tables of exports and the spreadsheets of several inputs; readings of one input are as good as its."""
+    for name in files:
+        stem = name.removesuffix(".result.csv")
+        if stem != name and _begin(folder / name).startswith(_EXPORT):
+            yield from (name, f"{stem}.inputs.csv", *([f"{stem}.csv"] * (f"{stem}.inputs.csv" in files)))
+        elif name.endswith(".xlsx") and _OF_SEVERAL in _begin(folder / name, "docProps/core.xml"):
+            yield name
+
+
+def _begin(path: Path, member: str = "") -> bytes:
+    """Return how a file, or one in an archive, begins; empty where it cannot be read."""
+    try:
+        with zipfile.ZipFile(path).open(member) if member else path.open("rb") as stream:
+            return stream.read(1000)
+    except (OSError, KeyError, RuntimeError, ValueError, zipfile.BadZipFile):
+        return b""
 
 
 def _files(root: Path) -> list[Path]:
@@ -66,5 +89,6 @@ def _files(root: Path) -> list[Path]:
         if _RESULT_OF_FILMS in files:
             films |= {"films", *(Path(name).stem for name in files)}
         own = {name for name in files if (table := _OF_FILM.fullmatch(name)) and table[1] in films}
+        own |= {*_exports(Path(folder), files)}
         found += [Path(folder) / name for name in files if name not in own and not name.startswith(_OF_DESKTOPS)]
     return found

@@ -155,8 +155,9 @@ def _xlsx(contents: Contents, out: Path) -> dict[Path, bytes]:
     buffer = io.BytesIO()
     plain = {"strings_to_formulas": False, "strings_to_urls": False}  # what people typed is no formula
     with pd.ExcelWriter(buffer, engine="xlsxwriter", engine_kwargs={"options": plain}) as book:
-        book.book.set_properties({"title": contents.title, "created": _NO_DAY})  # the same bytes each time
         tables = _tables(contents)
+        mark = {"keywords": "levilab"} if any(table.name == "inputs" for table in tables) else {}
+        book.book.set_properties({"title": contents.title, "created": _NO_DAY, **mark})  # the same bytes each time
         for table, name in zip(tables, _sheet_names(table.name for table in tables), strict=True):
             if len(table.columns[0].values) >= _MOST_ROWS:
                 raise UsageError("out", f"{table.name} has more rows than a spreadsheet: .csv, .nc or .h5", value=out)

@@ -408,7 +408,8 @@ def write_class(
     missing = {path: Text("not read: {problem}", plain_text(why)) for path, why in unread.items()}
     names = {source.path: source.name for _, found in results for source in found.sources}
     for path, first in copies.items():
-        if (folder_of(path) or path.name) != (folder_of(first) or first.name) and first in names:
+        of_run = first.is_dir() and not path.is_dir() and not folder_of(path)  # as an export, which is no group
+        if (folder_of(path) or path.name) != (folder_of(first) or first.name) and first in names and not of_run:
             said = "holds the same readings as {other:s}: a group needs a seed or a file of its own"
             missing[path] = Text(said, names[first])
     named = _names_of_unread([*missing], results, folder_of)

@@ -32,7 +32,7 @@ def class_workbook(classes: Sequence[Class], date: datetime | None) -> bytes:
     # a text is never a formula, a link or a number, whatever a person typed
     never = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False, "in_memory": True}
     with xlsxwriter.Workbook(buffer, {**never, "nan_inf_to_errors": True}) as book:
-        book.set_properties({"created": (date or _NO_DATE).replace(tzinfo=None)})
+        book.set_properties({"created": (date or _NO_DATE).replace(tzinfo=None), "keywords": "levilab"})
         bold = book.add_format({"bold": True, "text_wrap": True, "valign": "top"})
         red = {
             "type": "cell",

@@ -148,6 +148,17 @@ def test_a_run_given_twice_is_named(of_three, tmp_path):
     assert "holds the same readings as" in write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")
 
 
+def test_what_levilab_has_written_about_a_class_is_no_group_of_it(of_three, tmp_path, levilab):
+    root = with_changes(of_three, tmp_path / "class", "", {})
+    for name in ("all.csv", "all.xlsx"):
+        levilab("export", root, "-o", root / name)
+    levilab("export", next(root.glob("2*")), "-o", root / "one.xlsx")
+    write_class([root], root / "class.xlsx")
+    page = Page(write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")).text
+    assert "Class of 3 groups" in page
+    assert "3 of 3 results are good." in page
+
+
 def test_runs_of_several_scenes_are_named_where_a_truth_is_not_known(of_three, tmp_path):
     changed = {"configuration": {"scene": {"name": "practice"}}}
     known = with_changes(of_three, tmp_path / "known", "Group 2", changed)
