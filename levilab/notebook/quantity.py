@@ -114,7 +114,9 @@ class Quantity(Estimate):
         """Return it as a formula, which a notebook shows."""
         if self.value is None:
             return r"\text{not determined}"
-        number = f"{self.to_ufloat():SL}" if self.u else without_unit(self)
+        number = without_unit(self)
+        if self.u:
+            number = format(self.to_ufloat(), "eSL" if "×" in number else "SL")  # as tables have it
         text = "" if self.unit == "1" else rf"\,\mathrm{{{_latex_unit(self.unit)}}}"
         return f"${number}{text}$"
 

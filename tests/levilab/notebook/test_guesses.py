@@ -146,7 +146,7 @@ GUESSES = {
     "result['c32'] * 2": lambda twice: f"{twice}" == "0.0004737(8) (rad/s)^-1/2/s",
     "result['c32'].nominal_value == result['c32'].value == result['c32'].magnitude": bool,
     "result['c32'].std_dev == result['c32'].stderr == result['c32'].error == result['c32'].uncertainty": bool,
-    "result['c32']._repr_latex_()": lambda text: text == r"$0.0002369(4)\,\mathrm{(rad/s)^{-1/2}/s}$",
+    "result['c32']._repr_latex_()": lambda text: text == r"$2.369(4) \times 10^{-4}\,\mathrm{(rad/s)^{-1/2}/s}$",
     "result['c32'].interval": lambda ends: ends[0] < 2.3686e-4 < ends[1],
     "(result['c32'] + 1).n - 1": lambda value: value == pytest.approx(2.3686e-4, abs=1e-8),
     "sum([result['c32'], result['c32']]).unit": lambda unit: unit == "(rad/s)^-1/2/s",
