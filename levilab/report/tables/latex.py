@@ -41,7 +41,7 @@ _WITH_UNIT = re.compile(r"(?:< )?[−+-]?\d[\d.]*(?:\([\d.]+\))?(?:×10[⁻⁰¹
 _LONG, _PARAGRAPH = 48, 0.4
 #: The width of a table: its own, or that of the line, to which LaTeX scales a wider one.
 _WIDTH = r"\ifdim\width>\linewidth\linewidth\else\width\fi"
-_LEVELS = {"high": r"\textsuperscript{%s}", "low": r"\raisebox{-.4ex}{\scriptsize %s}", "": "%s"}
+_LEVELS = {"high": r"\textsuperscript{%s}", "low": r"\textsubscript{%s}", "": "%s"}
 
 
 def as_latex(name: str, table: Table, *, note: str = "", mark: str = "") -> str:
@@ -145,7 +145,7 @@ def _cell(cell: str, aligned: str, *, bold: bool) -> str:
     r"""Return a cell, of several lines perhaps: the first stands in the line of the row, of a head the last.
 
     >>> _cell("c₁\n[s⁻¹]", "l", bold=False)
-    '\\begin{tabular}[t]{@{}l@{}}c\\raisebox{-.4ex}{\\scriptsize 1}\\\\{[}s\\textsuperscript{$-$1}{]}\\end{tabular}'
+    '\\begin{tabular}[t]{@{}l@{}}c\\textsubscript{1}\\\\{[}s\\textsuperscript{$-$1}{]}\\end{tabular}'
     """
     lines = [to_latex(line) for line in cell.split("\n")]
     lines = [rf"\textbf{{{line}}}" if bold and line else line for line in lines]
@@ -163,7 +163,7 @@ def to_latex(text: str) -> str:
     >>> to_latex("50 % of {x}_1 & \\input{a}")
     '50~\\% of \\{x\\}\\_1 \\& \\textbackslash{}input\\{a\\}'
     >>> to_latex("3.2(1)×10⁻³, ν_r, é and 中")
-    '3.2(1)$\\times$10\\textsuperscript{$-$3}, $\\nu$\\raisebox{-.4ex}{\\scriptsize r}, e and ?'
+    '3.2(1)$\\times$10\\textsuperscript{$-$3}, $\\nu$\\textsubscript{r}, e and ?'
     """
     clean = " ".join(printable(text.replace("\t", " ")).split("\n"))
     return "".join(_LEVELS[run.level] % _letters(run.text) for run in typeset(clean))

@@ -116,8 +116,7 @@ GUESSES = {
     "result.to_dict()['c32']": lambda found: list(found) == ["value", "u", "unit"],
     "json.loads(result.to_json())['best_model']": lambda law: law == "disc",
     "result.to_latex()": lambda text: (
-        r"C\raisebox{-.4ex}{\scriptsize 3/2} & $0.0002369(4)\,\mathrm{(rad/s)^{-1/2}/s}$ \\" in text
-        and r"\_" not in text
+        r"C\textsubscript{3/2} & $2.369(4) \times 10^{-4}\,\mathrm{(rad/s)^{-1/2}/s}$ \\" in text and r"\_" not in text
     ),
     "result.models['power']['n'] is result.models['power']['exponent']": bool,
     "pickle.loads(pickle.dumps(result.values))['C₃/₂'] == result['C₃/₂'] == result['c32']": bool,

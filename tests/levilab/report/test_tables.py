@@ -63,7 +63,7 @@ HOSTILE = "\\input{/etc/passwd} \\write18{x} $ & # % _ ^ ~ { } < > | \" ` ' [x] 
 #: What may stand in the body: a command of LaTeX itself or of booktabs.
 KNOWN = {
     "begin", "end", "centering", "caption", "label", "toprule", "midrule", "bottomrule", "textbf", "textsuperscript",
-    "raisebox", "scriptsize", "setlength", "tabcolsep", "par", "smallskip", "footnotesize", "textbackslash",
+    "textsubscript", "setlength", "tabcolsep", "par", "smallskip", "footnotesize", "textbackslash",
     "textasciicircum", "textasciitilde", "times", "nu", "frac", "ldots", "linewidth", "resizebox", "ifdim", "width",
     "else", "fi",
 }  # fmt: skip
