@@ -85,11 +85,11 @@ def acquire_experiment(
             "SCENE", "With --mock: a top in full motion, such as spindown, or a scene's file.", show_default="spin only"
         ),
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Makes a virtual run repeatable.")] = None,
+    seed: Annotated[int | None, option("N", "Makes a virtual run repeatable.", min=0)] = None,
     group: Annotated[
         str | None, option("NAME", "Who measures, as 'Group 7': the run's name in tables and figures.")
     ] = None,
-    note: Annotated[str, typer.Option(help="Kept with the run.")] = "",
+    note: Annotated[str, option("TEXT", "Kept with the run.")] = "",
     temperature: Annotated[str | None, option("T", "Of the magnets, as 21.5 C; kept with the run.")] = None,
     washers: Annotated[str | None, option("MASSES", "On the top, as 0.06+0.1 g; kept with the run.")] = None,
     realtime: Annotated[bool, flag("Run the virtual bench in real time.", "--realtime")] = False,

@@ -88,7 +88,7 @@ def _parameter(name: str, option: Option) -> inspect.Parameter:
         default = kind(default)
     about = typer.Option(
         f"--{name.replace('_', '-')}",
-        metavar=option.metavar,
+        metavar=option.metavar or "|".join(option.choices),
         help=option.help.replace("[", r"\["),
         show_default=option.default_text or True,
         parser=number(option.unit) if option.kind is float else None,

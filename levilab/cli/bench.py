@@ -189,7 +189,7 @@ def bench_serve(
         str | None, option("SCENE", "The top in full motion: a scene's name or file.", show_default="spin only")
     ] = None,
     host: Annotated[
-        str, typer.Option(help="Address of this machine to listen at; 0.0.0.0: all of them.")
+        str, option("ADDRESS", "Address of this machine to listen at; 0.0.0.0: all of them.")
     ] = "127.0.0.1",
     port_base: Annotated[
         int | None, option("N", "The first port, the others follow.", min=1, max=65535, show_default="any free")

@@ -17,7 +17,7 @@ from levilab.reproduce.chapters import CHAPTERS
 def crosscheck(
     subjects: Annotated[
         list[str] | None,
-        argument("[SUBJECT]…", f"Of {', '.join(ROWS)}.", show_default="all", callback=among(ROWS, "subject")),
+        argument("SUBJECT", f"Of {', '.join(ROWS)}.", show_default="all", callback=among(ROWS, "subject")),
     ] = None,
     like: Annotated[
         list[Path] | None,
@@ -32,7 +32,7 @@ def crosscheck(
         int | None, option("N", "How many trials of each.", min=2, show_default="40; with --like 200")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Of the first trial; the next have the next.", show_default="0")
+        int | None, option("N", "Of the first trial; the next have the next.", min=0, show_default="0")
     ] = None,
     calibrate: Annotated[
         bool,

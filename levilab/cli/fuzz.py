@@ -10,10 +10,10 @@ from levilab.cli.output import message, result
 
 
 def fuzz(
-    seed: Annotated[int, typer.Option(min=0, help="Of the laboratory, or of the first one.")] = 0,
+    seed: Annotated[int, option("N", "Of the laboratory, or of the first one.", min=0)] = 0,
     number: Annotated[int | None, option("N", "That many laboratories.", min=1, show_default="1, or no end")] = None,
     seconds: Annotated[float | None, option("S", "Begin no more after this time.", min=0)] = None,
-    cores: Annotated[int | None, typer.Option(min=1, help="Processes.", show_default="all cores")] = None,
+    cores: Annotated[int | None, option("N", "Processes.", min=1, show_default="all cores")] = None,
     trace: Annotated[bool, flag("Print each step of one laboratory.", "--trace")] = False,
 ) -> None:
     """Carry out laboratories, and end with 1 where something is wrong."""

@@ -43,7 +43,7 @@ def of_class(
 def worksheet(
     experiments: Annotated[
         list[str] | None,
-        argument("EXPERIMENT…", f"Of {', '.join(SHEETS)}; or all.", callback=_read_sheets, show_default=False),
+        argument("EXPERIMENT", f"Of {', '.join(SHEETS)}; or all.", callback=_read_sheets, show_default=False),
     ] = None,
     out: Annotated[Path, place("DIR", "Where the files are written.")] = Path("worksheets"),
     groups: Annotated[int, option("N", "How many, each with its seed.", min=1, max=500)] = 20,

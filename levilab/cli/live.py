@@ -16,7 +16,7 @@ from levilab.errors import UsageError
 def live(
     run: Annotated[
         Path | None,
-        argument("[RUN]", "A run folder.", readable=False, show_default="the newest, one that is running first"),
+        argument("RUN", "A run folder.", readable=False, show_default="the newest, one that is running first"),
     ] = None,
     mock: Annotated[bool, flag("A virtual bench to play with, and to record runs on.", "--mock")] = False,
     seed: Annotated[int, option("N", "With --mock, draws the top; of Group 1, as in levilab worksheet.", min=0)] = 0,

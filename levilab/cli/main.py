@@ -157,6 +157,14 @@ def explain_bad_value(text: str, seen: object = None, own: str = "") -> str:
     return Sentences("" if seen is None else Text("'{seen:s}': ", seen=str(seen)), said, hint, between="")
 
 
+def _word(parameter: typer.core.TyperArgument | typer.core.TyperOption, ctx: Any) -> str:  # noqa: ARG001
+    """Return the word of an option's value, in the place of a type of Python; an argument is its own word."""
+    return parameter.metavar or "" if isinstance(parameter, typer.core.TyperOption) else ""
+
+
+typer.core.TyperOption.display_type_rich = _word  # type: ignore[assignment]
+typer.core.TyperArgument.display_type_rich = _word  # type: ignore[assignment]
+
 app = typer.Typer(
     name="levilab",
     cls=Commands,

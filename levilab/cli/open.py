@@ -27,7 +27,7 @@ def open_files(
     paths: Annotated[
         list[Path] | None,
         argument(
-            "FILE…", "Data files, or sheets and runs in them: FILE/SHEET.", readable=False, callback=existing_paths
+            "FILE", "Data files, or sheets and runs in them: FILE/SHEET.", readable=False, callback=existing_paths
         ),
     ] = None,
     keep: Annotated[bool, flag("Keep the options in FILE.levilab.toml, which every analysis reads.", "--keep")] = False,

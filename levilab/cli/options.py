@@ -197,7 +197,7 @@ HEADING = tuple(
 Paths = Annotated[
     list[Path] | None,
     typer.Argument(
-        metavar="[PATH]…",
+        metavar="PATH",
         readable=False,
         help="Run folders, data files, or folders to search.",
         show_default="runs",

@@ -68,7 +68,7 @@ def report(
 
 def runs(
     folder: Annotated[
-        Path | None, argument("[DIR]", "The folder to search.", readable=False, show_default="runs")
+        Path | None, argument("DIR", "The folder to search.", readable=False, show_default="runs")
     ] = None,
     out: Annotated[Path | None, place("DIR", "The same, as acquire has it.", readable=False, callback=None)] = None,
     last: Annotated[int | None, option("N", "The latest N runs alone.", min=1)] = None,

@@ -219,7 +219,7 @@ def benchmark_simulator(
 def benchmark_estimators(
     trials: Annotated[int, option("N", "Traces of each kind; 400 take about ten minutes.", min=10)] = 400,
     case: Annotated[list[str] | None, option("NAME", "Only this hard case, as '50 Hz'; repeatable.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Other traces of the same kinds.")] = 2026,
+    seed: Annotated[int, option("N", "Other traces of the same kinds.", min=0)] = 2026,
     out: Annotated[Path | None, place("DIR", "Write estimators.json and estimators.png there.")] = None,
     as_json: Json = False,
 ) -> None:

@@ -6,8 +6,6 @@ import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
-
 from levilab.cli.options import SCENES, Json, Settings, argument, flag, named_scene, option, place, quantity
 from levilab.cli.output import interruptible, message, print_json, result
 from levilab.errors import DataError, UsageError, WorkersLost, as_typed
@@ -62,7 +60,7 @@ def sweep(
     ] = None,
     settings: Settings = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, help="Seed of the points that --adaptive checks at random.", show_default="0")
+        int | None, option("N", "Seed of the points that --adaptive checks at random.", min=0, show_default="0")
     ] = None,
     out: Annotated[Path | None, place("STORE.zarr", "Where the results go.", show_default="NAME.zarr")] = None,
     cores: Annotated[int | None, option("N", "Processes on this machine.", min=1, show_default="one a core")] = None,
