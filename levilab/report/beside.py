@@ -335,9 +335,13 @@ def _too_short(of: Class, k: int) -> str:
     times = [getattr(group.source.readings, "time", None) for group in of.groups]
     lasts = [count_readings(of.groups[k]) if time is None else float(np.ptp(time)) for k, time in enumerate(times)]
     usual = statistics.median(lasts[:k] + lasts[k + 1 :] or [0])
-    said = "{n:.0f} readings instead of {usual:.0f}: measure longer"
-    said = said if times[k] is None else "{n:.0f} s of readings instead of {usual:.0f} s: measure longer"
-    return Text(said, n=lasts[k], usual=usual) if lasts[k] < usual / 2 else ""
+    said = "{n:.0f} readings instead of {usual:.0f}: {advice}"
+    said = said if times[k] is None else "{n:.0f} s of readings instead of {usual:.0f} s: {advice}"
+    advice, run = "measure longer", of.groups[k].source.run
+    if run and run.status == "interrupted":
+        goes_on = "the run was interrupted, levilab acquire {name:s} --resume {folder:s} continues it"
+        advice = Text(goes_on, run.record.experiment, run.folder)
+    return Text(said, n=lasts[k], usual=usual, advice=advice) if lasts[k] < usual / 2 else ""
 
 
 def count_readings(group: Group) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import shlex
 from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import takewhile
@@ -65,7 +66,7 @@ from levilab.report.page import FORMATS, newest_of, write_content, writing_repor
 from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
 from levilab.runs.find import RECORD
-from levilab.runs.run import read_record
+from levilab.runs.run import Run, read_record
 from levilab.texts.note import kind_of, of_file
 from levilab.texts.text import Sentences, Text, spoken, verbatim
 
@@ -139,6 +140,13 @@ def _left_out(results: Results) -> tuple[dict[Path, str], str]:
     about = Text("without readings: {kinds} ({names:s})", number_by_kind(others), names) if others else ""
     left_out_paths = {one.path for one in others}
     return {path: unread[path] for path in sorted(unread) if path not in used | left_out_paths}, about
+
+
+def _why_unread(path: Path) -> str:
+    with suppress(DataError):
+        if Run.load(path).status == "interrupted":
+            return "not read, and the run was interrupted: {problem}"
+    return "not read: {problem}"
 
 
 def _copies(results: Results) -> dict[Path, Path]:
@@ -405,7 +413,7 @@ def write_class(
     results = _with_folders_as_groups(results, folder_of)
     classes = [class_of(analysis, found) for analysis, found in results]
     classes.sort(key=lambda of: -len(of.groups))  # what one group alone measured comes last
-    missing = {path: Text("not read: {problem}", plain_text(why)) for path, why in unread.items()}
+    missing = {path: Text(_why_unread(path), problem=plain_text(why)) for path, why in unread.items()}
     names = {source.path: source.name for _, found in results for source in found.sources}
     for path, first in copies.items():
         of_run = first.is_dir() and not path.is_dir() and not folder_of(path)  # as an export, which is no group

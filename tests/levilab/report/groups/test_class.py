@@ -357,6 +357,17 @@ def test_a_run_of_few_readings_is_named_before_what_the_analysis_says(of_three, 
     assert any("AICc" in text for text in mark.notes)
 
 
+def test_an_interrupted_run_is_continued_or_named_as_such(of_three, tmp_path):
+    root = with_changes(of_three, tmp_path, "Group 2", {"status": "interrupted"})
+    (run,) = (one for one in root.glob("2*") if '"group": "Group 2"' in (one / RECORD).read_text(encoding="utf-8"))
+    lines = (run / "readings.csv").read_text(encoding="utf-8").splitlines()
+    for count, says in ((6, f"s: the run was interrupted, levilab acquire spin --resume {run} continues it"),
+                        (1, "not read, and the run was interrupted: ")):  # fmt: skip
+        (run / "readings.csv").write_text("\n".join([*lines[:count], ""]), encoding="utf-8")
+        page = Page(write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")).text
+        assert says in page
+
+
 def test_groups_of_few_tops_differ_by_chance_as_often_as_p_says():
     """By u alone 5 tops each would make 13 % of all classes differ."""
     random, width, seldom = np.random.default_rng(1), _width(4), 0
