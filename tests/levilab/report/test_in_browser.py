@@ -148,7 +148,10 @@ def _right_edge(page):
 def test_paper_is_light_and_holds_what_is_folded(browser, report):
     with watch(browser, color_scheme="dark") as page:
         page.goto(report.as_uri())
+        drawn = "card => getComputedStyle(card).filter.startsWith('invert')"
+        assert page.locator(".card:has(svg)").first.evaluate(drawn)
         page.emulate_media(media="print")
+        assert not page.locator(".card:has(svg)").first.evaluate(drawn)
         assert page.locator("body").evaluate("body => getComputedStyle(body).backgroundColor") == "rgb(255, 255, 255)"
         assert not page.locator(".zoom").first.is_visible()
         # neither a heading with its lead nor the titles of a table stand alone at the foot of a page
