@@ -89,6 +89,25 @@ def test_a_command_that_is_wider_than_the_page_goes_on_below(page):
     assert page.evaluate("[...document.querySelectorAll('span')].map((one) => one.getClientRects().length)") == [1] * 9
 
 
+#: Labels of a drawing through which an outline passes, in letters of 13 px.
+CROSSED = """() => {
+    const shapes = [...document.querySelectorAll("line, path, rect, circle, ellipse, polyline, polygon")];
+    const on = (shape) => Array.from({length: shape.getTotalLength()}, (_, k) =>
+        shape.getPointAtLength(k).matrixTransform(shape.getScreenCTM()));
+    const points = shapes.filter((shape) => !shape.closest("defs")).flatMap(on);
+    const across = ({left, right, top, bottom}) => points.some(({x, y}) =>
+        x > left + 1 && x < right - 1 && y > top + 3 && y < bottom - 3);
+    const labels = [...document.querySelectorAll("text")];
+    return labels.filter((text) => across(text.getBoundingClientRect())).map((text) => text.textContent);
+}"""
+
+
+@pytest.mark.parametrize("drawing", [*DOCS.glob("*.svg"), *DOCS.glob("experiments/*.svg")], ids=lambda one: one.stem)
+def test_no_line_of_a_drawing_crosses_a_label(page, drawing):
+    page.set_content(drawing.read_text(encoding="utf-8"))
+    assert page.evaluate(CROSSED) == []
+
+
 def test_the_search_ranks_pages_of_users_before_those_of_developers(page):
     page.add_script_tag(path=DOCS / "building" / "scorer.js")
     names = ["decisions/0014-records", "reference/python", "pulses", "data"]
