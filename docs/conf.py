@@ -54,6 +54,7 @@ html_last_updated_fmt = None
 html_theme_options = {"navigation_with_keys": True}
 html_static_path = ["building/style"]
 html_css_files = ["site.css"]
+html_js_files = ["copy.js"]
 html_favicon = "building/style/top.svg"
 html_search_scorer = str(Path(__file__).parent / "building/scorer.js")
 pygments_style = "friendly"

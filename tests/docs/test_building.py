@@ -89,6 +89,18 @@ def test_a_command_that_is_wider_than_the_page_goes_on_below(page):
     assert page.evaluate("[...document.querySelectorAll('span')].map((one) => one.getClientRects().length)") == [1] * 9
 
 
+def test_what_is_copied_of_a_block_are_its_commands(page):
+    page.add_script_tag(path=DOCS / "building/style/copy.js")
+    block = "$ levilab runs  # all\nspin-1\n$ levilab report runs/ --title 'no # 3'\n"
+    assert page.evaluate("text => toCopy(text)", block) == "levilab runs\nlevilab report runs/ --title 'no # 3'"
+    assert page.evaluate("text => toCopy(text)", "a = 1  # one\n") == "a = 1  # one"
+
+
+def test_no_menu_of_the_site_is_longer_than_its_screen():
+    menus = re.findall(r":hidden:\n\n(.*?)```", (DOCS / "index.md").read_text(encoding="utf-8"), re.DOTALL)
+    assert max(len(menu.split()) for menu in menus) <= 12
+
+
 #: Labels of a drawing through which an outline passes, in letters of 13 px.
 CROSSED = """() => {
     const shapes = [...document.querySelectorAll("line, path, rect, circle, ellipse, polyline, polygon")];
