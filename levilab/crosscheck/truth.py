@@ -28,7 +28,8 @@ class Truth:
 def truth_of(run: Run | None, analysis: str) -> Truth:
     """Return the truth of a run, empty for a real one and for what is not known.
 
-    A locked top wobbles at the drive's frequency; one that lost its lock, or has loose washers, need not.
+    A locked top wobbles at the drive's frequency; one that lost its lock, or has loose washers, need not.  The motion
+    splits the slow swings as it is predicted.
 
     The mean of limits is that of the law which the seed draws each of them from.
     """
@@ -38,6 +39,8 @@ def truth_of(run: Run | None, analysis: str) -> Truth:
     if analysis == "precession":
         lost = any(event["kind"] == RunEvent.LOCK_LOST for event in run.events())
         return Truth() if lost or _is_loose(scene) else Truth({"slope": 1.0, "intercept": 0.0})
+    if analysis == "sway":
+        return Truth() if _is_loose(scene) else Truth({"ratio": 1.0})
     if record.world == "spin":
         known = _OF_SPIN_WORLD.get(analysis)
         return known(random_scene(record.seed), run) if known else Truth()

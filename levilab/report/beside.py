@@ -72,6 +72,7 @@ class Compared:
         together: whether those agree; None where there are none.
         used: whether a group has a value that is neither doubtful nor far from its truth, or no group has.
         apart: why the groups have no common value, and so no mean; empty: they have.
+        shares_u: whether u of the groups is of one cause, so that the mean has the u of one.
     """
 
     name: str
@@ -84,6 +85,7 @@ class Compared:
     together: Comparison | None
     used: tuple[bool, ...]
     apart: str = ""
+    shares_u: bool = False
 
     @property
     def shown_unit(self) -> str:
@@ -117,7 +119,7 @@ class Compared:
         if self.mean is None or any(truth is None for _, truth in used):
             return None
         values, truths, u = np.array([(one.value, truth, one.u) for one, truth in used], float).T
-        of_mean = np.linalg.norm(u) / len(used)
+        of_mean = np.linalg.norm(u) / len(used) ** (0.5 if self.shares_u else 1)
         return float(truths.mean()), float((values - truths).mean() / of_mean), float(of_mean)
 
     @cached_property
@@ -276,7 +278,7 @@ def _quantity(
         return replace(of, used=used)
     shared = [one.u or 0.0 for one in known] if analysis.common else []
     together = compare(*np.array([(one.value, one.u) for one in widened], float).T)
-    return replace(of, used=used, mean=mean(known, shared), together=together)
+    return replace(of, used=used, mean=mean(known, shared), together=together, shares_u=bool(shared))
 
 
 def _width(freedom: float | None) -> float:

@@ -51,6 +51,7 @@ def test_a_top_that_does_not_follow_its_drive_has_no_true_precession(inertia, ev
     record = SimpleNamespace(synthetic=True, seed=1, world=None, table={"scene": scene}.get)
     run = SimpleNamespace(record=record, events=lambda: [{"kind": kind} for kind in events])
     assert truth_of(run, "precession").values == ({"slope": 1.0, "intercept": 0.0} if known else {})
+    assert truth_of(run, "sway").values == ({} if inertia else {"ratio": 1.0})  # also of a top that a drive left
 
 
 def of(subject, trials=400):

@@ -177,8 +177,10 @@ def test_a_value_without_a_finite_u_is_not_compared(value, u):
 
 def test_no_number_of_groups_makes_the_u_of_the_sway_smaller_which_is_common_to_them():
     parts = [{"values": {"ratio": {"value": 1.0028 + k * 1e-4, "u": 0.0018, "unit": "1"}}} for k in range(8)]
-    of = [_quantity("ratio", ANALYSES["sway"], "", parts[:n], [Truth()] * n, doubts=[False] * n) for n in (1, 2, 8)]
+    truth = Truth({"ratio": 1.0})
+    of = [_quantity("ratio", ANALYSES["sway"], "", parts[:n], [truth] * n, doubts=[False] * n) for n in (1, 2, 8)]
     assert [one.mean.u for one in of] == pytest.approx([0.0018] * 3, rel=0.01)
+    assert [one.truth[1] for one in of] == pytest.approx([1.6] * 3, abs=0.2)
 
 
 @pytest.mark.parametrize(("experiment", "names"), [("field", ["strength", "origin", "thickness"]), ("limit", ["mean"])])
