@@ -299,7 +299,7 @@ class Mark:
     Attributes:
         word: GOOD; LOOK: there is something to know about it; REPEAT: its result is wrong or missing.
         why: the reasons, the worst first.
-        notes: remarks on readings too few for an analysis, of which the reason is enough.
+        notes: remarks of an analysis on readings that are too few or doubtful, of which the reason is enough.
     """
 
     word: str
@@ -321,10 +321,10 @@ def _mark(of: Class, k: int) -> Mark:
             wrong.append(Text(said, symbol=one.symbol, times=with_sign(truth, 1)))
         elif truth is None and others is not None and abs(others) > FAR:
             odd.append(Text("{symbol}: {times:n} u from the others", symbol=one.symbol, times=with_sign(others, 1)))
-    wrong += group.doubts
+    wrong = [*group.doubts, *wrong]
     remarks = tuple(text for text in group.warnings if text not in group.doubts)
-    if short := _too_short(of, k):
-        return Mark(REPEAT if wrong else LOOK, (short, *wrong, *odd), remarks)
+    if (short := _too_short(of, k)) or group.doubts:
+        return Mark(REPEAT if wrong else LOOK, (*[short] * bool(short), *wrong, *odd), remarks)
     odd += remarks
     return Mark(REPEAT if wrong else LOOK if odd else GOOD, (*wrong, *odd))
 

@@ -295,7 +295,19 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
         write_class(paths, book := tmp_path / "class.xlsx")
         rows = CalamineWorkbook.from_path(book).get_sheet_by_name("spindown groups").to_python()
         assert {row[0] for row in rows if row[1] == REPEAT} == {"Group 2", *unread}
-    assert re.search(r"Group 2 repeat C₃/₂: \+\d+\.\d u from its truth", page)
+    assert re.search(r"Group 2 repeat \S+: the spin is about [^:]+ C₃/₂: \+\d+\.\d u from its truth", page)
+
+
+def test_a_wrong_unit_is_the_first_reason_and_what_no_law_fits_then_is_none(tmp_path):
+    for k in range(2):
+        spin_down_csv(tmp_path / f"{k}.csv", seed=k)
+    heads, *rows = (tmp_path / "1.csv").read_text(encoding="utf-8").splitlines()
+    times_60 = [f"{t},{60 * float(f)},{u}" for t, f, u in (row.split(",") for row in rows)]
+    (tmp_path / "1.csv").write_text("\n".join([heads, *times_60, ""]), encoding="utf-8")
+    _, mark = compared(tmp_path).marks
+    assert "Hz, a Levitron spins at 20 to 60 Hz; say the unit" in mark.why[0]
+    assert not any("fit" in text for text in mark.why)
+    assert any("the fit did not converge" in text for text in mark.notes)
 
 
 def test_tables_without_u_and_with_fewer_readings_in_the_same_time_are_good(tmp_path):
