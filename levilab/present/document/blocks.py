@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, fields, is_dataclass, replace
+from itertools import takewhile
 from typing import TYPE_CHECKING, Literal, TypeAlias, TypeVar
 
 from levilab.present.tables import Table
@@ -398,7 +399,7 @@ class InShort:
 
     Attributes:
         title, anchor: of the chapter.
-        verdict: empty for none.
+        verdict: below the doubts about it; empty for none.
         notes: their number as text; empty for none.
     """
 
@@ -415,6 +416,10 @@ def in_short(blocks: Iterable[Block]) -> list[InShort]:
         if isinstance(chapter, Section):
             inner = [*all_in(chapter)]
             verdict = next((one.text for one in inner if isinstance(one, Verdict)), "")
+            before = takewhile(lambda one: not isinstance(one, Verdict), inner)
+            doubts = [group[0] for one in before if isinstance(one, Warnings) for group in one.groups if verdict]
+            before_use = [" ".join([in_language("Before you use the numbers."), *doubts])] if doubts else []
+            verdict = "\n".join([*before_use, verdict])
             count = sum(len(group) for one in inner if isinstance(one, Warnings) for group in one.groups)
             notes = in_language(Text("{n} notes", n=count) if count > 1 else "1 note" if count else "")
             found.append(InShort(chapter.title, chapter.anchor, verdict, notes))

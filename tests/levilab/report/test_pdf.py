@@ -151,15 +151,17 @@ def test_a_column_of_long_sentences_is_wider_than_one_of_short_words():
 
 
 def test_a_first_page_of_several_chapters_says_what_each_found(monkeypatch):
+    mind = [Warnings((("mind",),))]
     chapters = tuple(
-        Section(name, (Warnings((("mind",),)), Section("Result", (Verdict(f"{name} holds"),))), name, new_page=new)
-        for name, new in (("one", False), ("two", True))  # the first one of a report follows its title where it can
+        Section(name, (Section("Result", (*doubts, Verdict(f"{name} holds"))), *notes), name, new_page=new)
+        for name, doubts, notes, new in (("one", [], mind, False), ("two", mind, [], True))
+        # the first one of a report follows its title where it can
     )
     last = Section("How to reproduce this", (Paragraph("x"),))
     said = data_of(Document("t", "", (*chapters, last)))["chapters"]
     assert [(one["title"], one["verdict"], one["notes"]) for one in said] == [
         ("one", "one holds", "1 note"),
-        ("two", "two holds", "1 note"),
+        ("two", ["Before you use the numbers. mind", ["line", ""], "two holds"], "1 note"),
         ("How to reproduce this", "", ""),
     ]
     assert data_of(Document("t", "", (chapters[0], last)))["chapters"] == []
