@@ -3,8 +3,8 @@
 import {GONE, read} from "./connection.js";
 import {LANGUAGE, by, lapse, make, phrase, put, typeset, write} from "./words.js";
 
-/** Sentences that are the answer: the value with its uncertainty, and what it means; the others are in the fold. */
-const ANSWER = 2;
+/** Sentences that are the answer: the value with its u, what is excluded, and what is not; the others are in the fold. */
+const ANSWER = 3;
 /** What is under way, by the step that the server names; "" once all is there. */
 const STEPS = {
   analyze: phrase("Analyzing: some seconds, the first time longer."),

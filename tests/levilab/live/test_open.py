@@ -111,7 +111,7 @@ def test_an_answer_is_shown_in_one_order_and_nothing_before_it_is_whole(hall, wa
         """Write first, and end later: what is there is not all yet."""
         if words[0] == "analyze":
             value = Text("C = {value:n}.", value="2.34(1)")
-            answer = {"sentences": as_tables(["The disc law fits.", value, "Others do not."])}
+            answer = {"sentences": as_tables(["The disc law fits.", value, "Not Stokes.", "Wobble."])}
             answer |= {"doubts": ["LOOSE WASHERS"], "notes": ["one run"]}
             file.with_name("steps.csv.result.json").write_text(json.dumps(answer))
             shutil.copy(FIGURE, file.with_name("steps.csv.spindown.png"))
@@ -130,15 +130,15 @@ def test_an_answer_is_shown_in_one_order_and_nothing_before_it_is_whole(hall, wa
     assert page.evaluate(ANSWER) == [0, 0, 0, 0, 0, False, True]
     go_on["analyze"].set()
     until(page, "document.getElementById('writing').textContent.startsWith('The report is being')")
-    until(page, f"JSON.stringify({ANSWER}) === '[1,2,1,1,1,false,true]'")
+    until(page, f"JSON.stringify({ANSWER}) === '[1,3,1,1,1,false,true]'")
     sizes = "['clientWidth', 'scrollWidth'].map((name) => document.getElementById('figures')[name])"
     assert len({*page.evaluate(sizes)}) == 1  # nothing is cut
-    assert page.inner_text("#verdict") == "The disc law fits.\n\nC = 2.34(1)."
+    assert page.inner_text("#verdict") == "The disc law fits.\n\nC = 2.34(1).\n\nNot Stokes."
     assert not page.locator("#verdict-more").is_visible()  # in a fold
     assert page.locator("#progress").is_visible()
     go_on["report"].set()
     until(page, "!document.getElementById('report').hidden")
-    assert page.evaluate(ANSWER) == [1, 2, 1, 1, 1, True, True]
+    assert page.evaluate(ANSWER) == [1, 3, 1, 1, 1, True, True]
     assert not page.locator("#progress").is_visible()
 
 
