@@ -26,7 +26,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
   document.body.classList.add("practice");
   by("practice").hidden = false;
   for (const {name, title} of about.experiments) by("experiment").append(Object.assign(option(phrase(title), name), {selected: name === sessionStorage.getItem("experiment")}));
-  const now = {drive: false, busy: false, paused: false, analyzed: "", ended: false, elsewhere: null, bench: null};
+  const now = {drive: false, busy: false, paused: false, analyzed: "", ended: false, elsewhere: null, bench: null, read: sessionStorage.getItem("read")};
 
   put(by("controls"), {disabled: true});  // until the bench is there
   if (!allowed) write("said", phrase("This page may only look: open the address that the terminal shows."));
@@ -98,7 +98,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     hold: () => send("pause", {on: !now.paused}),
     record: () => now.busy ? send("stop the run") : send("record a run", {experiment: by("experiment").value, group: by("group").value}),
     analyze: () => openResult(run()),
-    report: () => { now.read = run(); },
+    report: () => sessionStorage.setItem("read", now.read = run()),
   };
   for (const [id, act] of Object.entries(does)) {
     by(id).addEventListener("click", async () => {

@@ -203,6 +203,16 @@ def load_again(page, name):
     until(page, f"{SOLID} === 'analyze'")
 
 
+def read_the_report_and_come_back(page, name):
+    """As from an opened file: all steps of the guide are still done."""
+    page.evaluate("document.getElementById('report').click()")
+    until(page, "document.getElementById('guide').hidden")
+    page.goto("about:blank")
+    page.go_back()
+    until(page, f"window.levilab?.seen.run === '{name}' && {CAN_BE_ANALYZED}")
+    until(page, "document.getElementById('guide').hidden && document.getElementById('fit-head').offsetParent")
+
+
 def test_a_student_drives_records_and_analyzes(served, older, watched, monkeypatch):
     page = watched(device_scale_factor=0.5)  # fewer pixels to draw for a minute
     page.route("**/do?*", record_quickly)
@@ -251,6 +261,7 @@ def test_a_student_drives_records_and_analyzes(served, older, watched, monkeypat
     until(page, "document.querySelectorAll('#figures img').length && document.getElementById('verdict').innerText")
     until(page, f"{DONE} === 'drive,tune,record,analyze'")  # the run tuned the drive up
     assert page.text_content("#fit-lines").startswith(page.text_content("#verdict p >> nth=0"))
+    read_the_report_and_come_back(page, name)
     assert sorted(path.name for path in served.root.iterdir()) == [OLDER, name]
     assert (served.root / name / "result.json").exists()
 
