@@ -89,6 +89,8 @@ def test_who_has_no_file_tries_one(hall, watched, name, file, same):
     page = watched()
     page.goto(f"{address(hall)}open#{hall.doors.token}")
     until(page, "document.getElementById('kept-in').textContent")
+    clip = page.evaluate("getComputedStyle(document.getElementById('chosen')).clipPath")
+    assert clip == "inset(50%)"  # the link is the one way to choose a file
     page.get_by_role("button", name=name).click()
     until(page, f"levilab.look?.name === '{file}' && !document.getElementById('analyze').disabled")
     assert Path(page.evaluate("levilab.look.path")).read_bytes() == (SAMPLES / same).read_bytes()
