@@ -104,6 +104,16 @@ def test_a_language_that_is_a_new_file_says_everything_of_a_page(hall, watched):
     assert [one for one in outside(page) if str(hall.opened.folder) not in one] == []
 
 
+#: Texts of a field and of a choice that are wider than these, less the arrow of a choice.
+CUT = """['group', 'motion'].flatMap((id) => {
+  const one = document.getElementById(id), {font, paddingLeft, paddingRight} = getComputedStyle(one);
+  const room = one.clientWidth - parseFloat(paddingLeft) - parseFloat(paddingRight) - (one.options ? 16 : 0);
+  const context = Object.assign(document.createElement('canvas').getContext('2d'), {font});
+  const texts = one.options ? [...one.options].map(({text}) => text) : [one.placeholder];
+  return texts.filter((text) => context.measureText(text).width > room);
+})"""
+
+
 @pytest.mark.parametrize("viewport", [DESK, PHONE], ids=["desk", "phone"])
 def test_a_page_in_german_stays_german_and_nothing_is_cut(viewport, hall, watched):
     page = watched(viewport=viewport)
@@ -129,6 +139,9 @@ def test_a_page_in_german_stays_german_and_nothing_is_cut(viewport, hall, watche
     parts = "[...document.querySelectorAll('button, select, h2, dt')]"
     wide = f"{parts}.filter((one) => one.scrollWidth > one.clientWidth + 1)"
     assert page.evaluate(f"{wide}.map((one) => one.textContent)") == []
+    assert page.evaluate(CUT) == []
+    first, last = (f"document.querySelector('.looks label:{one}').offsetTop" for one in ("first-child", "last-child"))
+    assert viewport == PHONE or page.evaluate(f"{last} - {first}") < 12
 
 
 @pytest.mark.parametrize(("browser", "started_in", "seen"), [
