@@ -868,6 +868,15 @@ def _spin_comes_first(layout: Layout, filled: Sequence[str]) -> bool:
     return bool(first and second) and falls and rises and second[0][0] < SLOWEST_SPIN_HZ
 
 
+def _by_units(layout: Layout, numbers: Sequence[str]) -> dict[str, str]:
+    """Return name → number of the columns whose cells have a unit of time, and of frequency, where one has each."""
+    found = {
+        name: [n for n, unit in zip(numbers, layout.units, strict=False) if unit_factor(unit, dimension(name))]
+        for name in TITLES_WITHOUT_HEADER[:2]
+    }
+    return {name: of[0] for name, of in found.items()} if all(len(of) == 1 for of in found.values()) else {}
+
+
 def _titles(
     path: Path, layout: Layout, wanted: Mapping[str, str], *, guess: bool
 ) -> tuple[tuple[str, ...], Mapping[str, str], list[str]]:
@@ -881,11 +890,12 @@ def _titles(
     if layout.header_line:
         what = 'is no header for the {width} columns below: correct it, or say `columns` = "t=1,f=2"'
         raise NoSuchColumn(path, what, layout.width, line=layout.header_line)
-    if len(filled) > len(TITLES_WITHOUT_HEADER) or not guess:
+    taken = _by_units(layout, numbers)
+    if (len(filled) > len(TITLES_WITHOUT_HEADER) and not taken) or not guess:
         what = '{width} columns and no header; add one, or say `columns` = "t=1,f=2"'
         raise NoSuchColumn(path, what, layout.width, line=layout.first_line)
     time, spin, u = TITLES_WITHOUT_HEADER
     names = (spin, time, u) if _spin_comes_first(layout, filled) else TITLES_WITHOUT_HEADER
-    taken = dict(zip(names, filled, strict=False))
+    taken = taken or dict(zip(names, filled, strict=False))
     said = "{path:s}: no header; the columns are taken as {names:s}"
     return numbers, taken, [of_file("no header", Said(said, shorten(str(path), 200), ", ".join(taken)))]

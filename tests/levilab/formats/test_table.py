@@ -260,6 +260,12 @@ def test_a_first_column_that_falls_beside_times_from_0_is_the_spin(write):
     assert f"no header; the columns are taken as {T}, {F}" in table.warnings[0]
 
 
+def test_units_behind_the_numbers_tell_the_columns_of_a_text_without_titles(write):
+    table = read_table(write("".join(f"Reading {k}: {38 - 0.8 * k:.2f} Hz at {10 * k} s\n" for k in range(5))))
+    assert table.column("time_s").tolist() == [0, 10, 20, 30, 40]
+    assert table.column("spin_frequency_hz").tolist() == [38.0, 37.2, 36.4, 35.6, 34.8]
+
+
 @pytest.mark.parametrize(
     ("text", "columns", "expected"),
     [
