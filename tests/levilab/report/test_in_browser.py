@@ -6,6 +6,8 @@ import shutil
 import pytest
 
 from levilab.report.page import write_report
+from levilab.report.worksheets.document import write_worksheets
+from support.acquisitions import RAISED_QUICKLY, acquired
 from support.browser import PHONE, watch
 from support.figures import with_drawing
 from support.paths import SAMPLE_DATA
@@ -167,6 +169,18 @@ def test_on_paper_the_figure_shares_a_page_with_the_result(browser, tmp_path, sa
         page.goto(write_report([SAMPLE_DATA / sample], tmp_path / "report.html", short=short).as_uri())
         margin = dict.fromkeys(("top", "right", "bottom", "left"), "10mm")
         assert page.pdf(format="A4", margin=margin).count(b"/Type /Page\n") == pages
+
+
+def test_a_short_report_and_a_worksheet_are_a_page_with_the_margins_of_a_printer(browser, tmp_path):
+    (tmp_path / "run").mkdir()
+    run = acquired("spin", seed=1, group="Group 1", out=tmp_path / "run", settings=RAISED_QUICKLY).folder
+    with with_drawing(), watch(browser) as page:
+        for file in (
+            write_report([run], tmp_path / "short.html", short=True),
+            *write_worksheets([], tmp_path, {f"Gruppe {k}": k for k in range(12)}, language="de", keys=False),
+        ):
+            page.goto(file.as_uri())
+            assert page.pdf(prefer_css_page_size=True).count(b"/Type /Page\n") == 1, file.name
 
 
 def test_on_paper_a_section_of_nothing_but_what_is_left_out_there_has_no_title(browser, report):
