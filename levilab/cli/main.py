@@ -162,6 +162,14 @@ def _word(parameter: typer.core.TyperArgument | typer.core.TyperOption, ctx: Any
     return parameter.metavar or "" if isinstance(parameter, typer.core.TyperOption) else ""
 
 
+def _range(low: float | None, high: float | None) -> str | None:
+    """Return the range of an option's number as text."""
+    if low is None or high is None:
+        return None if low is None else f"{low:g} or more"
+    return f"{low:g} to {high:g}"
+
+
+typer.core.describe_number_range = _range  # type: ignore[assignment]
 typer.core.TyperOption.display_type_rich = _word  # type: ignore[assignment]
 typer.core.TyperArgument.display_type_rich = _word  # type: ignore[assignment]
 

@@ -42,6 +42,7 @@ def test_each_value_has_a_word_and_no_type_of_python():
         for one in made.get_params(context):
             term, is_switch = (one.get_help_record(context) or [""])[0], getattr(one, "is_flag", False)
             assert is_switch or re.search(r"(^|[^-] )([A-Z]|\w+\|)[^<>]*$", term), (made.name, term)
+            assert "x" not in (one._get_number_range_help_str() or ""), (made.name, term)
 
 
 def test_a_misspelt_command_below_a_stand_in_gets_its_suggestion(tmp_path):
