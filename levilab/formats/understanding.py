@@ -9,7 +9,8 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from functools import reduce
+from itertools import pairwise, product
 from pathlib import Path
 from statistics import median
 
@@ -65,8 +66,8 @@ from levilab.formats.titles import (
 )
 from levilab.formats.transposed import LIES, set_upright, tables_of
 from levilab.texts.note import of_file
+from levilab.texts.text import Sentences, text_of, verbatim
 from levilab.texts.text import Text as Said
-from levilab.texts.text import text_of, verbatim
 
 TITLES_WITHOUT_HEADER = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 #: No such top floats far below or above these [Hz], linear theory says 21.65 to 80.6: the unit is in doubt there.
@@ -419,14 +420,25 @@ def _unanswered(path: Path, doubt: Doubt) -> NoSuchColumn:
 
 def _must_be_sure(plan: "Plan") -> "Plan":
     """Return a plan; raise NoSuchColumn for a unit in doubt, TableError for two, or for a formula without its value."""
+    doubts: list[Doubt] = []
     for column in plan.columns:
         plan.layout.must_have_one_unit(plan.path, column.index)
-        doubt = None if column.written else _unit_doubt(plan, column)
-        if doubt:
-            raise _unanswered(plan.path, doubt)
+        doubts += filter(None, [None if column.written else _unit_doubt(plan, column)])
+    if doubts:
+        raise _unanswered(plan.path, reduce(_both, doubts))
     if UNVALUED.encode() in (plan.text.content or b""):
         read_rows(replace(plan.text, path=plan.path), plan.layout, plan.columns)
     return plan
+
+
+def _both(one: Doubt, other: Doubt) -> Doubt:
+    """Return two questions about units as one, whose answers are those of both."""
+    choices = []
+    for first, second in product(one.choices, other.choices):
+        said = [*first.columns.items(), *second.columns.items()]
+        columns = dict(said) | {key: to for key, to in said if "[" in to}  # each has its own column's unit alone
+        choices.append(Choice(Said("{answers}", (first.text, second.text)), columns))
+    return Doubt("unit", Sentences(one.text, other.text), None, tuple(choices))
 
 
 def _unit_doubt(plan: "Plan", column: Column) -> Doubt | None:

@@ -599,6 +599,19 @@ def test_a_path_into_no_file_stays_a_path():
     assert texts.locate(FILES / "excel.xlsx" / "Messung") == (FILES / "excel.xlsx", "Messung")
 
 
+def test_two_units_in_doubt_are_one_question_whose_answer_is_complete(tmp_path):
+    rows = (f"{1234 + 10_000 * k}, {2279 - 48 * k}\n" for k in range(20))  # millis() and rpm, as a sketch prints them
+    (path := tmp_path / "arduino.txt").write_text("".join(rows))
+    (doubt,) = understand(path).runs[0].doubts
+    assert [choice.columns for choice in doubt.choices][:2] == [
+        {"t": "1 [ms]", "f": "2 [rpm]"},
+        {"t": "1 [ms]", "f": "2 [Hz]"},
+    ]
+    table = read_table(path, columns=doubt.choices[0].columns)
+    assert table.column("time_s")[1] - table.column("time_s")[0] == pytest.approx(10)
+    assert table.column("spin_frequency_hz")[0] == pytest.approx(2279 / 60)
+
+
 def test_times_of_a_turn_without_a_unit_are_a_question(tmp_path):
     (path := tmp_path / "periods.csv").write_text(
         "t,T\n" + "".join(f"{10 * k},{0.0263 + k / 1000}\n" for k in range(20))
