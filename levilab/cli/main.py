@@ -169,7 +169,7 @@ def _range(low: float | None, high: float | None) -> str | None:
     return f"{low:g} to {high:g}"
 
 
-typer.core.describe_number_range = _range  # type: ignore[assignment]
+typer.core.describe_number_range = _range  # type: ignore[assignment, attr-defined]
 typer.core.TyperOption.display_type_rich = _word  # type: ignore[assignment]
 typer.core.TyperArgument.display_type_rich = _word  # type: ignore[assignment]
 
