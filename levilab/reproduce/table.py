@@ -59,10 +59,9 @@ def in_words(found: Reproduction) -> str:
     agree, differ, added, unexpected = (found.counts[verdict] for verdict in Verdict)
     independent, ranges, fitted, constructed, recomputed = agreeing(found.findings).values()
     said = (
-        f"{independent} values and statements agree with what a source prints or says; {agree - independent} more "
-        f"agree, but prove less: {ranges} within the range that starts alike leave open, {recomputed} with a second "
-        f"computation of our own, {constructed} by construction, {fitted} after a fit to them. {differ} differ for a "
-        "reason that was computed, too"
+        f"{agree} values and statements agree: {independent} with what a source prints or says, {ranges} within the "
+        f"range that starts alike leave open, {recomputed} with a second computation of our own, {constructed} by "
+        f"construction, {fitted} after a fit to them. {differ} differ for a reason that was computed, too"
     )
     facts = "1 fact stands" if added == 1 else f"{added} facts stand"
     more = f", and {facts} beside them that the sources do not have" if added else ""
