@@ -1,7 +1,7 @@
 """A simulated motion in a few numbers: its end, heights, spin, lines and errors."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -121,6 +121,8 @@ def summarise(
     energy = motion.energies
     change = float(np.max(np.abs(energy - energy[0]))) / (abs(float(energy[0])) or 1.0)
     lines = lines_of(motion)
+    if motion.fell is not None and not any(line.name for line in lines.lines):
+        lines = replace(lines, lines=())
     notes = _notes(motion, lines, rate if uses_states else math.inf)
     return Summary(motion, duration, rate, computing, lines, change, tuple(notes))
 
@@ -139,6 +141,8 @@ def _why_no_lines(motion: Trajectory, lines: AxisLines) -> str:
     end, states = float(motion.time[-1]), motion.time.size
     if motion.scene.observed == "spin":
         return "the spin alone is simulated, and the lines are those of the axis"
+    if lines.signal is not None and motion.fell is not None:
+        return "the top falls, and its axis has none of the frequencies of small motions"
     if lines.signal is not None:
         return "the axis stands still"
     if (states - 1) < end * rate_for(motion.scene) / 2:

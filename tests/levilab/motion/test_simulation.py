@@ -174,6 +174,8 @@ def test_where_there_are_no_lines_it_is_said_why_and_what_is_enough():
     assert summary(preset("undriven"), 2.0).lines.lines
     fell = as_document(summary(preset("undriven").changed({"start.spin_hz": 15.0}), 5.0))
     assert "the top was up for 0.185 s only" in fell["no_lines_because"]
+    falling = as_document(summary(preset("undriven").changed({"start.spin_hz": 22.0}), 5.0))
+    assert (falling["lines"], falling["no_lines_because"][:19]) == ([], "the top falls, and ")
     few = summarise(simulate(preset("undriven"), 3.0, rate=20.0), 3.0, 20.0, 0.01)
     assert "61 states in 3 s are too few" in as_document(few)["no_lines_because"]
     spin = summary(preset("friction").changed({"observed": "spin"}), 5.0)
