@@ -20,6 +20,15 @@ def _stability(table: str) -> Stability:
     return stability_of(Scene.model_validate_json(table))
 
 
+def masses_that_float(scene: Scene) -> str:
+    """Return the mass of a top, and which masses float over its base; empty where none does."""
+    lifted = _stability(scene.changed({"base.tilt_rad": 0.0}).model_dump_json()).lifted
+    if not lifted:
+        return ""
+    said = "the top has {mass:.2f} g; {light:.2f} to {heavy:.2f} g float today"
+    return Text(said, *(1e3 * kg for kg in (scene.top.mass_kg, lifted[-1].light, lifted[-1].heavy)))
+
+
 def _why_not(found: Stability, *, hides: bool) -> str:
     """Return why no top like this floats; where the mass is to be found, without the masses that do."""
     mass, window = found.scene.top.mass_kg, found.lifted[-1] if found.lifted else None

@@ -25,7 +25,7 @@ from levilab.live.practice import commands as ask
 from levilab.live.practice.commands import CommandRefused, Voice
 from levilab.live.practice.drive import GATE_S, TRIGGER_V, PracticeDrive
 from levilab.live.practice.experiments import PRACTICE, PracticeExperiment, settings_for
-from levilab.live.practice.fall import cause_of_fall
+from levilab.live.practice.fall import cause_of_fall, masses_that_float
 from levilab.live.practice.seeds import keys_of_seed, seed_of_group
 from levilab.live.practice.tasks import TASKS, Look, Tasks
 from levilab.live.practice.top import PracticeTop
@@ -344,6 +344,8 @@ class PracticeProcess:
     def _change_bench(self, command: ask.ChangeBench) -> None:
         if command.values or self.tasks.name:
             self.top.change(command.values)
+            if "washers_g" in command.values and not self.tasks.name:
+                self._voice.text = masses_that_float(self.top.scene)
         else:
             self.top.hide({})  # with a top that a task has left
             self._voice.text = ""

@@ -447,6 +447,8 @@ def test_what_a_person_changes_has_immediate_effect(tmp_path):
     (heavy,) = [text for text in script.said("message") if text.startswith("the top is too heavy")]
     assert "25.10 g" in heavy  # of 24.3 g
     assert 1.0 < float(re.search(r"it fell (\S+) s after the change$", heavy)[1]) < 4.0  # of 12 s that it was up
+    said = "the top has 25.10 g; 24.25 to 24.97 g float today"  # levilab stability practice
+    assert said in [state.text for state in script.states if 12.0 < state.time_s < 12.6]
     assert script.spins(20.0, 25.0)[-1][2] == pytest.approx(29.4, abs=0.3)  # it floats again, in air
     assert script.process.top.scene.changed({}).as_table() == read_scene("practice").as_table()
 
