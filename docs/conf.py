@@ -36,7 +36,8 @@ smartquotes = False
 autodoc_member_order = "bysource"
 autodoc_typehints = "signature"
 maximum_signature_line_length = 88
-autodoc_default_options = {"members": "", "exclude-members": "model_config"}  # of a module those that its page names
+# of a module what its page names, without what serves other rooms
+autodoc_default_options = {"members": "", "exclude-members": "model_config, contents, write"}
 autodoc_class_signature = "mixed"
 add_module_names = False
 python_use_unqualified_type_names = True

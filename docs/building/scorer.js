@@ -1,7 +1,8 @@
 // How the search of the site ranks pages: that of the typed word first, users' pages before those of developers.
 // The weights are those of Sphinx (searchtools.js); `score` adds the page's own factor.
 /** Words as they are typed → as the pages have them. */
-var typedAs = {wifi: "wi-fi", wlan: "wi-fi", karman: "kármán", photodiode: "phototransistor", download: "install"};
+var typedAs = {wifi: "wi-fi", wlan: "wi-fi", karman: "kármán", photodiode: "phototransistor", download: "install",
+  license: "licence", luftwiderstand: "reibung"};
 /** What is typed in the letters of the index: indices and powers as plain digits, ⁄ as /. */
 var folded = (typed) => typed.normalize("NFKC").replaceAll("⁄", "/").replace(/\p{Letter}+/gu, (word) => typedAs[word.toLowerCase()] ?? word);
 // in the place of Sphinx's own
@@ -15,8 +16,8 @@ var Scorer = {
     "sound-card": ["microphone", "sound card", "speaker"],
     "glossary": ["lock", "locked", "c3/2", "c32", "uncertainty", "aicc", "undecided", "gate"],
     "phone": ["smartphone", "phyphox", "wi-fi"], "physics": ["von kármán", "kármán"], "notebook": ["jupyter", "python"], "messages": ["warning", "warnings", "error"],
-    "live": ["share", "qr code"], "install": ["windows", "mac"], "simulator": ["simulate"], "practise": ["virtual bench"],
-    "report": ["pdf", "budget", "uncertainty budget"], "tutorial": ["tutorial"], "video": ["film", "video"], "animation": ["animation"],
+    "live": ["share", "qr code", "language"], "index": ["licence"], "install": ["windows", "mac"], "simulator": ["simulate"], "practise": ["virtual bench"],
+    "report": ["pdf", "budget", "uncertainty budget"], "tutorial": ["tutorial"], "video": ["film", "video", "camera"], "animation": ["animation"],
     "instruments/oscilloscope": ["oscilloscope"], "experiments/washers": ["washers", "weight", "mass"], "experiments/spin": ["tape", "lamp", "spindown"],
     "experiments/triggered": ["hold"], "experiments/trace": ["phototransistor"],
   },
@@ -31,7 +32,7 @@ var Scorer = {
     }
     if (Scorer.pages[page]?.includes(typed)) return 1000 + score;
     const words = (text) => text.toLowerCase().replace(/[^\p{Letter}\p{Number}]+/gu, " ");
-    if (typed && !anchor && words(title).includes(words(typed))) score += 100;
+    if (typed && !anchor && !page.startsWith("decisions/") && words(title).includes(words(typed))) score += 100;
     if (/^(decisions\/|reference\/|speed$|mutants$|fuzzing$|contributing$|changes$)/.test(page)) return 0.2 * score;
     if (/^(reproduce$)/.test(page)) return 0.4 * score;
     if (/^(data|install|bench|experiments\/|messages|report|notebook)/.test(page)) return 1.5 * score;
