@@ -392,7 +392,7 @@ def verdict(of: Class) -> str:
         (group,), (mark,) = of.groups, of.marks
         return Text("{name:s} alone measured this: {mark}.", name=group.source.name, mark=mark.word)
     texts = [
-        Text("{symbol} has no mean: {why}.", symbol=one.symbol, why=one.apart)
+        Text("The groups have no common {symbol}: {why}.", symbol=one.symbol, why=one.apart)
         if one.apart
         else Text("{mean} is the mean of {groups}{truth}.", _mean(one), _count(of, one), _beside_truth(one))
         for one in of.quantities

@@ -215,7 +215,7 @@ def test_groups_that_held_different_spins_have_no_mean_drag(tmp_path):
     (drag,) = of.quantities
     assert all(drag.estimates)
     assert drag.from_class == (None,) * 4
-    assert "d has no mean: the groups held different spins, and the drag rises with the spin." in verdict(of)
+    assert "The groups have no common d: the groups held different spins, and the drag rises" in verdict(of)
     assert "scatter" not in agreement(of)
     assert finding(of) == "d of 4 groups"
     page = write_class([tmp_path / "class"], tmp_path / "class.html").read_text(encoding="utf-8")
@@ -232,7 +232,7 @@ def test_lower_and_upper_limits_have_no_mean(tmp_path):
         (tmp_path / kind / RECORD).write_text(json.dumps(record | {"group": kind}), encoding="utf-8")
     of = compared(tmp_path, "limit")
     assert all(of.quantities[0].estimates)
-    assert "has no mean: some groups measured lower limits, others upper ones" in verdict(of)
+    assert "The groups have no common mean: some groups measured lower limits, others upper ones" in verdict(of)
 
 
 def test_page_and_pdf_begin_with_the_result(of_three, tmp_path):
