@@ -37,6 +37,8 @@ MOST_REWRITTEN = 1 << 26
 #: How the names of spreadsheets end, and those of texts in an archive.
 SPREADSHEETS = frozenset({".xlsx", ".xlsm", ".xls", ".ods"})
 TEXTS = frozenset({".csv", ".txt", ".tsv", ".dat", ".lvm", ".lab"})
+#: The record of a run in an archive; of several in one export they are numbered.
+_RUN = re.compile(r"(.*[/\\])?run(-\d+)?\.json", re.DOTALL)
 _OLE, _ZIP = b"\xd0\xcf\x11\xe0", b"PK\x03\x04"
 _BLOCK = 1 << 18
 #: Files of a folder that a message names.
@@ -167,7 +169,7 @@ def _unpacked(file: Path) -> tuple[Text, ...]:
     try:
         with zipfile.ZipFile(file) as archive:
             members = [member for member in archive.infolist() if not member.is_dir()]
-            if runs := [member.filename for member in members if Path(member.filename).name == "run.json"]:
+            if runs := [member.filename for member in members if _RUN.fullmatch(member.filename)]:
                 raise TableError(file, "holds a run of levilab ({run:s}): unpack it, and name its folder", runs[0])
             workbook = bool({"xl/workbook.xml", "content.xml"} & {member.filename for member in members})
             taken = members if workbook else [member for member in members if _may_be_table(member.filename)]

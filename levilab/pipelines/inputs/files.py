@@ -50,8 +50,9 @@ _OF_DESKTOPS = (".", "~$", "desktop.ini", "Thumbs.db", SKIP)
 _OF_FILM = re.compile(r"(.+)\.(tracks|spin|limit|precession)\.csv")
 _RESULT_OF_FILM, _RESULT_OF_FILMS = re.compile(r"(.+)\.\w+\.result\.video\.json"), "result.video.json"
 
-#: How an export begins, and the property of a spreadsheet of several inputs, which no analysis reads.
-_EXPORT, _OF_SEVERAL = b"analysis,model,name,value,u,unit", b"<cp:keywords>levilab<"
+#: How an export begins; and what stands in which member of exports of several inputs, which no analysis reads.
+_EXPORT = b"analysis,model,name,value,u,unit"
+_OF_SEVERAL = {".xlsx": ("docProps/core.xml", b"<cp:keywords>levilab<"), ".zip": ("run-001.json", b"{")}
 
 #: How names of files end that levilab writes beside what it reads.
 _RESULT, _CORRECTION = re.compile(r"result(\.\w+)?\.json$"), ".levilab.toml"
@@ -63,7 +64,7 @@ def _exports(folder: Path, files: Sequence[str]) -> Iterator[str]:
         stem = name.removesuffix(".result.csv")
         if stem != name and _begin(folder / name).startswith(_EXPORT):
             yield from (name, f"{stem}.inputs.csv", *([f"{stem}.csv"] * (f"{stem}.inputs.csv" in files)))
-        elif name.endswith(".xlsx") and _OF_SEVERAL in _begin(folder / name, "docProps/core.xml"):
+        elif (mark := _OF_SEVERAL.get(Path(name).suffix)) and mark[1] in _begin(folder / name, mark[0]):
             yield name
 
 

@@ -267,9 +267,8 @@ def _marks(of: Class) -> Iterator[Tabular]:
     ]
     rows += [Row((name, REPEAT, why), _ROWS[REPEAT]) for name, why in of.unread.items()]
     note = Text(
-        "repeat: not read, no value, or one more than {far:.0f} u from its truth, or a doubt about the "
-        "readings; look: a warning, or, where no truth is known, more than {far:.0f} u from the "
-        "others.",
+        "repeat: not read, another group's readings, no value, or one more than {far:.0f} u from its truth, or a doubt "
+        "about the readings; look: a warning, or, where no truth is known, more than {far:.0f} u from the others.",
         far=FAR,
     )
     if rows:

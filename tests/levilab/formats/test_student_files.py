@@ -475,11 +475,12 @@ def test_a_damaged_locked_or_foreign_file_says_what_to_do(tmp_path):
         read_table(tmp_path / "pictures.zip")
 
 
-def test_a_run_in_a_zip_is_no_table_as_it_would_lose_its_mark_of_a_virtual_bench(tmp_path):
+@pytest.mark.parametrize("name", ["a-spin/run.json", "run.json", "run-001.json"])
+def test_a_run_in_a_zip_is_no_table_as_it_would_lose_its_mark_of_a_virtual_bench(tmp_path, name):
     with zipfile.ZipFile(tmp_path / "run.zip", "w") as out:
-        out.writestr("a-spin/run.json", "{}")
+        out.writestr(name, "{}")
         out.writestr("a-spin/readings.csv", "t,f\n0,38\n10,37.9\n20,37.8\n")
-    with pytest.raises(TableError, match=r"holds a run of levilab \(a-spin/run.json\): unpack it"):
+    with pytest.raises(TableError, match=rf"holds a run of levilab \({name}\): unpack it"):
         read_table(tmp_path / "run.zip")
 
 

@@ -150,7 +150,7 @@ def test_a_run_given_twice_is_named(of_three, tmp_path):
 
 def test_what_levilab_has_written_about_a_class_is_no_group_of_it(of_three, tmp_path, levilab):
     root = with_changes(of_three, tmp_path / "class", "", {})
-    for name in ("all.csv", "all.xlsx"):
+    for name in ("all.csv", "all.xlsx", "all.zip"):
         levilab("export", root, "-o", root / name)
     levilab("export", next(root.glob("2*")), "-o", root / "one.xlsx")
     write_class([root], root / "class.xlsx")
