@@ -23,6 +23,8 @@ _SHORTEST_S = 1e-3
 #: A turn of a top that floats is so long [s], at 75 to 14 Hz.  Of its turns, of which few are missed, most differ from
 #: the next by less than this share.
 _TURNS_S, _NEXT, _MISSED = (1 / 75, 1 / 14), 0.1, 0.02
+#: By this factor turns without a unit must grow to be taken for such.
+_GROWTH = 1.02
 #: Units in which micro-controllers print the time from pulse to pulse.
 _UNITS = ("s", "ms", "us")
 #: Lines that may stand above the first number.
@@ -61,7 +63,7 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
     if len(numbers) < FEWEST_PULSES:
         what = "holds {n} numbers, at least {fewest} pulse times are needed"
         raise NoWaveform(path, what, len(numbers), FEWEST_PULSES)
-    turns = _turns(numbers, [unit] if unit else _UNITS)
+    turns = _turns(numbers, [unit] if unit else _UNITS) if unit or _grow(numbers) else None
     if turns is not None:
         said = "{name:s}: its numbers are taken for times from pulse to pulse, of {slow:.4g} to {fast:.4g} Hz"
         warnings.append(of_file("turns", Text(said, path.name, 1 / turns.max(), 1 / turns.min()), "advice"))
@@ -103,6 +105,12 @@ def _turns(numbers: NDArray[np.float64], units: Sequence[str]) -> NDArray[np.flo
     if near.mean() < 1 - _MISSED or any(_are_turns(steps * factor) for factor in factors):
         return None
     return next((turns for factor in factors if _are_turns(turns := numbers * factor)), None)
+
+
+def _grow(numbers: NDArray[np.float64]) -> bool:
+    """Return whether numbers grow as the turns of a top that slows down: samples of a light have a steady ground."""
+    tenth = max(len(numbers) // 10, 1)
+    return bool(np.median(numbers[-tenth:]) > _GROWTH * np.median(numbers[:tenth]))
 
 
 def _are_turns(durations: NDArray[np.float64]) -> bool:

@@ -349,6 +349,13 @@ def test_times_from_pulse_to_pulse_are_added(title, unit, write):
     assert "taken for times from pulse to pulse, of 38.93 to 40 Hz" in record.warnings[0]
 
 
+def test_samples_of_a_light_are_no_times_from_pulse_to_pulse(write):
+    """Of a converter with 16 bits: as µs the ground would be turns at 50 Hz, with few others between them."""
+    samples = 20_000 + 100 * np.sin(np.arange(3000)) + 30_000 * (np.arange(3000) % 150 == 0)
+    with pytest.raises(TableError, match="one column of numbers that do not increase: of samples say the `rate`"):
+        read_record(write("".join(f"{sample:.0f}\n" for sample in samples)))
+
+
 def test_times_of_pulses_are_not_added_though_they_could_be_turns(write):
     times = 20 + np.arange(1000) / 30  # as ms they would be turns of 50 to 19 Hz
     record = read_record(write("".join(f"{time:.5f}\n" for time in times)))
