@@ -30,6 +30,7 @@ const OWN_BENCH = ".";
 const CHANNELS = ["tape", "drive", "laser"];
 const PAUSED = phrase("The view is paused, and shows nothing of what the bench would do: “Go on” first.");
 const NO_VALUE = phrase("––.––––");
+const PLACE_EACH = 8, MOST_PLACES = 6000;  // of the sway each eighth pose is drawn, 50 a second, for two minutes
 const SLIP_HZ = 0.2, SWINGS_HZ = 0.5;  // a top that follows is counted this near to its drive, on a ramp, too; while it swings
 
 const token = takeToken();
@@ -37,6 +38,7 @@ const seen = {run: null, tick: -1, readings: -1, events: 0, fit: -1, poses: 0, s
 const data = {readings: null, found: null, hidden: null, shown: {}, said: [], fit: null, records: new Map(), about: null, bench: null, up: null, lastUp: NaN, last: {}, count: 0, trend: NaN};
 const papers = {plot: sheet(by("plot")), trace: sheet(by("trace"))};
 const history = openHistory(sessionStorage.getItem(`minutes ${token}`) ?? undefined), sound = openSound();
+let places = [];  // of the top while a run is recorded: [bench time, x]
 let fellAt = NaN;  // a fall whose poses are not kept yet
 let isReady = false;  // whether the bench for practice has measured something yet
 let paused = false, drawn = null, pointed = -1, space = null, topOf = "", wanted = "", practice = null, reachable = true;
@@ -97,7 +99,8 @@ function turnTo(run) {
   Object.assign(data, {readings: null, found: null, hidden: null, fit: null, about: null, ended: "", end: null, last: {}, count: 0, trend: NaN});
   by("event-list").replaceChildren();
   put(by("events-key"), {hidden: true});
-  if (by("drawn").value === "minutes") by("drawn").value = "all";
+  if (/minutes|place/.test(by("drawn").value)) by("drawn").value = "all";
+  places = [];
   pointed = -1;
   space?.endReplay?.();  // the fall was before this run
   dirty = {plot: true, trace: true};
@@ -107,7 +110,7 @@ function turnTo(run) {
 function takeReadings(about) {
   seen.readings = about.version;
   Object.assign(data, {last: about.last, count: about.count, trend: about.trend});
-  data.readings = about.x ? {...about, xAxis: about.x_axis, yAxis: about.y_axis} : null;
+  if (!drawPlaces()) data.readings = about.x ? {...about, xAxis: about.x_axis, yAxis: about.y_axis} : null;
   if (pointed >= (data.readings?.x.length ?? 0)) pointed = -1;
   dirty.plot = true;
 }
@@ -183,7 +186,20 @@ function takePoses(pieces) {
     else if (!before && data.up) forgetFall();
     if (last >= 0) data.lastUp = piece.start_s + last * piece.step_s;
     space.add(piece.start_s, piece.step_s, piece.position, piece.quaternion, up);
+    if (data.about?.status !== "running" || piece.start_s <= places.at(-1)?.[0]) continue;
+    if (!places.length && data.about.experiment === "sway") by("drawn").value = "place";
+    for (let k = 0; k < up.length; k += PLACE_EACH) places.push([piece.start_s + k * piece.step_s, piece.position[3 * k]]);
   }
+  places = places.slice(-MOST_PLACES);
+  drawPlaces();
+}
+
+/** Draw how the top sways in place of the readings.  Returns whether that is wanted, and known of this run. */
+function drawPlaces() {
+  if (by("drawn").value !== "place" || !places.length) return false;
+  const x = Float64Array.from(places, ([time]) => time - places[0][0]), low = Float64Array.from(places, ([, value]) => value);
+  data.readings = {x, low, high: low, u: null, single: true, xAxis: ["time", "s", 1], yAxis: ["x", "mm", 1000, true]};
+  return dirty.plot = true;
 }
 
 /** Mark the fall in the last minutes. */
@@ -282,6 +298,7 @@ function show() {
   const minutes = isOfMinutes();
   put(by("empty"), {hidden: data.count > 0 || minutes});
   put(by("drawn").parentElement, {hidden: !data.count});
+  put(by("drawn").lastElementChild, {hidden: !places.length});
   put(by("csv").parentElement, {hidden: !data.readings && !minutes});
   put(by("netcdf"), {hidden: minutes || !token || !/finished|interrupted/.test(about?.status)});
   write("readings-title", minutes ? phrase("The last minutes") : phrase("Readings"));

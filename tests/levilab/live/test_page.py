@@ -257,6 +257,26 @@ def test_what_the_bench_publishes_is_drawn(served, page, tmp_path):
     assert until(page, f"{SAID}.includes('tape from 0 to 0 volts, laser from') && {SAID}").count("before the fall") == 1
 
 
+def test_the_sway_of_a_top_is_drawn_while_it_is_filmed(served, page, tmp_path):
+    run = GrowingRun(tmp_path, experiment="sway")
+    time = np.arange(800) / 400  # two pieces of a second
+    position = np.stack([5e-4 * np.cos(9 * time), 0 * time, 0.075 + 0 * time], axis=1)
+    with run.running():
+        run.readings(spin_down(3))
+        page.goto(address(served, run.folder.name))
+        until(page, "levilab.data.about?.status === 'running' && levilab.data.count === 3")
+        assert page.evaluate("document.getElementById('drawn').lastElementChild.hidden")  # a real top is not seen
+        for k in (0, 400):
+            pose = np.tile([0.0, 0.0, 0.0, 1.0], (400, 1))
+            piece = Poses(7.0 + k / 400, 1 / 400, position[k : k + 400], pose, np.ones(400, dtype=bool))
+            publish(served.watches[run.folder.name], State(9.0, virtual=True, speed=1.0), piece)
+        until(page, "levilab.data.readings.yAxis[0] === 'x' && levilab.data.readings.x.length === 100")
+        x, y = (page.evaluate(f"[...levilab.data.readings.{one}]") for one in ("x", "low"))
+        np.testing.assert_allclose(y, 5e-4 * np.cos(9 * np.array(x)), atol=1e-9)
+        page.select_option("#drawn", "all")
+        until(page, "levilab.data.readings.yAxis[0] === 'spin'")
+
+
 def test_a_wide_view_shows_the_top_from_near_too(served, page, tmp_path):
     """It is seen half as large again and more, also where it has left the other picture."""
     run = GrowingRun(tmp_path)
