@@ -21,6 +21,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "building.commands",
     "building.docstrings",
+    "building.indices",
     "building.mathml",
     "building.outside_pages",
     "building.wrapping",

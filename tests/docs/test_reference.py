@@ -19,6 +19,13 @@ def test_docstrings_are_whole_and_signatures_are_short(page):
 
 
 @pytest.mark.skipif(not PAGES, reason="make site makes them")
+def test_indices_and_powers_of_the_physics_are_set():
+    text = (ROOT / "build/site/physics.html").read_text(encoding="utf-8")
+    assert "ν<sub>d</sub> turns the top" in text
+    assert "(rad/s)<sup>−1/2</sup>/s" in text
+
+
+@pytest.mark.skipif(not PAGES, reason="make site makes them")
 def test_a_fit_has_an_entry_for_each_of_its_names():
     names = "redchi", "covar", "correl", "best_fit", "eval", "eval_uncertainty", "conf_interval", "ci_report"
     text = (ROOT / "build/site/reference/python-results.html").read_text(encoding="utf-8")
