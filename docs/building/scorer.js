@@ -2,7 +2,12 @@
 // The weights are those of Sphinx (searchtools.js); `score` adds the page's own factor.
 /** Words as they are typed → as the pages have them. */
 var typedAs = {wifi: "wi-fi", wlan: "wi-fi", karman: "kármán", photodiode: "phototransistor", download: "install",
-  license: "licence", luftwiderstand: "reibung"};
+  license: "licence", luftwiderstand: "reibung", photogate: "phototransistor", webcam: "camera",
+  // German words that no page has
+  lichtschranke: "phototransistor", mikrofon: "microphone", soundkarte: "sound card", handy: "phone",
+  gewicht: "weight", einheit: "unit", komma: "comma", unterlegscheiben: "washers", magnetfeld: "field",
+  messunsicherheit: "uncertainty", fehlermeldung: "error", arbeitsblatt: "worksheet", lehrer: "teacher",
+  oszilloskop: "oscilloscope", zähler: "counter", auswertung: "analyze"};
 /** What is typed in the letters of the index: indices and powers as plain digits, ⁄ as /. */
 var folded = (typed) => typed.normalize("NFKC").replaceAll("⁄", "/").replace(/\p{Letter}+/gu, (word) => typedAs[word.toLowerCase()] ?? word);
 // in the place of Sphinx's own
@@ -18,7 +23,7 @@ var Scorer = {
     "phone": ["smartphone", "phyphox", "wi-fi"], "physics": ["von kármán", "kármán"], "notebook": ["jupyter", "python"], "messages": ["warning", "warnings", "error"],
     "live": ["share", "qr code", "language"], "index": ["licence"], "install": ["windows", "mac"], "simulator": ["simulate"], "practise": ["virtual bench"],
     "report": ["pdf", "budget", "uncertainty budget"], "tutorial": ["tutorial"], "video": ["film", "video", "camera"], "animation": ["animation"],
-    "instruments/oscilloscope": ["oscilloscope"], "experiments/washers": ["washers", "weight", "mass"], "experiments/spin": ["tape", "lamp", "spindown"],
+    "instruments/oscilloscope": ["oscilloscope"], "instruments/counter": ["counter"], "experiments/washers": ["washers", "weight", "mass"], "experiments/spin": ["tape", "lamp", "spindown"],
     "experiments/triggered": ["hold"], "experiments/trace": ["phototransistor"],
   },
   score: ([page, title, anchor, description, score, file]) => {

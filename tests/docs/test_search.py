@@ -13,17 +13,17 @@ from support.paths import ROOT
 SITE = ROOT / "build/site"
 #: Page → what is typed, and it is the first.
 FIRST = {
-    "phone": ("phyphox", "smartphone", "wifi"),
+    "phone": ("phyphox", "smartphone", "wifi", "Handy"),
     "open-my-file": ("excel", "xlsx", "labview", "arduino", "logger pro", "csv", "audio", "comma", "rpm", "Drehzahl"),
-    "sound-card": ("microphone", "sound card", "speaker"),
+    "sound-card": ("microphone", "sound card", "speaker", "Mikrofon", "Soundkarte"),
     "install": ("windows", "install", "download", "mac"),
-    "class": ("grading", "worksheet", "seed", "teacher", "student"),
+    "class": ("grading", "worksheet", "seed", "teacher", "student", "Lehrer"),
     "glossary": ("lock", "C3/2", "C₃/₂", "c32", "uncertainty", "AICc", "undecided", "gate"),
     "live": ("share", "QR code", "language"), "tutorial-de": ("Präzession", "Luftwiderstand"),
     "messages": ("warning", "warnings", "error"),
-    "experiments/washers": ("washers", "weight", "mass"),
-    "experiments/spin": ("tape", "lamp", "spin down", "spindown"), "experiments/trace": ("photodiode",),
-    "instruments/oscilloscope": ("oscilloscope",),
+    "experiments/washers": ("washers", "weight", "mass", "Gewicht", "Unterlegscheiben"),
+    "experiments/spin": ("tape", "lamp", "spin down", "spindown"), "experiments/trace": ("photodiode", "Lichtschranke"),
+    "instruments/oscilloscope": ("oscilloscope", "Oszilloskop"), "instruments/counter": ("counter", "Zähler"),
     "pymeasure": ("pymeasure",), "animation": ("animation",), "report": ("pdf", "budget"), "notebook": ("jupyter",),
     "video": ("video", "camera"), "experiments/triggered": ("hold",), "simulator": ("simulate",),
     "practise": ("virtual bench",),
