@@ -294,7 +294,6 @@ function show() {
   showFacts(about);
   document.body.classList.toggle("no-scope", !data.records.size && !practice && Boolean(about) && about.status !== "running");
   write("count", isOfMinutes() ? phrase("the spin as it is counted, and the drive") : data.count ? `${data.count.toLocaleString("en").replaceAll(",", "\u202f")}${data.readings?.single === false ? phrase(", each stroke from the lowest to the highest of many") : ""}` : "");
-  put(by("fit-head").parentElement, {hidden: !data.count || !by("fit-head").textContent || isOfMinutes()});
   const minutes = isOfMinutes();
   put(by("empty"), {hidden: data.count > 0 || minutes});
   put(by("drawn").parentElement, {hidden: !data.count});
@@ -310,6 +309,7 @@ function show() {
   put(document, {title: `${state === "running" && data.count ? `${phrase("{count} readings", {count: data.count})} · ` : ""}levilab live`});
   if (isReady) practice?.show(bench, about, data.count, down);
   showFit();
+  put(by("fit-head").parentElement, {hidden: !data.count || !by("fit-head").textContent || isOfMinutes()});
   put(by("own"), {hidden: !practice || wanted === OWN_BENCH || !seen.run || (isOwn(seen.run) ?? !wanted)});  // a run that begins is listed in a moment
   space?.setSpeed?.(bench?.speed, bench?.paused || bench?.silent);
   showTop(bench);
