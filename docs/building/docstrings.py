@@ -37,6 +37,22 @@ def _process(_app: Sphinx, what: str, _name: str, _thing: Any, _options: Any, li
         lines.insert(0, "\\")
 
 
+#: numpy's array of a kind of number, as Sphinx writes it in a signature, and as it shows it.
+_ARRAY = re.compile(r"~numpy\.ndarray\[tuple\[~typing\.Any, \.\.\.\], ~numpy\.dtype\[([~\w.]+)\]\]")
+_SHOWN = re.compile(r"ndarray\[tuple\[Any, \.\.\.\], dtype\[(\w+)\]\]")
+
+
+def _shorten_properties(_app: Sphinx, page: Any, _name: str) -> None:
+    """Write the type of a property as those of signatures, for which Sphinx has no event."""
+    from docutils.nodes import Text
+    from sphinx.addnodes import desc_annotation
+
+    for node in page.findall(desc_annotation):
+        if _SHOWN.search(node.astext()):
+            shown = _SHOWN.sub(r"NDArray[\1]", node.astext()).replace("NDArray[float64]", "Array")
+            node.children = [Text(shown)]
+
+
 def shorten(signature: str, names: dict[str, str]) -> str:
     """Return a signature with the names of types, without their checks, and with ... for a value that a factory makes.
 
@@ -46,6 +62,7 @@ def shorten(signature: str, names: dict[str, str]) -> str:
     short = signature.replace("~typing.Annotated", "Annotated").replace("<factory>", "...")
     for text, name in names.items():
         short = short.replace(text, name)
+    short = _ARRAY.sub(r"~numpy.typing.NDArray[\1]", short)
     while (start := short.find("Annotated[")) >= 0:
         end = inside = start + len("Annotated[")
         commas, depth = [], 1
@@ -71,5 +88,6 @@ def setup(app: Sphinx) -> dict[str, bool]:
         return tuple(text and shorten(text, names) for text in of[-2:])
 
     app.connect("autodoc-process-signature", sign)
+    app.connect("doctree-resolved", _shorten_properties)
     app.connect("autodoc-process-docstring", _process, priority=100)  # before napoleon
     return {"parallel_read_safe": True, "parallel_write_safe": True}
