@@ -317,7 +317,8 @@ def _question(
     if numbers and not total and (per_reading := _turns_per_reading(layout, numbers, time)):
         units = [per_reading, *units]
     spins = {unit: total or [number * (unit_factor(unit, "frequency") or 1.0) for number in numbers] for unit in units}
-    spins = spins or _likely(_spins_of_periods(numbers))
+    if not spins and numbers[-1:] > numbers[:1]:  # the turns of a top that slows down last ever longer
+        spins = _likely(_spins_of_periods(numbers))
     said = what or "no unit", _ranges(spins), ("rpm", "Hz")
     return _ask(layout, index, "f", {**_at(time), **given}, numbers=numbers, said=said) if spins else None
 

@@ -16,7 +16,7 @@ from levilab.formats.table import read_table
 from levilab.formats.texts import locate
 from levilab.formats.titles import COMPONENTS, MAGNITUDE, dimension
 from levilab.formats.understanding import UnderstoodColumn, UnderstoodRun, understand
-from levilab.formats.waveforms.header import NoWaveform
+from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 from levilab.pipelines.field import readings as scan
@@ -122,11 +122,10 @@ def look_at(path: Path, options: Mapping[str, Any], *, plots: bool = True) -> Lo
     columns = options.get("columns")
     try:
         record = read_record(path, columns=columns, rate=options.get("rate"))
-    except NoWaveform:
-        return _look_at_table(path, options, plots=plots)
     except LevilabError as error:
         look = _look_at_table(path, options, plots=plots)
-        return look if not look.problem else Look(path, "", look.runs, text_of(error))
+        is_record = isinstance(error, NoRate) or not isinstance(error, NoWaveform)
+        return Look(path, "", look.runs, text_of(error)) if look.problem and is_record else look
     try:
         return _look_at_record(path, record, options.get("channel"))
     except LevilabError as error:

@@ -1,5 +1,6 @@
 """Lists of pulse times: one number a line, with a title or without."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -20,13 +21,12 @@ from levilab.texts.text import Text
 _LONGEST_TURN_S = 10.0
 #: No top has pulses so near [s], ten a turn at 100 Hz: they are differences of the times between pulses.
 _SHORTEST_S = 1e-3
-#: A turn of a top that floats is so long [s], at 75 to 14 Hz.  Of its turns, of which few are missed, most differ from
-#: the next by less than this share.
-_TURNS_S, _NEXT, _MISSED = (1 / 75, 1 / 14), 0.1, 0.02
-#: By this factor turns without a unit must grow to be taken for such.
-_GROWTH = 1.02
-#: Units in which micro-controllers print the time from pulse to pulse.
-_UNITS = ("s", "ms", "us")
+#: A turn of a top that floats lasts so long [s], at 75 to 14 Hz.
+_TURNS_S = (1 / 75, 1 / 14)
+#: Units in which micro-controllers print the time from pulse to pulse, and names of it beside those of a period.
+_UNITS, _BETWEEN = ("s", "ms", "us"), re.compile(r"(d|δ|Δ|delta)[ _]?t\b|interval|pulse to pulse", re.IGNORECASE)
+#: What a title of times may say: nothing known, times, or Δt, the uncertainty of times in a table.
+_TIMES = {None, "time_s", "time_u_s"}
 #: Lines that may stand above the first number.
 _MOST_TITLES = 20
 
@@ -63,11 +63,9 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
     if len(numbers) < FEWEST_PULSES:
         what = "holds {n} numbers, at least {fewest} pulse times are needed"
         raise NoWaveform(path, what, len(numbers), FEWEST_PULSES)
-    turns = _turns(numbers, [unit] if unit else _UNITS) if unit or _grow(numbers) else None
+    turns = _turns(path, numbers, unit, titles)
     if turns is not None:
-        said = "{name:s}: its numbers are taken for times from pulse to pulse, of {slow:.4g} to {fast:.4g} Hz"
-        warnings.append(of_file("turns", Text(said, path.name, 1 / turns.max(), 1 / turns.min()), "advice"))
-        return PulseTimes(path, "list of times from pulse to pulse", np.cumsum(turns), tuple(warnings))
+        return _added(path, turns, first + 1, warnings)
     times = numbers * (unit_factor(unit, "time") or 1.0 if unit else 1.0)
     late = np.flatnonzero(np.diff(times) <= 0)
     if late.size > max(0.01 * len(times), 3):
@@ -89,46 +87,60 @@ def _must_be_of_turns(path: Path, times: NDArray[np.float64], line: int) -> None
     if apart < _SHORTEST_S:
         what = (
             "as times of pulses its numbers are {apart:.3g} s apart, and no top turns so fast: of times from pulse to "
-            "pulse write the sums (numpy.cumsum), of samples say the `rate` in Hz"
+            "pulse write dt with the unit above them, of samples say the `rate` in Hz"
         )
         raise NoRate(path, what, apart)
 
 
-def _turns(numbers: NDArray[np.float64], units: Sequence[str]) -> NDArray[np.float64] | None:
-    """Return the times from pulse to pulse [s] in the first unit in which numbers are such times of a top, or None.
-
-    They change little from one to the next, and are no times of pulses in any unit.
-    """
-    factors = [unit_factor(unit, "time") or 1.0 for unit in units]
-    steps = np.diff(numbers)
-    near = np.abs(steps) < _NEXT * numbers[1:]
-    if near.mean() < 1 - _MISSED or any(_are_turns(steps * factor) for factor in factors):
-        return None
-    return next((turns for factor in factors if _are_turns(turns := numbers * factor)), None)
-
-
-def _grow(numbers: NDArray[np.float64]) -> bool:
-    """Return whether numbers grow as the turns of a top that slows down: samples of a light have a steady ground."""
-    tenth = max(len(numbers) // 10, 1)
-    return bool(np.median(numbers[-tenth:]) > _GROWTH * np.median(numbers[:tenth]))
-
-
-def _are_turns(durations: NDArray[np.float64]) -> bool:
+def _are_turns(numbers: NDArray[np.float64], unit: str) -> bool:
+    """Return whether numbers can be the times that turns of a top last, in a unit."""
     shortest, longest = _TURNS_S
-    return shortest < float(np.median(durations)) < longest
+    return shortest < float(np.median(numbers)) * (unit_factor(unit, "time") or 1.0) < longest
+
+
+def _turns(path: Path, numbers: NDArray[np.float64], unit: str, titles: list[str]) -> NDArray[np.float64] | None:
+    """Return the times from pulse to pulse [s] that numbers are; None where they are none, or none of a top.
+
+    Raises NoRate for what may be such times, or samples or limits, as neither title nor unit says it.
+    """
+    units = [unit] if unit else _UNITS
+    found = next((one for one in units if _are_turns(numbers, one)), None)
+    if found is None or any(_are_turns(np.diff(numbers), one) for one in units):  # they are times of pulses
+        return None
+    if not unit and not any(_BETWEEN.match(text) or read_title(text).inverse for text in titles):
+        what = (
+            "holds one column of numbers without a unit: times from pulse to pulse are titled as dt [{unit:s}]; of "
+            "samples say the `rate` in Hz"
+        )
+        raise NoRate(path, what, found)
+    return numbers * (unit_factor(found, "time") or 1.0)
+
+
+def _added(path: Path, turns: NDArray[np.float64], line: int, warnings: Sequence[str]) -> PulseTimes:
+    """Return the times of pulses by the times between them [s], the first of them in a line.  Raises TableError."""
+    wrong = np.flatnonzero(turns <= 0)
+    if wrong.size:
+        k = int(wrong[0])
+        what = "a time from pulse to pulse of {turn:.6g} s, above 0 is expected: correct it, or leave the line out"
+        raise TableError(path, what, turns[k], line=line + k)
+    said = "{name:s}: its numbers are times from pulse to pulse, of {slow:.4g} to {fast:.4g} Hz"
+    note = of_file("turns", Text(said, path.name, 1 / turns.max(), 1 / turns.min()), "advice")
+    return PulseTimes(path, "list of times from pulse to pulse", np.cumsum(turns), (*warnings, note))
 
 
 def _unit(path: Path, titles: list[str]) -> str:
-    """Return the unit of the times, by the title, its last word, or a row of units; empty without one.
+    """Return the unit of the times: of the title, of its last word, or of a row of units; empty without one.
 
     Raises NoWaveform where the title of the column, or its unit, is that of another quantity than a time.
     """
     units = [""]
     for text in titles:
-        title, last = read_title(text), plain_unit(text.split()[-1])
-        unit = plain_unit(text) if is_unit(text) else title.unit or (last if unit_factor(last, "time") else "")
+        title, (name, _, last) = read_title(text), text.rpartition(" ")
+        unit = plain_unit(text) if is_unit(text) else title.unit or ""
+        if not unit and unit_factor(last, "time") and read_title(name.rpartition(" ")[2]).column == "time_s":
+            unit = plain_unit(last)  # "Pulse time us"
         is_time = bool(unit) and unit_factor(unit, "time") is not None
-        if (is_unit(unit) and not is_time) or (title.column not in {None, "time_s"} and not title.inverse):
+        if (is_unit(unit) and not is_time) or (title.column not in _TIMES and not title.inverse):
             what = "holds one column, '{title:s}', which is no time: times of pulses are expected, as t [s]"
             raise NoWaveform(path, what, shorten(text))
         units += [unit] if is_time else []

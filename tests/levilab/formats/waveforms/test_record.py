@@ -340,26 +340,48 @@ def test_pulse_times_in_microseconds_without_a_unit_are_asked_for_it(write):
     assert read_record(write(f"t [us]\n{times}")).times[1] == pytest.approx(0.025, rel=1e-12)
 
 
-@pytest.mark.parametrize(("title", "unit"), [("dt [ms]", 1e-3), ("Periode in ms", 1e-3), ("T us", 1e-6), ("", 1e-6)])
+@pytest.mark.parametrize(
+    ("title", "unit"), [("dt [ms]", 1e-3), ("dt", 1e-6), ("Periode in ms", 1e-3), ("T us", 1e-6), ("Δt", 1e-3)]
+)
 def test_times_from_pulse_to_pulse_are_added(title, unit, write):
     """A micro-controller prints them, and those of a top that slows increase as well."""
-    turns = 25e-3 + 2.3e-6 * np.arange(300)
+    turns = 25e-3 + 2.3e-6 * np.arange(60)
+    turns[[7, 30]] *= 2  # pulses that were missed
     record = read_record(write(f"{title}\n" + "".join(f"{turn / unit:.4f}\n" for turn in turns)))
     np.testing.assert_allclose(record.times, np.cumsum(turns), rtol=1e-7)
-    assert "taken for times from pulse to pulse, of 38.93 to 40 Hz" in record.warnings[0]
+    assert "are times from pulse to pulse, of 19.94 to 40 Hz" in record.warnings[0]
 
 
-def test_samples_of_a_light_are_no_times_from_pulse_to_pulse(write):
-    """Of a converter with 16 bits: as µs the ground would be turns at 50 Hz, with few others between them."""
-    samples = 20_000 + 100 * np.sin(np.arange(3000)) + 30_000 * (np.arange(3000) % 150 == 0)
-    with pytest.raises(TableError, match="one column of numbers that do not increase: of samples say the `rate`"):
-        read_record(write("".join(f"{sample:.0f}\n" for sample in samples)))
+@pytest.mark.parametrize("turn", ["0", "-4294"])
+def test_a_time_from_pulse_to_pulse_below_0_is_named_with_its_line(turn, write):
+    lines = ["25", "25.01", turn, *(f"{25 + k / 100}" for k in range(20))]
+    with pytest.raises(TableError, match=r"line 4: a time from pulse to pulse of .* s, above 0 is expected"):
+        read_record(write("dt [ms]\n" + "\n".join(lines) + "\n"))
+
+
+@pytest.mark.parametrize(
+    ("numbers", "unit"),
+    [
+        (25_000 + 2.3 * np.arange(300), "us"),
+        ([21.52, 21.74, 21.61, 22.03, 21.9, 21.77, 21.85, 22.1, 21.99, 22.0], "ms"),  # lower limits
+        (20_000 + 100 * np.sin(np.arange(3000)) + 30_000 * (np.arange(3000) % 150 == 0), "us"),  # light, of 16 bits
+    ],
+)
+def test_numbers_without_a_unit_that_may_be_turns_are_not_guessed(numbers, unit, write):
+    with pytest.raises(TableError, match=rf"times from pulse to pulse are titled as dt \[{unit}\]; of samples say the"):
+        read_record(write("".join(f"{number:.2f}\n" for number in numbers)))
 
 
 def test_times_of_pulses_are_not_added_though_they_could_be_turns(write):
     times = 20 + np.arange(1000) / 30  # as ms they would be turns of 50 to 19 Hz
     record = read_record(write("".join(f"{time:.5f}\n" for time in times)))
     np.testing.assert_allclose(record.times, times, atol=1e-5)
+
+
+@pytest.mark.parametrize("title", ['""', "Tom S", "pulse no. h"])
+def test_the_last_word_of_another_title_is_no_unit(title, write):
+    record = read_record(write(f"{title}\n" + "".join(f"{k / 40:.5f}\n" for k in range(300))))
+    assert record.times[1] == pytest.approx(0.025, rel=1e-12)
 
 
 def test_times_too_near_are_no_times_of_pulses(write):
