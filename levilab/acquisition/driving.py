@@ -401,10 +401,10 @@ def has_drifted(counts: Sequence[float]) -> bool:
     return abs(float(last.mean() - first.mean())) > max(_DRIFTS_BY_U * u, _DRIFTS_HZ)
 
 
-def compare_with_drive(session: Session[D], slip: Slip, **at: float) -> None:
+def compare_with_drive(session: Session[D], slip: Slip, time_s: float | None = None) -> None:
     """Record the difference of a held top's counted spin from its drive; warn of a tape that slips.
 
-    at: `time_s` of the last count, where that was earlier [s].
+    time_s: of the last count, where that was earlier [s].
     """
     difference = with_sign(slip.difference, 3)
     text = Text(
@@ -413,6 +413,7 @@ def compare_with_drive(session: Session[D], slip: Slip, **at: float) -> None:
         spin=slip.spin,
         difference=difference,
     )
+    at = {} if time_s is None else {"time_s": time_s}
     session.event(RunEvent.HELD, text, spin_frequency_hz=slip.spin, drive_frequency_hz=slip.drive, u_hz=slip.u, **at)
     if slip.significant:
         session.warn(slip_as_text(slip))

@@ -164,9 +164,9 @@ def _word(parameter: typer.core.TyperArgument | typer.core.TyperOption, ctx: Any
 
 def _range(low: float | None, high: float | None) -> str | None:
     """Return the range of an option's number as text."""
-    if low is None or high is None:
-        return None if low is None else f"{low:g} or more"
-    return f"{low:g} to {high:g}"
+    if low is not None and high is not None:
+        return f"{low:g} to {high:g}"
+    return f"{low:g} or more" if low is not None else None if high is None else f"{high:g} or less"
 
 
 typer.core.describe_number_range = _range  # type: ignore[assignment, attr-defined]

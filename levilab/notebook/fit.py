@@ -32,7 +32,9 @@ def axes_of(frame: pd.DataFrame, residual: str) -> tuple[str, str]:
 
 def coverage(sigma: float) -> float:
     """Return the coverage of a number of standard deviations; one below 1 is the coverage itself, as for lmfit."""
-    return sigma if 0 < sigma < 1 else math.erf(abs(sigma) / math.sqrt(2))
+    if not 0 < sigma < math.inf:
+        raise UsageError("sigma", "a number above 0 is expected", value=sigma)
+    return sigma if sigma < 1 else math.erf(sigma / math.sqrt(2))
 
 
 def _statistic(name: str) -> Callable[[FittedModel], Any]:
@@ -255,9 +257,11 @@ class FittedModel(Named[Quantity]):
                 is the coverage.
         """
         try:
-            wanted = np.atleast_1d(np.asarray(sigmas, dtype=float)).tolist()
+            wanted = np.ravel(np.asarray(sigmas, dtype=float)).tolist()
         except (TypeError, ValueError):
-            raise UsageError("sigmas", "numbers are expected, as conf_interval([1, 2])['c32']", value=sigmas) from None
+            raise UsageError(
+                "sigmas", "numbers above 0 are expected, as conf_interval([1, 2])['c32']", value=sigmas
+            ) from None
         sides = sorted((coverage(one), self._half_width(one)) for one in wanted)
         ends = [*((p, -k) for p, k in reversed(sides)), (0.0, 0.0), *sides]
         return {name: [(p, one.n + k * one.s if k else one.n) for p, k in ends] for name, one in self.items()}

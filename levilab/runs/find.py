@@ -60,7 +60,8 @@ def _identity(folder: str) -> object:
 _NO_PATHS = (
     (r"\[[^\[\]]+\]",
      '{part:s}: is no path; a unit stands with its column in quotation marks: `columns` = "f=2 {part:s}"'),
-    (r"\w+=[\w ]+", "{part:s}: is no path; columns stand together, with a comma: `columns` = t=1,{part:s}"),
+    (r"\w+=[\w ]+(\[[^\[\]]+\])?",
+     '{part:s}: is no path; columns stand together, with a comma, in quotation marks: `columns` = "t=1,{part:s}"'),
 )  # fmt: skip
 
 

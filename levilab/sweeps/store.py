@@ -94,7 +94,8 @@ class Store:
         Args:
             path: of a folder that does not exist; None: in memory.
             plan: what is to be computed.
-            begin: adds to the store what else it must have; whatever ends the process meanwhile leaves no store behind.
+            begin: adds to the store what else it must have.  An interruption counts once the store is whole; where the
+                process is killed meanwhile, there is none.
 
         Raises:
             CannotWrite: something is there already, or the folder cannot be made.
@@ -109,7 +110,7 @@ class Store:
         if path.exists():
             raise CannotWrite(taken)
         part = path.with_name(f".{path.name}.{computer().process}.part")
-        with interruption_postponed(), writing(f"{path} cannot be made"):  # zarr's tasks would outlive it
+        with interruption_postponed(), writing(f"{path} cannot be made"):  # its tasks outlive an interruption
             try:
                 make_folder(path.parent)
                 cls._in(DurableStore(part), part, plan, begin)

@@ -35,11 +35,15 @@ def read_wav(path: Path) -> Waveform:
             rate, data = wavfile.read(path, mmap=True)
     except (ValueError, struct.error, EOFError, TypeError, ArithmeticError, UnboundLocalError) as error:
         whole, there = _riff_size(path), path.stat().st_size
-        if there < whole:
+        if there < whole < _NO_SIZE:
             what = "is cut off: it holds {there} of {whole} bytes; copy it again, or open it in Audacity and save it"
             raise TableError(path, what, there, whole) from error
         raise TableError(path, _UNREADABLE, _ADVICE) from error
     return _waveform(path, rate, data)
+
+
+#: What a program writes that does not know the size yet, and could not come back to it, as ffmpeg into a pipe.
+_NO_SIZE = 8 + 0xFFFFFFFF
 
 
 def _riff_size(path: Path) -> int:

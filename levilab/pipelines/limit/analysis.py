@@ -196,9 +196,9 @@ class Limits:
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether tops that nothing stops would have floated on for long."""
+        """Whether tops that nothing stops would have floated on for long, or have fallen long before."""
         edge = next((one for one in self.comparisons if one.name == LOWER_EDGE), None)
-        return edge is not None and (edge.difference.value or 0.0) > STOPPED_ABOVE_HZ - FALLS_BETWEEN_HZ[1]
+        return edge is not None and abs(edge.difference.value or 0.0) > STOPPED_ABOVE_HZ - FALLS_BETWEEN_HZ[1]
 
     @property
     def conditions_text(self) -> str:
@@ -261,8 +261,10 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
     def about_run(self, run: Limits) -> Iterable[str]:
         """Yield what to know of one run."""
         if run.is_doubtful:
-            text = "{spin:n} is no lower limit of a top that is left to itself: was it stopped, or held by a drive?"
-            yield Note("stopped", Text(text, spin=with_uncertainty(run.statistics.mean)), weight="doubt")
+            fast = (run.statistics.mean.value or 0.0) > run.device.linear_lower_hz
+            why = "was it stopped, or held by a drive?" if fast else "was each second turn counted?"
+            text = Text("{spin:n} is no lower limit of a top: {why}", with_uncertainty(run.statistics.mean), why)
+            yield Note("stopped", text, weight="doubt")
         yield from warnings_of(run.statistics)
 
 

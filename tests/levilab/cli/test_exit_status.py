@@ -125,7 +125,7 @@ FAILURES = {
     "acquire spin --mock --out file": "choose another place with --out",
     f"analyze spindown {LIMITS}": f"spindown needs a spin run; levilab analyze limit {LIMITS} reads it",
     f"analyze limit {SCOPE}": f"levilab analyze spin {SCOPE} reads it",
-    "analyze spindown file --columns t=1 f=2": "f=2: is no path; columns stand together, with a comma: --columns t=1,",
+    "analyze spindown file --columns t=1 f=2": 'in quotation marks: --columns "t=1,f=2"',
     "analyze spindown nowhere": "nowhere: there is no such file or folder in ",
     "analyze spindown nowhere.toml": "its .toml files are bench.toml",
     "analyze spindown nowhere.csv": ": check the name",

@@ -225,17 +225,6 @@ NO_WAVEFORMS = {
     'FUNC:ARB "nowhere"': 785,
 }  # fmt: skip
 WAVEFORMS = {
-    "DATA:ARB a,0,0,0": -222,  # fewer than eight
-    f"{_EIGHT},1.5": -222, f"{_EIGHT},x": -104, "DATA:ARB a": -109, "DATA:ARB": -109,
-    'DATA:ARB "a b",0,0,0,0,0,0,0,0': -224, "DATA:ARB:DAC a,#19" + "\0" * 9: 800, "DATA:ARB:DAC a,#Q17": -102,
-    'FUNC:ARB "nowhere"': 785,
-}  # fmt: skip
-REFUSED_BY_THE_OLDER = {
-    "DATA mine,1,0": -224, "DATA VOLATILE": -109, "DATA:COPY": -109, "DATA:COPY mine": 785, "DATA:DEL SINC": 786,
-    "DATA VOLATILE,1;:DATA:COPY SINC": 782, "DATA VOLATILE,1;:DATA:COPY mine,SINC": 784, "DATA:DEL mine": 785,
-    "DATA VOLATILE,1;:FUNC:USER VOLATILE;:DATA:DEL VOLATILE": 787, "FUNC:USER mine": 785, "DATA:ATTR:POIN? mine": 785,
-}  # fmt: skip
-WAVEFORMS = {
     "the older one has one, which is built in": (OLD, ("FUNC:USER?", "EXP_RISE"), ("DATA VOLATILE,1,0", None), [-113]),
     "after a reset a built-in waveform is selected": (  # 250 samples at 40 kSa/s, as a public driver lists the state
         *(NEW, ("FUNC:ARB?", FIRST_ARB), ("FUNC:ARB:SRAT?;:FREQ?;:FUNC ARB;FREQ?", [40e3, 1e3, 160])),

@@ -56,6 +56,16 @@ def test_theory_beside_them_is_that_of_the_thesis_top(sample_data, tmp_path):
     assert "below it, likely because a tilted top moves, and is lost sooner." in upper.text
 
 
+@pytest.mark.parametrize(
+    ("spin", "asks"),
+    [(40.0, "was it stopped, or held by a drive?"), (21.9, ""), (10.9, "was each second turn counted?")],
+)
+def test_spins_at_which_no_top_falls_are_doubted(spin, asks, tmp_path):
+    (file := tmp_path / "limits.csv").write_text(f"f [Hz]\n{spin}\n{spin + 0.02}\n{spin - 0.02}\n", encoding="utf-8")
+    doubts = LIMIT.analyze([file]).doubts
+    assert [text.partition(": ")[2] for text in doubts] == ([asks] if asks else [])
+
+
 def test_both_kinds_together_have_values_of_both(sample_data, tmp_path):
     analysis = ANALYSES["limit"].analyze([sample_data])
     document = ANALYSES["limit"].document(analysis, tmp_path)

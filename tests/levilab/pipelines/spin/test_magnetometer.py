@@ -79,7 +79,7 @@ def test_a_top_that_is_stopped_by_hand_shows_no_lower_limit(tmp_path):
     (file := tmp_path / "mine.csv").write_text("38.1\n37.9\n38\n", encoding="utf-8")
     found = ANALYSES["limit"].analyze([file])
     assert "Hz above it, more than a tilt explains." in found.text
-    assert "is no lower limit of a top that is left to itself: was it stopped, or held by a drive?" in found.doubts[0]
+    assert "is no lower limit of a top: was it stopped, or held by a drive?" in found.doubts[0]
 
 
 def test_a_spin_that_is_held_is_compared_with_the_drive(tmp_path, long):
