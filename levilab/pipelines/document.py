@@ -113,7 +113,9 @@ class Analysis(Needs[Any], Generic[A]):
         compared: quantities that groups of a class compare; empty: the constants of the law, or where there is none
             the first quantities.
         apart: why groups have no common value of these, and so no mean; empty: they have.
-        common: why their u are of one cause, so that the mean has the u of one group; empty: they are not.
+        shared_u: the part of a quantity's u that is the same for all inputs of one top or base, which no mean makes
+            smaller: of what is found of an input, the model's name, the quantity's name and its u.
+        common: why this part is there, for people; empty: the models say it.
         curve: the fitted curve of an input, by its number and the model's name, as a function of arrays in SI; None:
             there is none.
         curve_u: its standard uncertainty, likewise.
@@ -145,6 +147,7 @@ class Analysis(Needs[Any], Generic[A]):
     files: Callable[[A], Mapping[str, str]] = lambda _: {}
     compared: tuple[str, ...] = ()
     apart: Callable[[A], str] = lambda _: ""
+    shared_u: Callable[[Any, str, str, float], float] = lambda *_: 0.0
     common: str = ""
     curve: Callable[[A, int, str], Callable[[np.ndarray], np.ndarray]] | None = None
     curve_u: Callable[[A, int, str], Callable[[np.ndarray], np.ndarray]] | None = None

@@ -72,7 +72,7 @@ class Compared:
         together: whether those agree; None where there are none.
         used: whether a group has a value that is neither doubtful nor far from its truth, or no group has.
         apart: why the groups have no common value, and so no mean; empty: they have.
-        shares_u: whether u of the groups is of one cause, so that the mean has the u of one.
+        shared_u: the part of u of each group that is the same in all, which no mean makes smaller.
     """
 
     name: str
@@ -85,7 +85,7 @@ class Compared:
     together: Comparison | None
     used: tuple[bool, ...]
     apart: str = ""
-    shares_u: bool = False
+    shared_u: tuple[float, ...] = ()
 
     @property
     def shown_unit(self) -> str:
@@ -114,12 +114,12 @@ class Compared:
 
         How one top differs from another is in neither.
         """
-        rows = zip(self.widened, self.truths, self.used, strict=True)
-        used = [(one, truth) for one, truth, use in rows if use and one]
-        if self.mean is None or any(truth is None for _, truth in used):
+        rows = zip(self.widened, self.truths, self.shared_u, self.used, strict=True)
+        used = [(one, truth, shared) for one, truth, shared, use in rows if use and one]
+        if self.mean is None or any(truth is None for _, truth, _ in used):
             return None
-        values, truths, u = np.array([(one.value, truth, one.u) for one, truth in used], float).T
-        of_mean = np.linalg.norm(u) / len(used) ** (0.5 if self.shares_u else 1)
+        values, truths, u, shared = np.array([(one.value, truth, one.u, part) for one, truth, part in used], float).T
+        of_mean = np.hypot(np.sqrt(np.sum(u**2 - shared**2)) / len(used), shared.mean())
         return float(truths.mean()), float((values - truths).mean() / of_mean), float(of_mean)
 
     @cached_property
@@ -197,7 +197,9 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
     )
     names = analysis.compared or (_constants(document, model) if has_models else []) or _common(parts)
     doubts = [bool(group.doubts) for group in groups]
-    found_of = (_quantity(name, analysis, model, parts, truths, doubts=doubts) for name in (*names, *more))
+    found_of = (
+        _quantity(name, analysis, model, parts, truths, runs=found.runs, doubts=doubts) for name in (*names, *more)
+    )
     quantities = tuple(one for one in found_of if one.together)
     if why := analysis.apart(found):
         quantities = tuple(
@@ -255,6 +257,7 @@ def _quantity(
     parts: Sequence[Mapping[str, Any]],
     truths: Sequence[Truth],
     *,
+    runs: Sequence[Any],
     doubts: Sequence[bool],
 ) -> Compared:
     found = [_model(part, model).get("parameters", {}).get(name) or part["values"].get(name) for part in parts]
@@ -269,6 +272,9 @@ def _quantity(
         None,
         None,
         tuple(one is not None for one in good),
+        shared_u=tuple(
+            analysis.shared_u(run, model, name, one["u"]) if one else 0.0 for run, one in zip(runs, good, strict=True)
+        ),
     )
     far = [distance is not None and abs(distance) > FAR for distance in of.from_truth]
     used = tuple(bool(one) and not (doubt or off) for one, doubt, off in zip(good, doubts, far, strict=True))
@@ -276,9 +282,9 @@ def _quantity(
     known, widened = ([*filter(None, compress(each, used))] for each in (of.estimates, of.widened))
     if not known:
         return replace(of, used=used)
-    shared = [one.u or 0.0 for one in known] if analysis.common else []
+    shared = [*compress(of.shared_u, used)]
     together = compare(*np.array([(one.value, one.u) for one in widened], float).T)
-    return replace(of, used=used, mean=mean(known, shared), together=together, shares_u=bool(shared))
+    return replace(of, used=used, mean=mean(known, shared), together=together)
 
 
 def _width(freedom: float | None) -> float:
@@ -422,13 +428,9 @@ def agreement(of: Class) -> str:
 def statistics_of_agreement(of: Class) -> str:
     """Return the statistics behind the agreement; empty where no groups were compared."""
     compared = [(one, one.together) for one in of.quantities if one.together and one.together.freedom]
-    rule = (
-        "The mean is unweighted; its u is that of one group and, over √N, the standard deviation of the values."
-        if of.analysis.common
-        else "The mean is unweighted, as in levilab report; its u comes from the standard deviation of the values, or "
-        "is larger by the u of the groups."
-    )
-    meaning = [rule] if compared else []
+    rule = "The mean is unweighted; its u is the larger of s/√N and √Σu²/N (s: standard deviation of the values)."
+    shared = "The part of u that all groups share is not in this Σu²: it is added in quadrature, as no mean reduces it."
+    meaning = [rule, *[shared] * any(any(one.shared_u) for one, _ in compared)] if compared else []
     return Sentences(*meaning, *(_chi_square(one, together) for one, together in compared))
 
 

@@ -1,11 +1,11 @@
 """Scans of the base's field at some paths: each by itself and together."""
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from analysis.field.fit import FieldScan, fit_scan
 from analysis.field.floating import Floating, KnownTop, follow
+from analysis.spindown.combine import mean
 from analysis.uncertainty import Estimate
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.field.device import known_of, known_top, usual
@@ -63,14 +63,19 @@ class FieldAnalysis(Analyzed[FieldReadings, FieldRun, None, FieldOptions]):
     @property
     def values(self) -> Mapping[str, Estimate]:
         """Of one scan what it says; of several means over them."""
-        return self.runs[0].values if len(self.runs) == 1 else means([run.values for run in self.runs])
+        return self.runs[0].values if len(self.runs) == 1 else self.means
+
+    @property
+    def means(self) -> dict[str, Mean]:
+        """Of several scans."""
+        return means([run.values for run in self.runs])
 
     @property
     def text(self) -> str:
         """What the data say, in a few sentences."""
         if len(self.runs) == 1:
             return self.runs[0].text
-        found = means([run.values for run in self.runs])
+        found = self.means
         taken = {name for run in self.runs for name in run.taken}
         return scans_as_text(found, len(self.runs), found["strength"].scatter, taken)
 
@@ -105,19 +110,20 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
     return FieldRun(scan, top, floating, tuple(warnings), taken)
 
 
+def shared_u(u: float) -> float:
+    """Return the part of u of a scan that is common to all: what calliper and data sheet leave open is nearly all."""
+    return u
+
+
 def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:
     """Return unweighted means over scans, of the quantities that all of them have.
 
-    What calliper and data sheet leave open is common to all scans, and no mean makes it smaller: u is that of one scan,
-    or s/√N where the scans scatter more.
+    No mean makes the common part of u smaller: u is that of one scan and, in quadrature, s/√N.
     """
     names = [name for name in runs[0] if all(name in run for run in runs)]
     found = {}
     for name in names:
-        values = [run[name].value or 0.0 for run in runs]
-        sizes = [run[name].u or 0.0 for run in runs]
-        n, mean = len(values), sum(values) / len(values)
-        scatter = math.sqrt(sum((value - mean) ** 2 for value in values) / (n - 1))
-        u = max(math.sqrt(sum(size**2 for size in sizes) / n), scatter / math.sqrt(n))
-        found[name] = Mean(mean, u, runs[0][name].unit, scatter=scatter, runs=n)
+        of_runs = [run[name] for run in runs]
+        of_all = mean(of_runs, [shared_u(one.u or 0.0) for one in of_runs])
+        found[name] = Mean(of_all.value, of_all.u, of_all.unit, scatter=of_all.scatter or 0.0, runs=len(runs))
     return found

@@ -10,7 +10,7 @@ from analysis.budget import Budget, Component
 from analysis.field.fit import UNITS, FieldScan, UPart, parts_of
 from analysis.uncertainty import Estimate
 from levilab.pipelines.document import Analysis, statistics_of, value_of, values_of
-from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun, Mean, analyze_source
+from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun, Mean, analyze_source, shared_u
 from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
 from levilab.pipelines.field.report import field_columns, field_part, field_tables
 from levilab.pipelines.field.words import FIELD_ROW, QUANTITIES, remark
@@ -111,20 +111,17 @@ def budget_of_all(analysis: FieldAnalysis) -> tuple[Budget, ...]:
 
 
 def _of_mean(analysis: FieldAnalysis, name: str, budgets: Sequence[Budget]) -> Budget:
-    """Return u of a mean: that of one scan, in the square mean, or s/√N where the scans scatter more."""
-    mean, n = analysis.values[name], len(budgets)
+    """Return u of a mean: that of one scan, and s/√N."""
+    mean, n = analysis.means[name], len(budgets)
     u = mean.u or 0.0
-    own = math.sqrt(sum(one.u**2 for one in budgets) / n)
-    if u > own * (1 + 1e-9):
-        remedy = Text("more scans: it takes {more} instead of {n} to halve it", more=4 * n, n=n)
-        scatter = Component("runs", "scatter between the scans", "A", u * math.sqrt(n), mean.unit, 1 / math.sqrt(n),
-                            note=Text("standard deviation of one scan from another, {n} scans", n=n),
-                            remedy=remedy)  # fmt: skip
-        return Budget(name, mean.value or 0.0, u, mean.unit, (scatter,))
-    rows = []
+    sizes = np.array([one.u for one in budgets])
+    remedy = Text("more scans: it takes {more} instead of {n} to halve it", more=4 * n, n=n)
+    note = Text("standard deviation of one scan from another, {n} scans", n=n)
+    rows = [Component("runs", "scatter between the scans", "A", mean.scatter, mean.unit, 1 / math.sqrt(n),
+                      note=note, remedy=remedy)] * (mean.scatter > 0)  # fmt: skip
     for part in dict.fromkeys(row.name for one in budgets for row in one.included):
         found = [row for one in budgets for row in one.included if row.name == part]
-        size = math.sqrt(sum((row.contribution or 0.0) ** 2 for row in found) / n)
+        size = float(np.linalg.norm([row.contribution or 0.0 for row in found]) / np.linalg.norm(sizes) * sizes.mean())
         first = found[0]
         same = len({row.u for row in found}) == 1 and first.u
         size_u, unit, by = (first.u, first.unit, size / first.u) if same and first.u else (size, mean.unit, 1.0)
@@ -182,4 +179,6 @@ FIELD = Analysis(
     curve=lambda analysis, number, _: analysis.runs[number].scan.model,
     curve_u=lambda analysis, number, _: analysis.runs[number].scan.u_model,
     compared=("strength", "origin", "thickness"),
+    shared_u=lambda *found_of: shared_u(found_of[-1]),
+    common="Calliper and data sheet are the same for all scans, so the mean keeps the u of one group.",
 )

@@ -352,6 +352,10 @@ def _check_models(run: SpinDown) -> str:
     return f"its result has a drag law that this version lacks, {unknown[0]}" if unknown else ""
 
 
+def _shared_u(run: SpinDown, law: str, name: str, _: float) -> float:
+    return next((fit.shared_u.get(name, 0.0) for fit in run.fits if fit.name == law), 0.0)
+
+
 SPINDOWN = Analysis(
     name="spindown",
     experiments=frozenset({EXPERIMENT}),
@@ -375,6 +379,7 @@ SPINDOWN = Analysis(
     columns=spindown_columns,
     row=SPINDOWN_ROW,
     symbols=SYMBOLS,
+    shared_u=_shared_u,
     curve=spindown_curve,
     curve_u=spindown_curve_u,
 )

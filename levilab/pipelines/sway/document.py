@@ -84,6 +84,7 @@ SWAY = Analysis(
     columns=sway_columns,
     row=SWAY_ROW,
     symbols=symbols_of(QUANTITIES),
-    common="χ²/dof is that of a run's windows: above 1 they differ by more than their u, nearly alike in all runs, so "
-    "u is larger, and the mean keeps the u of one group.",
+    shared_u=lambda *found_of: found_of[-1],
+    common="χ²/dof compares the windows of one run: above 1 they differ by more than their u, which is made larger. "
+    "All runs have nearly the same differences, so the mean keeps the u of one group.",
 )

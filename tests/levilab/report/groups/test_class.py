@@ -15,7 +15,18 @@ from levilab.crosscheck.truth import Truth
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.suits import save
-from levilab.report.beside import DIFFER, GOOD, REPEAT, _quantity, _width, agreement, class_of, finding, verdict
+from levilab.report.beside import (
+    DIFFER,
+    GOOD,
+    REPEAT,
+    _quantity,
+    _width,
+    agreement,
+    class_of,
+    finding,
+    statistics_of_agreement,
+    verdict,
+)
 from levilab.report.groups.document import write_class
 from levilab.report.groups.figure import class_figure
 from levilab.report.page import render
@@ -170,7 +181,7 @@ def test_runs_of_several_scenes_are_named_where_a_truth_is_not_known(of_three, t
 @pytest.mark.parametrize(("value", "u"), [(1.0, float("nan")), (1.0, 0.0), (1.0, None), (float("nan"), 1.0)])
 def test_a_value_without_a_finite_u_is_not_compared(value, u):
     parts = [{"values": {"mean": {"value": one, "u": of, "unit": "Hz"}}} for one, of in [(1.0, 0.1), (value, u)]]
-    quantity = _quantity("mean", ANALYSES["limit"], "", parts, [Truth(), Truth()], doubts=[False, False])
+    quantity = _quantity("mean", ANALYSES["limit"], "", parts, [Truth(), Truth()], runs=parts, doubts=[False, False])
     assert [one is None for one in quantity.estimates] == [False, True]
     assert quantity.mean.value == 1.0
 
@@ -178,9 +189,43 @@ def test_a_value_without_a_finite_u_is_not_compared(value, u):
 def test_no_number_of_groups_makes_the_u_of_the_sway_smaller_which_is_common_to_them():
     parts = [{"values": {"ratio": {"value": 1.0028 + k * 1e-4, "u": 0.0018, "unit": "1"}}} for k in range(8)]
     truth = Truth({"ratio": 1.0})
-    of = [_quantity("ratio", ANALYSES["sway"], "", parts[:n], [truth] * n, doubts=[False] * n) for n in (1, 2, 8)]
+    of = [
+        _quantity("ratio", ANALYSES["sway"], "", parts[:n], [truth] * n, runs=parts[:n], doubts=[False] * n)
+        for n in (1, 2, 8)
+    ]
     assert [one.mean.u for one in of] == pytest.approx([0.0018] * 3, rel=0.01)
     assert [one.truth[1] for one in of] == pytest.approx([1.6] * 3, abs=0.2)
+
+
+def scans_of_one_base(root):
+    """Four groups scan one base: a noise of their own, and the calliper of one group."""
+    for k in range(4):
+        scan = shutil.copytree(SAMPLE_DATA / "field-scan", root / f"G{k}" / "scan")
+        head, *rows = (scan / "readings.csv").read_text(encoding="utf-8").splitlines()
+        cells = [row.split(",") for row in rows]
+        column, noise = head.split(",").index("flux_density_t"), 5e-5 * np.random.default_rng(k).normal(size=len(rows))
+        for row, more in zip(cells, noise, strict=True):
+            row[column] = str(float(row[column]) + more)
+        (scan / "readings.csv").write_text("\n".join([head, *map(",".join, cells)]), encoding="utf-8")
+    return root
+
+
+def test_the_mean_of_a_class_has_the_u_of_the_analysis_of_its_runs(tmp_path):
+    of = compared(scans_of_one_base(tmp_path), "field")
+    for one in of.quantities:
+        assert one.mean.u == pytest.approx(of.found.values[one.name].u)
+        assert one.mean.u >= np.mean([group.u for group in one.estimates])
+    assert "added in quadrature" in statistics_of_agreement(of)
+    for budget in ANALYSES["field"].budget_of_all(of.found):
+        assert budget.u == pytest.approx(np.sqrt(sum(row.contribution**2 for row in budget.included)))
+
+
+def test_what_a_tilt_leaves_to_the_drag_is_no_smaller_in_the_mean_of_a_class(of_three):
+    row = ANALYSES["spindown"]
+    of = class_of(row, row.analyze([of_three], row.options(tilt="fitted")))
+    (c32,) = of.quantities
+    assert all(c32.shared_u)
+    assert c32.mean.u == pytest.approx(of.found.combined.fit("disc").constants["c32"].u)
 
 
 @pytest.mark.parametrize(("experiment", "names"), [("field", ["strength", "origin", "thickness"]), ("limit", ["mean"])])
