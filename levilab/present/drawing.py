@@ -213,9 +213,10 @@ _RAISED = re.compile(r"\^(?:\(([^()]+)\)|(−?(?:½|\d+/\d+)))")
 
 
 def in_mathtext(text: str) -> str:
-    """Return plain notation as matplotlib's labels have it: what follows ^ is raised.
+    """Return plain notation as matplotlib's labels have it: what follows ^ is raised, the fraction of C₃/₂ lowered.
 
     >>> in_mathtext("ω̇ = −C₃/₂ω^(3/2)"), in_mathtext("(rad/s)^−½/s")
-    ('ω̇ = −C₃/₂ω$^{3/2}$', '(rad/s)$^{−1/2}$/s')
+    ('ω̇ = −C$_{3/2}$ω$^{3/2}$', '(rad/s)$^{−1/2}$/s')
     """
-    return _RAISED.sub(lambda found: f"$^{{{(found[1] or found[2]).replace('½', '1/2')}}}$", text)
+    raised = _RAISED.sub(lambda found: f"$^{{{(found[1] or found[2]).replace('½', '1/2')}}}$", text)
+    return raised.replace("₃/₂", "$_{3/2}$")

@@ -247,10 +247,10 @@ def _draw_by_run(axes: Axes, analysis: SpinDownAnalysis) -> None:
     few = len(found) <= MOST_BARS
     axes.errorbar(number, value, u if few else None, color="black", linestyle="none", elinewidth=0.6)
     axes.plot(number, value, color="black", linestyle="none", marker="o", markersize=2.5 if few else 1.2)
-    unit = in_mathtext(unit_row(mean.unit).text)
+    symbol, unit = in_mathtext(SYMBOLS[name]), in_mathtext(unit_row(mean.unit).text)
     groups = [_legend_text(source.group) for source in analysis.sources if source.group]
-    axes.set(xlabel=f"{groups[0]} … {groups[-1]}" if groups else "run", ylabel=f"{SYMBOLS[name]}  [{times}{unit}]")
-    axes.set_title(Text("{symbol}, {law}: mean, ±s", symbol=SYMBOLS[name], law=short_law(best.name)), pad=3, fontsize=8)
+    axes.set(xlabel=f"{groups[0]} … {groups[-1]}" if groups else "run", ylabel=f"{symbol}  [{times}{unit}]")
+    axes.set_title(Text("{symbol}, {law}: mean, ±s", symbol=symbol, law=short_law(best.name)), pad=3, fontsize=8)
 
 
 # --- what the laws differ from each other --------------------------------------------------------------

@@ -68,8 +68,8 @@ def _draw_values(axes: Axes, of: Compared) -> None:
             axes.plot(truth * scale, k, marker="D", markersize=5, color=VERMILION, markerfacecolor="none")
         if one is not None and one.value is not None and one.u is not None:
             axes.errorbar(one.value * scale, k, xerr=one.u * scale, fmt="o", markersize=3, color="black", elinewidth=1)
-    shown = in_mathtext(of.shown_unit)
-    axes.set_xlabel(f"{of.symbol}  [{times}{shown}]" if times or shown else of.symbol, fontsize=8)
+    symbol, shown = in_mathtext(of.symbol), in_mathtext(of.shown_unit)
+    axes.set_xlabel(f"{symbol}  [{times}{shown}]" if times or shown else symbol, fontsize=8)
 
 
 def _draw_distances(axes: Axes, quantities: Sequence[Compared]) -> None:
