@@ -4,7 +4,8 @@ import json
 import os
 import re
 import zipfile
-from collections.abc import Iterator, Sequence
+import zlib
+from collections.abc import Collection, Iterator, Sequence
 from pathlib import Path
 
 from levilab.formats.waveforms.record import SEARCHED
@@ -41,6 +42,17 @@ def _analysis_of(result: Path) -> str:
         return str(json.loads(result.read_bytes())["analysis"])
     except (OSError, ValueError, LookupError, TypeError):
         return ""
+
+
+def is_archive_of(path: Path, runs: Collection[Path]) -> bool:
+    """Return whether a file is a zip of runs that lie unpacked, too: of one beside it, or with the same records."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = [member for member in archive.infolist() if Path(member.filename).name == RECORD]
+    except (OSError, ValueError, zipfile.BadZipFile):
+        return False
+    records = {zlib.crc32((run / RECORD).read_bytes()) for run in runs}
+    return bool(members) and (path.with_suffix("") in runs or records.issuperset(member.CRC for member in members))
 
 
 #: How names of files begin that are not a person's.

@@ -16,6 +16,7 @@ from levilab.errors import DataError, check_ending
 from levilab.files import check_writable
 from levilab.formats.texts import locate
 from levilab.pipelines.analyzed import A
+from levilab.pipelines.inputs.files import is_archive_of
 from levilab.pipelines.inputs.names import short_paths, with_short_names
 from levilab.pipelines.inputs.search import Found
 from levilab.pipelines.inputs.unread import (
@@ -408,6 +409,9 @@ def write_class(
     results = _each_reading_once(recall_suiting(paths, given or {}, skips=True))
     unread, others = _left_out(results)
     copies = _copies(results)
+    used = [source.path for _, found in results for source in found.sources]
+    runs = [path for path in (*used, *copies, *unread) if (path / RECORD).exists()]
+    unread = {path: why for path, why in unread.items() if not (path.is_file() and is_archive_of(path, runs))}
     folder_of = _folders_of_groups(results, [*unread, *copies, *copies.values()])
     results = _with_folders_as_groups(results, folder_of)
     classes = [class_of(analysis, found) for analysis, found in results]

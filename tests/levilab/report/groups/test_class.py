@@ -152,6 +152,21 @@ def test_a_group_with_the_seed_of_another_one_is_named_and_two_copies_of_a_run_a
     assert "Group 3 repeat holds the same readings as Group 2: a group needs a seed or a file of its own" in page
 
 
+def test_a_zip_beside_the_run_that_it_holds_is_no_group_and_one_alone_is(of_three, tmp_path):
+    root = with_changes(of_three, tmp_path / "class", "", {})
+    first, second, alone = sorted(root.glob("2*"))
+    for name, run in (("sent", first), (second.name, second), ("alone", alone)):
+        shutil.make_archive(str(root / name), "zip", root, run.name)
+    shutil.rmtree(alone)
+    (second / RECORD).write_text((second / RECORD).read_text(encoding="utf-8") + "\n", encoding="utf-8")
+    for paths in ([root], sorted(root.iterdir())):
+        page = Page(write_class(paths, tmp_path / "class.html").read_text(encoding="utf-8")).text
+        assert "Class of 3 groups" in page
+        assert "2 of 3 results are good. To repeat: alone.zip." in page
+        assert "sent.zip" not in page.split("Made by")[0]
+        assert f"{second.name}.zip" not in page.split("Made by")[0]
+
+
 def test_a_run_given_twice_is_named(of_three, tmp_path):
     root = with_changes(of_three, tmp_path, "Group 2", {})
     run, *_ = sorted(root.glob("2*"))
