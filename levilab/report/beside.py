@@ -146,7 +146,7 @@ class Class:
         found: what it found.
         model: the law whose constants are compared, that of most seeds; empty where the analysis has one model.
         others: the law of each group's seed where that is another one, by the group's name.
-        unread: why inputs could not be used, by their names.
+        unread: what to do about inputs that are not among the groups, by their names.
     """
 
     analysis: Analysis[Any]
@@ -155,7 +155,7 @@ class Class:
     groups: tuple[Group, ...]
     quantities: tuple[Compared, ...]
     others: Mapping[str, str]
-    unread: Mapping[str, str] = field(default_factory=dict)
+    unread: Mapping[str, Mark] = field(default_factory=dict)
 
     @cached_property
     def marks(self) -> tuple[Mark, ...]:
@@ -362,7 +362,8 @@ def count_marks(of: Class) -> str:
     named: dict[str, list[str]] = {GOOD: [], LOOK: [], REPEAT: []}
     for group, one in zip(of.groups, of.marks, strict=True):
         named[one.word].append(group.source.name)
-    named[REPEAT] += of.unread
+    for name, mark in of.unread.items():
+        named[mark.word].append(name)
     good = len(named[GOOD])
     said = "{n} of {all} results is good." if good == 1 else "{n} of {all} results are good."
     texts: list[str] = [Text(said, n=good, all=len(of.groups) + len(of.unread))]

@@ -1,5 +1,6 @@
 """Notes on data as data: of which kind and weight, and whether their text names the input."""
 
+from pathlib import Path
 from typing import Any, Literal, Self
 
 from levilab.texts.text import Text
@@ -16,31 +17,41 @@ class Note(Text):
         kind: notes of one kind are alike, whatever their values.
         weight: whether advice, a warning or a doubt.
         names_input: whether its text names the input that it is about.
+        paths: of the inputs that it is about, where a program needs them.
     """
 
-    __slots__ = ("kind", "names_input", "weight")
+    __slots__ = ("kind", "names_input", "paths", "weight")
     kind: str
     weight: Weight
     names_input: bool
+    paths: tuple[Path, ...]
 
-    def __new__(cls, kind: str, text: str, *, weight: Weight = "warning", names_input: bool = False) -> Self:
+    def __new__(
+        cls,
+        kind: str,
+        text: str,
+        *,
+        weight: Weight = "warning",
+        names_input: bool = False,
+        paths: tuple[Path, ...] = (),
+    ) -> Self:
         """Make it of a text."""
         self = super().__new__(cls, "{text}", text=text)
-        self.kind, self.weight, self.names_input = kind, weight, names_input
+        self.kind, self.weight, self.names_input, self.paths = kind, weight, names_input, paths
         return self
 
     def __reduce__(self) -> Any:
         """Return how it is made again in another process."""
-        return _note, (self.kind, self.values["text"], self.weight, self.names_input)
+        return _note, (self.kind, self.values["text"], self.weight, self.names_input, self.paths)
 
 
-def _note(kind: str, text: str, weight: Weight, names_input: bool) -> Note:  # noqa: FBT001 - of a pickle
-    return Note(kind, text, weight=weight, names_input=names_input)
+def _note(kind: str, text: str, weight: Weight, names_input: bool, paths: tuple[Path, ...]) -> Note:  # noqa: FBT001 - of a pickle
+    return Note(kind, text, weight=weight, names_input=names_input, paths=paths)
 
 
-def of_file(kind: str, text: str, weight: Weight = "warning") -> Note:
+def of_file(kind: str, text: str, weight: Weight = "warning", paths: tuple[Path, ...] = ()) -> Note:
     """Return a note whose text names its file."""
-    return Note(kind, text, weight=weight, names_input=True)
+    return Note(kind, text, weight=weight, names_input=True, paths=paths)
 
 
 def kind_of(text: str) -> str:

@@ -18,9 +18,10 @@ SKIP = ".levilab-skip"
 def data_files(root: Path) -> list[Path]:
     """Find the files at or below a folder that may hold data, by name; those of runs belong to their runs.
 
-    A folder below with a file `SKIP` is left out, with all in it.
+    A folder below with a file `SKIP` is left out, with all in it.  A browser's `a (1).csv` comes after `a.csv`.
     """
-    return sorted(path for path in _files(root) if path.suffix.casefold() in SEARCHED)
+    files = (path for path in _files(root) if path.suffix.casefold() in SEARCHED)
+    return sorted(files, key=lambda path: (path.with_suffix(""), path))
 
 
 def other_files(root: Path) -> list[Path]:

@@ -104,7 +104,8 @@ def _without_copies(found: Sequence[Source[R]], warnings: list[str]) -> list[Sou
             cells.setdefault((length, cell), []).append(source)
         elif first.data.resolve() != source.data.resolve():
             text = "{path:s}: holds the same readings as {other:s}, counted once"
-            warnings.append(of_file("same readings", Text(text, source.path, first.path)))
+            said = Text(text, source.path, first.path)
+            warnings.append(of_file("same readings", said, paths=(source.path, first.path)))
     return kept
 
 

@@ -52,6 +52,7 @@ from levilab.report.beside import (
     REPEAT,
     Class,
     Compared,
+    Mark,
     agreement,
     class_of,
     count_readings,
@@ -68,7 +69,8 @@ from levilab.report.reproduction import Heading, language_option
 from levilab.report.tables.values import unit_of_residuals
 from levilab.runs.find import RECORD
 from levilab.runs.run import Run, read_record
-from levilab.texts.note import kind_of, of_file
+from levilab.texts.note import Note as OneNote
+from levilab.texts.note import of_file
 from levilab.texts.text import Sentences, Text, spoken, verbatim
 
 if TYPE_CHECKING:
@@ -151,10 +153,29 @@ def _why_unread(path: Path) -> str:
 
 
 def _copies(results: Results) -> dict[Path, Path]:
-    """Return the inputs that were left out as they hold the readings of another one, and that."""
-    notes = [text for _, found in results for text in found.warnings if kind_of(text) == "same readings"]
-    said = [note.values["text"].values for note in notes if isinstance(note, Text)]
-    return {Path(values["path"]): Path(values["other"]) for values in said}
+    """Return the inputs that were left out, each with the input whose readings it holds."""
+    texts = (text for _, found in results for text in found.warnings)
+    notes = (text for text in texts if isinstance(text, OneNote) and text.kind == "same readings")
+    return {note.paths[0]: note.paths[1] for note in notes}
+
+
+def _of_two_groups(path: Path, first: Path, folder_of: Callable[[Path], str]) -> bool:
+    """Return whether two inputs are of two groups: copies of one group, or without a group, are one input."""
+    return folder_of(path) != folder_of(first) and bool(folder_of(path) and folder_of(first))
+
+
+def _look_at_copy(other: str) -> Mark:
+    said = "holds the same readings as {other:s}: a group needs a seed or a file of its own"
+    return Mark(LOOK, (Text(said, other),))
+
+
+def _with_copies(of: Class, copies: Mapping[str, Path]) -> Class:
+    """Return a class whose groups have a remark on each other group with the same readings."""
+    groups = []
+    for group in of.groups:
+        remarks = [_look_at_copy(name).why[0] for name, first in copies.items() if first == group.source.path]
+        groups.append(replace(group, warnings=(*group.warnings, *remarks)))
+    return replace(of, groups=tuple(groups))
 
 
 def _with_folders_as_groups(results: Results, folder_of: Callable[[Path], str]) -> Results:
@@ -261,15 +282,15 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
 
 def _marks(of: Class) -> Iterator[Tabular]:
     """Yield a row for each group whose result is not good, and why; nothing where all are."""
+    names = (group.source.name for group in of.groups)
     rows = [
-        Row((group.source.name, mark.word, Sentences(*mark.why, between="\n")), _ROWS[mark.word])
-        for group, mark in zip(of.groups, of.marks, strict=True)
+        Row((name, mark.word, Sentences(*mark.why, between="\n")), _ROWS[mark.word])
+        for name, mark in (*zip(names, of.marks, strict=True), *of.unread.items())
         if mark.word != GOOD
     ]
-    rows += [Row((name, REPEAT, why), _ROWS[REPEAT]) for name, why in of.unread.items()]
     note = Text(
-        "repeat: not read, another group's readings, no value, or one more than {far:.0f} u from its truth, or a doubt "
-        "about the readings; look: a warning, or, where no truth is known, more than {far:.0f} u from the others.",
+        "repeat: not read, no value, or one more than {far:.0f} u from its truth, or a doubt about the readings; look: "
+        "a warning, another group's readings, or, where no truth is known, more than {far:.0f} u from the others.",
         far=FAR,
     )
     if rows:
@@ -416,15 +437,15 @@ def write_class(
     results = _with_folders_as_groups(results, folder_of)
     classes = [class_of(analysis, found) for analysis, found in results]
     classes.sort(key=lambda of: -len(of.groups))  # what one group alone measured comes last
-    missing = {path: Text(_why_unread(path), problem=plain_text(why)) for path, why in unread.items()}
+    missing = {path: Mark(REPEAT, (Text(_why_unread(path), problem=plain_text(why)),)) for path, why in unread.items()}
     names = {source.path: source.name for _, found in results for source in found.sources}
-    for path, first in copies.items():
-        of_run = first.is_dir() and not path.is_dir() and not folder_of(path)  # as an export, which is no group
-        if (folder_of(path) or path.name) != (folder_of(first) or first.name) and first in names and not of_run:
-            said = "holds the same readings as {other:s}: a group needs a seed or a file of its own"
-            missing[path] = Text(said, names[first])
-    named = _names_of_unread([*missing], results, folder_of)
-    classes[0] = replace(classes[0], unread=dict(zip(named, missing.values(), strict=True)))
+    copies = {
+        path: first for path, first in copies.items() if first in names and _of_two_groups(path, first, folder_of)
+    }
+    missing |= {path: _look_at_copy(names[first]) for path, first in copies.items()}
+    named = dict(zip(missing, _names_of_unread([*missing], results, folder_of), strict=True))
+    classes = [_with_copies(of, {named[path]: first for path, first in copies.items()}) for of in classes]
+    classes[0] = replace(classes[0], unread={named[path]: mark for path, mark in missing.items()})
     date = newest_of(results)
     if form:
         groups = [folder_of(path) or path.name for path in missing]

@@ -105,7 +105,7 @@ def _groups(of: Class) -> tuple[list[str], list[list[Cell]]]:
         fit = [count_readings(group), *map(group.statistics.get, names)]
         own = [column[k] for column in columns]
         rows.append([*about, *own, *fit, group.best_model])
-    rows += [[name, in_language(REPEAT), in_language(why)] for name, why in of.unread.items()]
+    rows += [[name, in_language(mark.word), "\n".join(map(in_language, mark.why))] for name, mark in of.unread.items()]
     return heads, rows
 
 

@@ -130,13 +130,16 @@ def test_a_folder_is_the_group_of_its_files(tmp_path):
 
 
 def test_files_of_one_folder_and_runs_of_no_group_are_each_by_itself(tmp_path):
-    """The folder that holds all of them is no group."""
+    """The folder that holds all of them is no group; a browser's duplicate and a run copied there are none, too."""
     for name in ("anna", "ben"):
         spin_down_csv(tmp_path / f"{name}.csv", seed=len(name))
         shutil.copytree(SAMPLE_DATA / "spin-down-1", tmp_path / "runs" / name)
+    shutil.copy(tmp_path / "anna.csv", tmp_path / "anna (1).csv")
     page = Page(write_class([tmp_path], tmp_path / "class.html").read_text(encoding="utf-8")).text
-    assert "Class of 4 runs" in page
-    assert re.search(r"2 of 4 results .* To repeat: ben.*ben repeat holds the same readings as anna", page, re.DOTALL)
+    assert "Class of 3 runs" in page
+    assert "To repeat" not in page
+    for name, copied in (("anna (1).csv", "anna.csv"), ("ben", "anna")):
+        assert re.search(rf"{re.escape(name)}: holds the same readings as \S*{re.escape(copied)}, counted once", page)
 
 
 def test_a_group_with_the_seed_of_another_one_is_named_and_two_copies_of_a_run_are_not(of_three, tmp_path):
@@ -148,8 +151,10 @@ def test_a_group_with_the_seed_of_another_one_is_named_and_two_copies_of_a_run_a
         (root / name / RECORD).write_text(json.dumps(record | {"group": group}), encoding="utf-8")
     page = Page(write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")).text
     assert "Class of 4 groups" in page
-    assert "3 of 4 results are good. To repeat: Group 3." in page
-    assert "Group 3 repeat holds the same readings as Group 2: a group needs a seed or a file of its own" in page
+    assert "2 of 4 results are good. To look at: Group 2 and Group 3." in page
+    assert "mean of 3 groups" in page
+    for name, other in (("Group 2", "Group 3"), ("Group 3", "Group 2")):
+        assert f"{name} look holds the same readings as {other}: a group needs a seed or a file of its own" in page
 
 
 def test_a_zip_beside_the_run_that_it_holds_is_no_group_and_one_alone_is(of_three, tmp_path):
