@@ -54,15 +54,18 @@ def numbers(findings: Sequence[Finding]) -> list[str]:
     return [str(n) for n in (*agreeing(findings).values(), *others)]
 
 
+#: How values and statements agree, in the order of `agreeing`.
+_HOW = (
+    "with what a source prints or says", "within the range that starts alike leave open", "after a fit to them",
+    "by construction", "with a second computation of our own",
+)  # fmt: skip
+
+
 def in_words(found: Reproduction) -> str:
     """Return the counts in a sentence."""
     agree, differ, added, unexpected = (found.counts[verdict] for verdict in Verdict)
-    independent, ranges, fitted, constructed, recomputed = agreeing(found.findings).values()
-    said = (
-        f"{agree} values and statements agree: {independent} with what a source prints or says, {ranges} within the "
-        f"range that starts alike leave open, {recomputed} with a second computation of our own, {constructed} by "
-        f"construction, {fitted} after a fit to them. {differ} differ for a reason that was computed, too"
-    )
+    how = ", ".join(f"{n} {how}" for how, n in zip(_HOW, agreeing(found.findings).values(), strict=True) if n)
+    said = f"{agree} values and statements agree: {how or 'none'}. {differ} differ for a reason that was computed, too"
     facts = "1 fact stands" if added == 1 else f"{added} facts stand"
     more = f", and {facts} beside them that the sources do not have" if added else ""
     return said + (f", {unexpected} are UNEXPECTED" if unexpected else ", none is unexpected") + more + "."

@@ -39,7 +39,7 @@ def test_a_report_has_its_verdicts_and_is_the_same_each_time_and_never_markup():
     assert "<b>one</b>" not in page
     assert page.count("SYNTHETIC.") >= 3
     assert "1 are UNEXPECTED" in page
-    assert "1 values and statements agree: 1 with what a source prints or says, 0 within" in page
+    assert "1 values and statements agree: 1 with what a source prints or says. 0 differ" in page
 
 
 def test_the_command_prints_a_table_and_writes_a_report(tmp_path):
