@@ -72,7 +72,7 @@ _RESULT, _CORRECTION = re.compile(r"result(\.\w+)?\.json$"), ".levilab.toml"
 
 
 def _exports(folder: Path, files: Sequence[str]) -> Iterator[str]:
-    """Yield the tables of exports and the spreadsheets of several inputs; readings of one input are as good as its."""
+    """Yield the tables of exports and the spreadsheets of several inputs; the readings of one are an input, too."""
     for name in files:
         stem = name.removesuffix(".result.csv")
         if stem != name and _begin(folder / name).startswith(_EXPORT):

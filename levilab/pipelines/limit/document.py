@@ -145,7 +145,7 @@ def _renumber(groups: tuple[Limits, ...], order: Sequence[int]) -> tuple[Limits,
 
 def _apart(analysis: LimitAnalysis) -> str:
     both = len({run.which for run in analysis.runs}) > 1
-    return "some groups measured lower limits, others upper ones: give the runs of each alone" if both else ""
+    return "some groups measured lower limits, others upper ones; compare each kind alone" if both else ""
 
 
 LIMIT = Analysis(

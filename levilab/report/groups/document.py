@@ -353,7 +353,7 @@ def _groups(of: Class) -> Tabular:
             plain(group.statistics.get("rms_residual")),
             plain(group.statistics.get("reduced_chi_square"), 2),
             group.best_model,
-            group.source.path.name,
+            verbatim(group.source.path.name),
         )
         for group in of.groups
     ]

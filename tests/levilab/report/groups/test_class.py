@@ -31,6 +31,7 @@ from levilab.report.groups.document import write_class
 from levilab.report.groups.figure import class_figure
 from levilab.report.page import render
 from levilab.runs.find import RECORD
+from levilab.texts.text import speaking
 from levilab.world.spin_world import SpinScene, random_scene
 from support.acquisitions import RAISED_QUICKLY, acquired
 from support.pages import Page
@@ -236,6 +237,10 @@ def test_the_mean_of_a_class_has_the_u_of_the_analysis_of_its_runs(tmp_path):
         assert one.mean.u == pytest.approx(of.found.values[one.name].u)
         assert one.mean.u >= np.mean([group.u for group in one.estimates])
     assert "added in quadrature" in statistics_of_agreement(of)
+    with speaking("de"):
+        page = write_class([tmp_path], tmp_path / "class.html").read_text(encoding="utf-8")
+    assert "kommt quadratisch hinzu" in page
+    assert len(re.findall(r"<td[^>]*>scan</td>", page)) == 4  # a folder's name has no language
     for budget in ANALYSES["field"].budget_of_all(of.found):
         assert budget.u == pytest.approx(np.sqrt(sum(row.contribution**2 for row in budget.included)))
 
@@ -297,7 +302,9 @@ def test_lower_and_upper_limits_have_no_mean(tmp_path):
         (tmp_path / kind / RECORD).write_text(json.dumps(record | {"group": kind}), encoding="utf-8")
     of = compared(tmp_path, "limit")
     assert all(of.quantities[0].estimates)
-    assert "The groups have no common mean: some groups measured lower limits, others upper ones" in verdict(of)
+    assert "no common mean: some groups measured lower limits, others upper ones; compare each kind alone." in verdict(
+        of
+    )
 
 
 def test_page_and_pdf_begin_with_the_result(of_three, tmp_path):
