@@ -15,7 +15,7 @@ from levilab.formats.columns import Choice, Doubt, DoubtfulRows
 from levilab.formats.table import read_table
 from levilab.formats.texts import locate
 from levilab.formats.titles import COMPONENTS, MAGNITUDE, dimension
-from levilab.formats.understanding import UnderstoodColumn, UnderstoodRun, understand
+from levilab.formats.understanding import UnderstoodColumn, UnderstoodRun, is_possible_spin, understand
 from levilab.formats.waveforms.header import NoRate, NoWaveform
 from levilab.formats.waveforms.record import read_record
 from levilab.formats.waveforms.waveform import PulseTimes, Waveform
@@ -124,6 +124,8 @@ def look_at(path: Path, options: Mapping[str, Any], *, plots: bool = True) -> Lo
         record = read_record(path, columns=columns, rate=options.get("rate"))
     except LevilabError as error:
         look = _look_at_table(path, options, plots=plots)
+        if look.problem and (limits := _look_at_limits(path)):
+            return limits
         is_record = isinstance(error, NoRate) or not isinstance(error, NoWaveform)
         return Look(path, "", look.runs, text_of(error)) if look.problem and is_record else look
     try:
@@ -212,6 +214,17 @@ def _plots_of_table(run: UnderstoodRun, given: Mapping[str, Any], wanted: tuple[
     components = [name for name in others if dimension(name) == "flux density" and name != MAGNITUDE]
     drawn = components or others[:1] or [first]
     return tuple(Plot(x, y, x_axis, y_axis) for y, y_axis in map(points, drawn))
+
+
+def _look_at_limits(path: Path) -> Look | None:
+    """Return how one column of limits is understood; None of another file."""
+    table = limit.single_column(path, guess=True)
+    if table is None or not is_possible_spin(float(np.median(spins := table.column("spin_frequency_hz")))):
+        return None
+    values = tuple(digits(spin, 6) for spin in spins[:_SHOWN])
+    column = UnderstoodColumn(0, "".join(table.header), "spin_frequency_hz", "Hz", 1.0, inverse=False, values=values)
+    plot = Plot((*range(1, len(spins) + 1),), tuple(spins.tolist()), ("reading", ""), ("spin frequency", "Hz"))
+    return Look(path, Text("{n} limits", n=len(spins)), (UnderstoodRun(path, "", 0, (column,)),), plots={0: (plot,)})
 
 
 def _look_at_record(path: Path, record: Waveform | PulseTimes, channel: str | None) -> Look:

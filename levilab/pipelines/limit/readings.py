@@ -68,7 +68,7 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
     try:
         table = read_table(path, quantities=QUANTITIES, needed=NEEDED, **options.of_tables)
     except (NoTable, NoSuchColumn) as error:
-        single = _single_column(path, guess=options.guess)
+        single = single_column(path, guess=options.guess)
         if single is None:
             raise error from None
         table = single
@@ -131,7 +131,7 @@ def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> Limi
     return LimitReadings(spins[~stopped], u_spins[~stopped], (*notes, of_file("falls", seen, "advice")))
 
 
-def _single_column(path: Path, *, guess: bool) -> Table | None:
+def single_column(path: Path, *, guess: bool) -> Table | None:
     """Return the table of a file with one number a line, which are limits by its title or, if guess, for want of one.
 
     None of a file that holds anything else.

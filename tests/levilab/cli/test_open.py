@@ -118,6 +118,14 @@ def test_sensor_logger_names_its_sensor_in_the_name_of_the_file(tmp_path, name):
     assert "21.00" in ended.out
 
 
+@pytest.mark.parametrize("text", ["lower limit\n21.86\n21.7\n22.03\n", "untere Grenze [Hz]\n21,86\n21,7\n22,03\n"])
+def test_a_column_of_limits_is_shown(text, tmp_path):
+    (tmp_path / "limits.txt").write_text(text, encoding="utf-8")
+    look = look_at(tmp_path / "limits.txt", {})
+    assert (look.problem, look.runs[0].columns[0].quantity) == ("", "spin_frequency_hz")
+    assert look.plots[0][0].y == (21.86, 21.7, 22.03)
+
+
 def test_a_cell_is_shown_as_a_spreadsheet_shows_it(tmp_path):
     with xlsxwriter.Workbook(tmp_path / "my.xlsx") as book:
         sheet = book.add_worksheet()
