@@ -189,11 +189,12 @@ def _with_folders_as_groups(results: Results, folder_of: Callable[[Path], str]) 
 
 
 def _folders_of_groups(results: Results, unread: Iterable[Path]) -> Callable[[Path], str]:
-    """Return the function file → its folder below the deepest one of all files, empty there; run → its group."""
+    """Return the function file → its folder below the deepest one of all inputs, empty there; run → its group."""
     used = (one.path for _, found in results for one in found.sources if not one.run)
     files = {path: locate(path)[0].resolve() for path in (*used, *unread)}
     folders = {path: file.parent.parts for path, file in files.items() if not (file / RECORD).exists()}
-    common = takewhile(lambda parts: len({*parts}) == 1, zip(*folders.values(), strict=False))
+    of_runs = [one.path.resolve().parent.parts for _, found in results for one in found.sources if one.run]
+    common = takewhile(lambda parts: len({*parts}) == 1, zip(*folders.values(), *of_runs, strict=False))
     depth = len([*common])
     groups = {path: _group_in(file) for path, file in files.items() if path not in folders}
     return lambda path: groups.get(path) or "".join(folders.get(path, ())[depth : depth + 1])

@@ -130,6 +130,14 @@ def test_a_folder_is_the_group_of_its_files(tmp_path):
         assert "readings.csv," not in page.split("Made by")[0].replace("readings.csv, line", "")
 
 
+def test_the_only_folder_beside_runs_is_a_group(of_three, tmp_path):
+    shutil.copytree(of_three, tmp_path / "class")
+    (tmp_path / "class" / "Group 5").mkdir()
+    spin_down_csv(tmp_path / "class" / "Group 5" / "ours.csv")
+    page = Page(write_class([tmp_path / "class"], tmp_path / "class.html").read_text(encoding="utf-8")).text
+    assert re.search(r"Group 5\s+(good|look)", page)
+
+
 def test_files_of_one_folder_and_runs_of_no_group_are_each_by_itself(tmp_path):
     """The folder that holds all of them is no group; a browser's duplicate and a run copied there are none, too."""
     for name in ("anna", "ben"):
