@@ -24,7 +24,7 @@ def keep_options_whole(body: str) -> str:
 def _change(_app: Sphinx, _name: str, _template: str, context: dict[str, Any], _tree: object) -> None:
     if "body" in context:
         # Sphinx puts two hyphens behind the name of an argument
-        body = re.sub(r"(</(?:strong|em)>) -- ", r"\1: ", context["body"]).replace(">Variables<", ">Attributes<")
+        body = re.sub(r"(</\w+>) -- ", r"\1: ", context["body"]).replace(">Variables<", ">Attributes<")
         context["body"] = keep_options_whole(body)
 
 

@@ -64,7 +64,9 @@ export async function openSpace(canvas, description) {
   function keepFall(at) {
     const {times} = live, from = times.findIndex((time) => time >= at - BEFORE_S), to = times.findIndex((time) => time >= at + AFTER_S);
     if (from < 0 || to < 0) return false;
-    fall = Object.fromEntries(Object.entries(live).map(([name, list]) => [name, list.slice(from, to)]));
+    const kept = Object.fromEntries(Object.entries(live).map(([name, list]) => [name, list.slice(from, to)]));
+    if (film === fall) film = kept;  // a replay goes on in it
+    fall = kept;
     return true;
   }
 

@@ -452,7 +452,7 @@ def test_a_fall_is_replayed_and_what_is_drawn_is_saved(served, watched, tmp_path
     publish(watch, Poses(3.0, 1 / 400, position[900:], upright[900:], up[900:]))  # the top lies there
     until(page, "levilab.space?.state && document.getElementById('replay').offsetParent")
     page.click("#replay")
-    assert page.evaluate("levilab.space.replays")
+    until(page, "levilab.space.replays")
     later = GrowingRun(tmp_path, "20261122T110000Z-spin-0000")
     watch.turn_to(later.folder)
     until(page, f"levilab.seen.run === '{later.folder.name}'")
