@@ -166,7 +166,7 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, aside: Array, 
     first = _fit(basis, turns, u, nuisance, widths)[0][:count]
     nuisance = np.column_stack([nuisance, _waves(basis @ first)])
     slope, bend = (chebval(0.0, chebder(np.eye(count), n)) / half**n for n in (1, 2))
-    chirp = float(bend @ _fit(basis, turns, u, nuisance, widths)[0][:count])
+    chirp = float(bend @ first)
     slower = chirp * min(chirp / start, 0.0)  # of the slope, a second; that of an even drive stays
     drag = slower * (half * late) ** 3 / 6
     more = np.column_stack([nuisance, EXPONENT_U * drag])

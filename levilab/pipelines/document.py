@@ -80,6 +80,11 @@ def refuse_columns_of_runs(found: Found[Any], options: InputOptions) -> None:
         raise UsageError("columns", Text("goes with a data file, and {known}: leave it out", known=known))
 
 
+def whole_u(_run: Any, _model: str, _name: str, u: float) -> float:
+    """Return the shared part of a quantity's u where it is the whole of it."""
+    return u
+
+
 @dataclass(frozen=True, kw_only=True)
 class Analysis(Needs[Any], Generic[A]):
     """One analysis: what it needs of its inputs, how it is carried out, its result.json, and what people are shown.

@@ -110,20 +110,16 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
     return FieldRun(scan, top, floating, tuple(warnings), taken)
 
 
-def shared_u(u: float) -> float:
-    """Return the part of u of a scan that is common to all: what calliper and data sheet leave open is nearly all."""
-    return u
-
-
 def means(runs: Sequence[Mapping[str, Estimate]]) -> dict[str, Mean]:
     """Return unweighted means over scans, of the quantities that all of them have.
 
-    No mean makes the common part of u smaller: u is that of one scan and, in quadrature, s/√N.
+    What calliper and data sheet leave open is nearly all of u, and common to all scans: u is that of one scan and, in
+    quadrature, s/√N.
     """
     names = [name for name in runs[0] if all(name in run for run in runs)]
     found = {}
     for name in names:
         of_runs = [run[name] for run in runs]
-        of_all = mean(of_runs, [shared_u(one.u or 0.0) for one in of_runs])
+        of_all = mean(of_runs, [one.u or 0.0 for one in of_runs])
         found[name] = Mean(of_all.value, of_all.u, of_all.unit, scatter=of_all.scatter or 0.0, runs=len(runs))
     return found

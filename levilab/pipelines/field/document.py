@@ -9,8 +9,8 @@ import numpy as np
 from analysis.budget import Budget, Component
 from analysis.field.fit import UNITS, FieldScan, UPart, parts_of
 from analysis.uncertainty import Estimate
-from levilab.pipelines.document import Analysis, statistics_of, value_of, values_of
-from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun, Mean, analyze_source, shared_u
+from levilab.pipelines.document import Analysis, statistics_of, value_of, values_of, whole_u
+from levilab.pipelines.field.analysis import FieldAnalysis, FieldRun, Mean, analyze_source
 from levilab.pipelines.field.readings import FieldReadings, read_scan_file, read_scan_run
 from levilab.pipelines.field.report import field_columns, field_part, field_tables
 from levilab.pipelines.field.words import FIELD_ROW, QUANTITIES, remark
@@ -179,6 +179,6 @@ FIELD = Analysis(
     curve=lambda analysis, number, _: analysis.runs[number].scan.model,
     curve_u=lambda analysis, number, _: analysis.runs[number].scan.u_model,
     compared=("strength", "origin", "thickness"),
-    shared_u=lambda *found_of: shared_u(found_of[-1]),
+    shared_u=whole_u,
     common="Calliper and data sheet are the same for all scans, so the mean keeps the u of one group.",
 )

@@ -4,7 +4,7 @@ from typing import Any
 
 from analysis.budget import Budget
 from levilab.pipelines.budget import direct_row
-from levilab.pipelines.document import Analysis, values_of
+from levilab.pipelines.document import Analysis, values_of, whole_u
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SwayOptions
 from levilab.pipelines.row import find_all, symbols_of
@@ -84,7 +84,7 @@ SWAY = Analysis(
     columns=sway_columns,
     row=SWAY_ROW,
     symbols=symbols_of(QUANTITIES),
-    shared_u=lambda *found_of: found_of[-1],
+    shared_u=whole_u,
     common="χ²/dof compares the windows of one run: above 1 they differ by more than their u, which is made larger. "
     "All runs have nearly the same differences, so the mean keeps the u of one group.",
 )

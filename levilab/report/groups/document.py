@@ -164,16 +164,15 @@ def _of_two_groups(path: Path, first: Path, folder_of: Callable[[Path], str]) ->
     return folder_of(path) != folder_of(first) and bool(folder_of(path) and folder_of(first))
 
 
-def _look_at_copy(other: str) -> Mark:
-    said = "holds the same readings as {other:s}: a group needs a seed or a file of its own"
-    return Mark(LOOK, (Text(said, other),))
+def _same_as(other: str) -> str:
+    return Text("holds the same readings as {other:s}: a group needs a seed or a file of its own", other)
 
 
 def _with_copies(of: Class, copies: Mapping[str, Path]) -> Class:
     """Return a class whose groups have a remark on each other group with the same readings."""
     groups = []
     for group in of.groups:
-        remarks = [_look_at_copy(name).why[0] for name, first in copies.items() if first == group.source.path]
+        remarks = [_same_as(name) for name, first in copies.items() if first == group.source.path]
         groups.append(replace(group, warnings=(*group.warnings, *remarks)))
     return replace(of, groups=tuple(groups))
 
@@ -443,7 +442,7 @@ def write_class(
     copies = {
         path: first for path, first in copies.items() if first in names and _of_two_groups(path, first, folder_of)
     }
-    missing |= {path: _look_at_copy(names[first]) for path, first in copies.items()}
+    missing |= {path: Mark(LOOK, (_same_as(names[first]),)) for path, first in copies.items()}
     named = dict(zip(missing, _names_of_unread([*missing], results, folder_of), strict=True))
     classes = [_with_copies(of, {named[path]: first for path, first in copies.items()}) for of in classes]
     classes[0] = replace(classes[0], unread={named[path]: mark for path, mark in missing.items()})
