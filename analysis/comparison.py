@@ -22,8 +22,8 @@ class Comparison:
         freedom: its degrees of freedom.
         p: the probability that chance makes it so large.
         scatter: standard deviation of the values, unweighted; None of one value.
-        distances: from each value to the mean of the others, weighted by 1/(u² + τ²), in units of the u of that
-            difference, with the τ of the others; None of one value.
+        distances: from each value to the mean of the others, in units of the u of that difference, with the τ of the
+            others; None of one value.
     """
 
     between: float
@@ -61,21 +61,27 @@ def compare(values: ArrayLike, u: ArrayLike) -> Comparison:
 def _from_others(x: NDArray[np.float64], u: NDArray[np.float64], k: int) -> float:
     """Return the distance of a value from the mean of the others, in units of the u of their difference.
 
-    τ is that of the others, which a value far off does not widen.  It is known from their n − 2 differences alone: the
-    distance is that of a normal number as improbable as this one of Student's t (degrees of freedom by Welch and
-    Satterthwaite, GUM G.4).
+    τ is that of the others, which a value far off does not widen, and few of them leave it uncertain: the probability
+    of a value as far off is averaged over all τ by their likelihood (A. Gelman et al., Bayesian Data Analysis, 3rd ed.
+    (2013), eq. 5.20 and 5.21), with the prior 1/(u + τ): flat below their u, and of an unknown scale above.  The
+    distance is that of a normal number as improbable.  Where τ is far above u, it is Student's t with n − 2 degrees of
+    freedom.  One other value tells nothing of τ, which is then 0.
     """
-    from scipy.special import ndtri, stdtr
+    from scipy.special import log_ndtr, ndtri_exp
 
     others, of_others = np.delete(x, k), np.delete(u, k)
-    between = scatter_between(others, of_others)
-    mean, of_mean, _ = weighted_mean(others, np.hypot(of_others, between))
-    variance, of_tops = u[k] ** 2 + of_mean**2 + between**2, between**2 * (1 + 1 / len(others))
-    distance = float(x[k] - mean) / math.sqrt(variance)
-    if not of_tops:
-        return distance
-    p = stdtr((len(others) - 1) * max(variance / of_tops, 1.0) ** 2, -abs(distance))
-    return math.copysign(-float(ndtri(p)), distance) if p > 0 else distance
+    typical = 1 / math.sqrt(np.mean(of_others**-2.0))
+    steps = np.geomspace(1e-3, 1e3 * (1 + np.ptp(others) / typical), 100)  # outside them lies less than 10⁻³
+    taus, log_prior = (typical * steps, np.log(steps / (1 + steps))) if len(others) > 1 else (np.zeros(1), np.zeros(1))
+    weights = 1 / (of_others**2 + taus[:, None] ** 2)
+    total = weights.sum(axis=1)
+    means = weights @ others / total
+    chi_square = (weights * (others - means[:, None]) ** 2).sum(axis=1)
+    log_p = log_prior + (np.log(weights).sum(axis=1) - np.log(total) - chi_square) / 2
+    distances = (x[k] - means) / np.sqrt(u[k] ** 2 + taus**2 + 1 / total)
+    log_p -= np.logaddexp.reduce(log_p)
+    below, above = (np.logaddexp.reduce(log_p + log_ndtr(side * distances)) for side in (1.0, -1.0))
+    return float(ndtri_exp(below) if below < above else -ndtri_exp(above))
 
 
 def weighted_mean(x: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float, float, float]:

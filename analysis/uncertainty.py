@@ -1,9 +1,10 @@
-"""Standard uncertainties: from curvature, and what an estimate is.
+"""Standard uncertainties: of an estimate, of a mean, from curvature.
 
 Source: JCGM 100:2008 (GUM) for the words; Bates & Watts, Nonlinear Regression Analysis (1988), §2.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,6 +47,52 @@ class Estimate:
     u: float | None
     unit: str
     interval: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Mean(Estimate):
+    """The mean of a quantity over several runs; u is its standard error.
+
+    Attributes:
+        scatter: standard deviation of one run's value from another's; None with one run.
+        degrees_of_freedom: of scatter and u.
+    """
+
+    scatter: float | None = None
+    degrees_of_freedom: int = 0
+
+
+def mean(estimates: Sequence[Estimate], shared_u: Sequence[float] = ()) -> Mean:
+    """Return the mean of a quantity over the runs that have it, with u = s/√N from their scatter s (GUM 4.2).
+
+    Few runs may agree by chance: u is no smaller than the runs' own uncertainties leave to their mean, √Σu²/N.
+    Of one run: its own value and u.  The part of u that is the same in all runs, as that of a tilt, does not show in
+    their scatter, and no number of runs makes it smaller: it is added.
+
+    Args:
+        estimates: one a run.
+        shared_u: that part of each one's u.
+
+    >>> mean([Estimate(value, 0.01, "Hz") for value in (1.0, 2.0, 3.0)])
+    Mean(value=2.0, u=0.577..., unit='Hz', interval=None, scatter=1.0, degrees_of_freedom=2)
+    """
+    unit = estimates[0].unit
+    shared = shared_u or [0.0] * len(estimates)
+    kept = [(each, part) for each, part in zip(estimates, shared, strict=True) if each.value is not None]
+    values = np.array([estimate.value for estimate, _ in kept])
+    if not len(values):
+        return Mean(None, None, unit)
+    if len(values) == 1:
+        only = next(estimate for estimate in estimates if estimate.value is not None)
+        return Mean(only.value, only.u, unit, only.interval)
+    with np.errstate(over="ignore", invalid="ignore"):
+        average, scatter = float(values.mean()), float(values.std(ddof=1))
+    if not np.isfinite([average, scatter]).all():
+        return Mean(None, None, unit)
+    own = [np.sqrt(max(estimate.u**2 - part**2, 0.0)) for estimate, part in kept if estimate.u is not None]
+    least = float(np.sqrt(np.sum(np.square(own)))) / len(values) if len(own) == len(values) else 0.0
+    u = math.hypot(max(scatter / float(np.sqrt(len(values))), least), float(np.mean([part for _, part in kept])))
+    return Mean(average, u, unit, scatter=scatter, degrees_of_freedom=len(values) - 1)
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ each good to 0.1 %; PHYSICS.md §5). So the u of a mean over runs comes from the
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import hypot
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from analysis.spindown.joint import JointExponent, joint_exponent
 from analysis.spindown.lawfit import LawFit
 from analysis.spindown.selection import NO_FIT, Statistics, statistics, weigh
 from analysis.spindown.verdict import Verdict, verdict
-from analysis.uncertainty import Estimate, student
+from analysis.uncertainty import Estimate, Mean, mean, student
 
 
 class NothingToCombine(AnalysisError):
@@ -32,19 +31,6 @@ class NothingToCombine(AnalysisError):
             "{runs} runs have no drag law in common, at least one run and one law were expected: "
             "fit the same laws to each run"
         )
-
-
-@dataclass(frozen=True)
-class Mean(Estimate):
-    """The mean of a constant over the runs; u is its standard error.
-
-    Attributes:
-        scatter: standard deviation of one run's constant from another's; None with one run.
-        degrees_of_freedom: of scatter and u.
-    """
-
-    scatter: float | None = None
-    degrees_of_freedom: int = 0
 
 
 @dataclass(frozen=True)
@@ -192,39 +178,6 @@ def _combine_law(name: str, fits: Sequence[LawFit], stats: Statistics) -> Combin
     ]
     linearised = {constant: mean([line[constant] for line in lines]) for constant in lines[0]} if lines else None
     return CombinedLaw(name, constants, linearised, stats, tuple(said))
-
-
-def mean(estimates: Sequence[Estimate], shared_u: Sequence[float] = ()) -> Mean:
-    """Return the mean of one constant over the runs that have it, with u = s/√N from their scatter s (GUM 4.2).
-
-    Few runs may agree by chance: u is no smaller than the runs' own uncertainties leave to their mean, √Σu²/N.
-    Of one run: its own value and u.  The part of u that is the same in all runs, as that of a tilt, does not show in
-    their scatter, and no number of runs makes it smaller: it is added.
-
-    Args:
-        estimates: one a run.
-        shared_u: that part of each one's u.
-
-    >>> mean([Estimate(value, 0.01, "Hz") for value in (1.0, 2.0, 3.0)])
-    Mean(value=2.0, u=0.577..., unit='Hz', interval=None, scatter=1.0, degrees_of_freedom=2)
-    """
-    unit = estimates[0].unit
-    shared = shared_u or [0.0] * len(estimates)
-    kept = [(each, part) for each, part in zip(estimates, shared, strict=True) if each.value is not None]
-    values = np.array([estimate.value for estimate, _ in kept])
-    if not len(values):
-        return Mean(None, None, unit)
-    if len(values) == 1:
-        only = next(estimate for estimate in estimates if estimate.value is not None)
-        return Mean(only.value, only.u, unit, only.interval)
-    with np.errstate(over="ignore", invalid="ignore"):
-        average, scatter = float(values.mean()), float(values.std(ddof=1))
-    if not np.isfinite([average, scatter]).all():
-        return Mean(None, None, unit)
-    own = [np.sqrt(max(estimate.u**2 - part**2, 0.0)) for estimate, part in kept if estimate.u is not None]
-    least = float(np.sqrt(np.sum(np.square(own)))) / len(values) if len(own) == len(values) else 0.0
-    u = hypot(max(scatter / float(np.sqrt(len(values))), least), float(np.mean([part for _, part in kept])))
-    return Mean(average, u, unit, scatter=scatter, degrees_of_freedom=len(values) - 1)
 
 
 def _remarks(law: str, constant: str, estimates: Sequence[Estimate], average: Mean) -> list[Remark]:

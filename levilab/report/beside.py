@@ -15,9 +15,8 @@ import numpy as np
 
 from analysis.comparison import Comparison, compare
 from analysis.numbers import digits
-from analysis.spindown.combine import mean
 from analysis.spindown.drag import LAWS
-from analysis.uncertainty import Estimate, student
+from analysis.uncertainty import Estimate, mean, student
 from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import unquote
 from levilab.present.numbers import enumeration, plain, with_sign, with_uncertainty

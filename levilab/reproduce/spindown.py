@@ -13,9 +13,8 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.numbers import digits
-from analysis.spindown.combine import mean
 from analysis.spindown.fit import SpinDown, fit_spin_down
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate, mean
 from levilab.present.document.blocks import Note, Picture
 from levilab.reproduce.check import Comparison, Finding, Found, Within, check, statement
 from levilab.reproduce.figure import spindown_figure

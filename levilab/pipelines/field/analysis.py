@@ -5,8 +5,7 @@ from dataclasses import dataclass
 
 from analysis.field.fit import FieldScan, fit_scan
 from analysis.field.floating import Floating, KnownTop, follow
-from analysis.spindown.combine import mean
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate, mean
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.field.device import known_of, known_top, usual
 from levilab.pipelines.field.readings import FieldReadings

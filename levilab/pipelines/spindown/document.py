@@ -9,13 +9,13 @@ import numpy as np
 
 from analysis.budget import Budget, Component, printed_step, rest, u_of_step
 from analysis.numbers import digits
-from analysis.spindown.combine import Combined, CombinedLaw, Mean
+from analysis.spindown.combine import Combined, CombinedLaw
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown
 from analysis.spindown.lawfit import LawFit, Parts
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.verdict import Verdict
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate, Mean
 from levilab.pipelines.budget import bench_clock, direct_row, gate_of, time_base
 from levilab.pipelines.document import Analysis, number, statistics_of, value_of, values_of
 from levilab.pipelines.inputs.source import Source

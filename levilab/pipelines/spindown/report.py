@@ -11,14 +11,14 @@ import numpy as np
 from analysis.arrays import Array
 from analysis.numbers import digits
 from analysis.residuals import independent
-from analysis.spindown.combine import CombinedLaw, Mean
+from analysis.spindown.combine import CombinedLaw
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown
 from analysis.spindown.lawfit import LawFit
 from analysis.spindown.selection import Statistics
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.tilt import count_of
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate, Mean
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.part import (

@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import least_squares
 
 from analysis.residuals import durbin_watson, runs_test_p
-from analysis.spindown.combine import NothingToCombine, combine, mean
+from analysis.spindown.combine import NothingToCombine, combine
 from analysis.spindown.drag import LAWS, spin
-from analysis.spindown.fit import Estimate, fit_spin_down
+from analysis.spindown.fit import fit_spin_down
 from analysis.spindown.joint import JointExponent, joint_exponent
 
 T = np.arange(0, 200, 10.0)
@@ -20,15 +20,6 @@ def runs(u=0.03, constants=THESIS, *, tilt=False, **options):
         fit_spin_down(T, spin("disc", T, 40.0, c) + rng.normal(0, 0.03, T.size), u, tilt=tilt, **options)
         for c in constants
     ]
-
-
-def test_a_mean_is_the_thesiss_with_its_uncertainty_from_the_scatter():
-    c1 = [Estimate(c, 4e-6, "1/s") for c in (0.003199, 0.003134, 0.003133, 0.003261)]
-    average = mean(c1)
-    assert average.value == pytest.approx(0.00318175, rel=1e-12)  # the thesis prints this mean
-    assert average.scatter == pytest.approx(6.1190e-5, rel=1e-4)  # by hand: √(1.1233e-8/3)
-    assert average.u == pytest.approx(6.1190e-5 / 2, rel=1e-4)
-    assert average.degrees_of_freedom == 3
 
 
 def test_each_constant_is_the_mean_of_the_runs():
@@ -46,15 +37,6 @@ def test_each_constant_is_the_mean_of_the_runs():
             )
     lines = [run.fit("disc").linearised["c32"].value for run in fitted]
     assert together.fit("disc").linearised["c32"].value == pytest.approx(np.mean(lines))
-
-
-def test_what_runs_of_one_top_share_grows_no_smaller_with_their_number():
-    found = [Estimate(c, 5e-6, "1/s") for c in (1.0e-3, 1.002e-3, 0.998e-3, 1.0e-3)]
-    shared = mean(found, [3e-6] * 4)
-    assert shared.value == mean(found).value
-    # by hand: each one's own part is √(5² − 3²) = 4, so 2 of the mean, with 3 of all
-    assert mean([*found[:1]] * 4, [3e-6] * 4).u == pytest.approx(np.hypot(2e-6, 3e-6))
-    assert mean([*found[:1]] * 400, [3e-6] * 400).u > 3e-6
 
 
 def test_the_common_law_is_found_and_the_others_excluded():
