@@ -24,6 +24,7 @@ extensions = [
     "building.indices",
     "building.mathml",
     "building.outside_pages",
+    "building.words",
     "building.wrapping",
 ]
 exclude_patterns = ["building"]

@@ -1,31 +1,29 @@
-// How the search of the site ranks pages: that of the typed word first, users' pages before those of developers.
+// How the search of the site ranks pages: first that which has the typed word in words.toml, then users' pages.
 // The weights are those of Sphinx (searchtools.js); `score` adds the page's own factor.
-/** Words as they are typed → as the pages have them. */
-var typedAs = {wifi: "wi-fi", wlan: "wi-fi", karman: "kármán", photodiode: "phototransistor", download: "install",
-  license: "licence", luftwiderstand: "reibung", photogate: "phototransistor", webcam: "camera",
-  // German words that no page has
-  lichtschranke: "phototransistor", mikrofon: "microphone", soundkarte: "sound card", handy: "phone",
-  gewicht: "weight", einheit: "unit", komma: "comma", unterlegscheiben: "washers", magnetfeld: "field",
-  messunsicherheit: "uncertainty", fehlermeldung: "error", arbeitsblatt: "worksheet", lehrer: "teacher",
-  oszilloskop: "oscilloscope", zähler: "counter", auswertung: "analyze"};
 /** What is typed in the letters of the index: indices and powers as plain digits, ⁄ as /. */
-var folded = (typed) => typed.normalize("NFKC").replaceAll("⁄", "/").replace(/\p{Letter}+/gu, (word) => typedAs[word.toLowerCase()] ?? word);
+var folded = (typed) => typed.normalize("NFKC").replaceAll("⁄", "/");
 // in the place of Sphinx's own
 var splitQuery = (query) => folded(query).split(/[^\p{Letter}\p{Number}_\p{Emoji_Presentation}]+/gu).filter((term) => term);
+/** The stems of a text. */
+var stemsOf = (text) => splitQuery(text.toLowerCase()).map((word) => new Stemmer().stemWord(word));
+/** How well an entry of the index answers what is typed: 1 where it is the whole, less where it is a part. */
+var share = (entry, typed) => (stemsOf(entry).every((stem) => typed.includes(stem)) ? stemsOf(entry).length / typed.length : 0);
+// the site has no categories
+Documentation.addTranslations({messages: {
+  "Your search did not match any documents. Please make sure that all words are spelled correctly and that you've selected enough categories.":
+  "No page has these words. Try others, in English or German, or look into “Glossary”, “Messages” and “Commands” in the menu."}});
+/** Where no page has all of the words: the pages with some of them. */
+var withAll = Search.performTermsSearch;
+Search.performTermsSearch = (words, excluded) => {
+  const pages = {};
+  const found = withAll(words, excluded);
+  if (found.length) return found;
+  for (const result of [...words].flatMap((word) => withAll(new Set([word]), excluded))) {
+    pages[result[0]] = result.with(4, result[4] + (pages[result[0]]?.[4] ?? 0));
+  }
+  return Object.values(pages);
+};
 var Scorer = {
-  // page → the words for which it is the first
-  pages: {
-    "open-my-file": ["excel", "spreadsheet", "xlsx", "csv", "labview", "arduino", "audio", "wav", "mp3", "comma", "decimal comma", "rpm", "drehzahl", "unit",
-      "units", "wrong unit"],
-    "class": ["students", "student", "teacher", "worksheet", "grading", "seed"],
-    "sound-card": ["microphone", "sound card", "speaker"],
-    "glossary": ["lock", "locked", "c3/2", "c32", "uncertainty", "aicc", "undecided", "gate"],
-    "phone": ["smartphone", "phyphox", "wi-fi"], "physics": ["von kármán", "kármán"], "notebook": ["jupyter", "python"], "messages": ["warning", "warnings", "error"],
-    "live": ["share", "qr code", "language"], "index": ["licence"], "install": ["windows", "mac"], "simulator": ["simulate"], "practise": ["virtual bench"],
-    "report": ["pdf", "budget", "uncertainty budget"], "tutorial": ["tutorial"], "video": ["film", "video", "camera"], "animation": ["animation"],
-    "instruments/oscilloscope": ["oscilloscope"], "instruments/counter": ["counter"], "experiments/washers": ["washers", "weight", "mass"], "experiments/spin": ["tape", "lamp", "spindown"],
-    "experiments/triggered": ["hold"], "experiments/trace": ["phototransistor"],
-  },
   score: ([page, title, anchor, description, score, file]) => {
     const asked = folded(new URLSearchParams(location.search).get("q") || "").trim();
     const typed = asked.toLowerCase();
@@ -35,7 +33,10 @@ var Scorer = {
       if (/[_. ]|[a-z][A-Z]/.test(asked)) return 2000 + score;
       if (/^[A-Z]/.test(asked) ? title.endsWith("." + asked) : title.includes(".FittedModel.")) return 50 + score;
     }
-    if (Scorer.pages[page]?.includes(typed)) return 1000 + score;
+    const {docnames, indexentries} = Search._index;
+    const entries = Object.keys(indexentries).filter((entry) => indexentries[entry].some(([file, , main]) => main && docnames[file] === page));
+    const best = Math.max(0, ...entries.map((entry) => share(entry, stemsOf(asked))));
+    if (best) score += best === 1 ? 1000 : 50 * best;
     const words = (text) => text.toLowerCase().replace(/[^\p{Letter}\p{Number}]+/gu, " ");
     if (typed && !anchor && !page.startsWith("decisions/") && words(title).includes(words(typed))) score += 100;
     if (/^(decisions\/|reference\/|speed$|mutants$|fuzzing$|contributing$|changes$)/.test(page)) return 0.2 * score;

@@ -1,6 +1,7 @@
 """What people type into the search of the site, and the page that comes first; `make site` runs it on the new site."""
 
 import threading
+import tomllib
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
@@ -11,22 +12,23 @@ from support.messages import QUOTED
 from support.paths import ROOT
 
 SITE = ROOT / "build/site"
+WORDS = tomllib.loads((ROOT / "docs/building/words.toml").read_text("utf-8"))
 #: Page → what is typed, and it is the first.
 FIRST = {
-    "phone": ("phyphox", "smartphone", "wifi", "Handy"),
+    "phone": ("phyphox", "smartphone", "wifi", "Handy", "battery"),
     "open-my-file": ("excel", "xlsx", "labview", "arduino", "logger pro", "csv", "audio", "comma", "rpm", "Drehzahl"),
     "sound-card": ("microphone", "sound card", "speaker", "Mikrofon", "Soundkarte"),
     "install": ("windows", "install", "download", "mac"),
     "class": ("grading", "worksheet", "seed", "teacher", "student", "Lehrer"),
-    "glossary": ("lock", "C3/2", "C₃/₂", "c32", "uncertainty", "AICc", "undecided", "gate"),
+    "glossary": ("lock", "C3/2", "C₃/₂", "c32", "uncertainty", "AICc", "undecided", "gate", "error bars", "Messfehler"),
     "live": ("share", "QR code", "language"), "tutorial-de": ("Präzession", "Luftwiderstand"),
-    "messages": ("warning", "warnings", "error"),
+    "messages": ("warning", "warnings", "error", "crashed", "Absturz"),
     "experiments/washers": ("washers", "weight", "mass", "Gewicht", "Unterlegscheiben"),
     "experiments/spin": ("tape", "lamp", "spin down", "spindown"), "experiments/trace": ("photodiode", "Lichtschranke"),
     "instruments/oscilloscope": ("oscilloscope", "Oszilloskop"), "instruments/counter": ("counter", "Zähler"),
-    "pymeasure": ("pymeasure",), "animation": ("animation",), "report": ("pdf", "budget"), "notebook": ("jupyter",),
+    "pymeasure": ("pymeasure",), "animation": ("animation",), "report": ("pdf", "budget", "printing"),
     "video": ("video", "camera"), "experiments/triggered": ("hold",), "simulator": ("simulate",),
-    "practise": ("virtual bench",),
+    "practise": ("virtual bench",), "notebook": ("jupyter",),
     "tutorial": ("first experiment",), "index": ("cite", "license"), "physics": ("von karman",),
     "reference/python-simulator": ("simulate_many",),
     "reference/python-analyses": ("spin_at_fall",),
@@ -92,6 +94,17 @@ def found(search, words):
 @pytest.mark.parametrize(("page", "words"), [(page, words) for page in FIRST for words in FIRST[page]])
 def test_the_search_finds_what_people_type(search, page, words):
     assert found(search, words)[0] == page
+
+
+def test_each_word_of_the_table_finds_its_page_first(search):
+    first = "words => (history.replaceState(null, '', '?' + new URLSearchParams({q: words})),"
+    first += "Search._performSearch(...Search._parseQuery(words)).at(-1)[0])"
+    typed = [(word, page) for page, words in WORDS.items() for word in " ".join(words.split()).split(", ")]
+    assert [(word, page) for word, page in typed if search.evaluate(first, word) != page] == []
+
+
+def test_where_no_page_has_all_words_those_with_some_are_found(search):
+    assert found(search, "levitron xylophone manufacturer") == found(search, "levitron") != []
 
 
 @pytest.mark.parametrize("words", AMONG_TWO)
