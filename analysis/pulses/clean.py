@@ -1,5 +1,6 @@
 """Clean a trace: remove hum of the mains and a wandering baseline, and find times without a signal."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,7 +82,7 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, times: Arr
         bins = np.interp(np.arange(bins.size), np.flatnonzero(counted), bins[counted])
     lines = _without_pulse_lines(mains_lines(bins, bin_rate), bins, bin_rate)
     if lines:
-        notes.append(Finding("hum", values=tuple(value for line in lines for value in line)))
+        notes.append(_hum(lines))
         samples, bins = _without_hum(samples, rate, bins, counted, [frequency for frequency, _ in lines], times=times)
     steps = _baseline(bins, bin_rate, counted)
     if steps is not None:
@@ -92,6 +93,21 @@ def clean(samples: Array, rate: float, bins: Array, bad: Mask | None, times: Arr
     if not counted.all():
         bins = np.where(counted, bins, np.median(bins[counted]))
     return Clean(samples, bins, bad, tuple(notes), lines)
+
+
+def _hum(lines: Lines, of: str = "") -> Finding:
+    return Finding("hum", of, tuple(value for line in lines for value in line))
+
+
+def name_lines(notes: Iterable[Finding], lines: Lines, fit: Fit, duration: float) -> tuple[Finding, ...]:
+    """Return notes in which the lines of hum that may be harmonics of the pulses stand by themselves.
+
+    fit: the phase of the pulses, which is not known before hum is removed; duration: of the record [s].
+    """
+    near = tuple(line for line in lines if _harmonic(line[0], fit, duration))
+    rest = tuple(line for line in lines if line not in near)
+    named = [*([_hum(rest)] if rest else []), *([_hum(near, "harmonic")] if near else [])]
+    return tuple(one for note in notes for one in (named if note.name == "hum" else [note]))
 
 
 def _without_pulse_lines(lines: Lines, bins: Array, rate: float) -> Lines:
@@ -116,17 +132,7 @@ def _pulse_lines(lines: Lines, bins: Array, rate: float, fit: Fit) -> Lines:
     is higher.
     """
     duration = bins.size / rate
-    slowest, fastest = np.sort(fit.frequency(np.array([0.0, duration])))
-    if slowest <= 0:
-        return ()
-
-    def harmonic(place: float) -> int:
-        """Return which harmonic passes a frequency during the record; 0: none does."""
-        k = round(2 * place / (slowest + fastest))
-        near = k * slowest - 3 / duration < place < k * fastest + 3 / duration
-        return k if near else 0
-
-    harmonics = {line: harmonic(line[0]) for line in lines}
+    harmonics = {line: _harmonic(line[0], fit, duration) for line in lines}
     if not any(harmonics.values()):
         return ()
     thin = shorten(bins, max(int(rate / (4 * HIGHEST)), 1))
@@ -145,12 +151,20 @@ def _pulse_lines(lines: Lines, bins: Array, rate: float, fit: Fit) -> Lines:
             beside = [j for j in range(k - 2, k + 3) if j > 0 and j not in doubtful.values()]
             # a harmonic whose frequency changes during the record is no higher than this at one frequency
             share = abs(complex(np.mean(hann * turn**k * np.exp(2j * np.pi * line[0] * time))))
-            if line[1] < OWN * share * max(map(height, beside), default=0.0):
+            still = 2 * abs(complex(np.mean(thin * np.exp(-2j * np.pi * line[0] * time))))
+            if line[1] < OWN * share * max(map(height, beside), default=0.0) or height(k) > OWN * still:
                 own.append(line)
                 del doubtful[line]
                 break
         else:
             return tuple(own)
+
+
+def _harmonic(place: float, fit: Fit, duration: float) -> int:
+    """Return which harmonic of the pulses passes a frequency during the record; 0: none does."""
+    slowest, fastest = np.sort(fit.frequency(np.array([0.0, duration])))
+    k = round(2 * place / (slowest + fastest)) if slowest > 0 else 0
+    return k if k * slowest - 3 / duration < place < k * fastest + 3 / duration else 0
 
 
 def _dead_bins(bins: Array, rate: float, whole: Mask | None) -> Mask:
@@ -201,14 +215,16 @@ def mains_lines(bins: Array, rate: float) -> Lines:
             reach = max(STRAYS * multiple, 2 * width)
             band = near(nominal, reach)
             peak = band.start + int(np.argmax(amplitude[band]))
-            if amplitude[peak] <= 8 * level or not _narrow(amplitude, peak, near(peak * width, 1.5 + 3 * width)):
+            height, place = float(amplitude[peak]), _peak(amplitude, peak) * width
+            inside = abs(place - nominal) < STRAYS * multiple + width / 4  # else it is the flank of a line beside
+            high = height > 8 * level and _narrow(amplitude, peak, near(peak * width, 1.5 + 3 * width))
+            if not (inside and high):
                 continue
             further = sorted(
                 float(amplitude[near(k * nominal, k * reach)].max())
                 for k in (2, 3, 4)
                 if k * (nominal + reach) < min(2 * HIGHEST, top) and k * multiple not in hum
             )
-            height, place = float(amplitude[peak]), _peak(amplitude, peak) * width
             alone = not further or height > SINGLE * further[len(further) // 2]
             if alone and _stays(thin, place / thin_rate, height):
                 hum.add(multiple)

@@ -42,6 +42,8 @@ BESIDE = 12
 MORE_TURNS, LOG_ODDS = (-3, -2, -1, 1, 2, 3), 10.0
 #: Pulses nearer to their turns than this are used once a jump was found [turns]; the fit leaves out the others.
 NEAR = 0.05
+#: This number of turns, none of whose thirds has a pulse by chance alone, shows that they are thirds of a turn.
+LEAST_THIRDS = 24
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def fit_train(times: Array, *, degree: int | None = None, step: float = 0.0) -> 
     numbering = number_turns(times)
     if np.count_nonzero(numbering.belongs) < FEWEST:
         numbering = Numbering(numbering.turns, np.ones(times.size, dtype=bool))
-    train = _fit_numbered(times, numbering, degree)
+    train = without_thirds(times, _fit_numbered(times, numbering, degree), degree)
     least = max(LEAST_LOST, STEPS * step)
     for _ in range(TRIES):
         jump, numbering = _find_jump(times, train.fit)
@@ -141,6 +143,19 @@ def fit_train(times: Array, *, degree: int | None = None, step: float = 0.0) -> 
         if again:
             break
     return train if train.fit.jump is None else _with_whole_turns(times, train, degree)
+
+
+def without_thirds(times: Array, train: Train, degree: int | None, pulses: int = 1) -> Train:
+    """Return the train by whole turns where its turns are thirds of one, as with two marks a third of a turn apart.
+
+    pulses: in three thirds, at most; a list of times whose third pulse is always missing looks like two.
+    """
+    counts = np.bincount(train.turns % 3, minlength=3)
+    if np.count_nonzero(counts) > pulses or np.ptp(train.turns) < LEAST_THIRDS:
+        return train
+    whole = np.rint(train.fit.phase(times)).astype(np.int64) - int(np.argmax(counts))
+    belongs = np.isin(np.arange(times.size), train.used) & (whole % 3 == 0)
+    return _fit_numbered(times, Numbering(whole // 3, belongs), degree)
 
 
 def _is_sudden(times: Array, train: Train, jump: Jump) -> bool:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.arrays import Array
 from analysis.errors import NotPositive, ShapesDiffer
 from analysis.pulses import traps
-from analysis.pulses.clean import Clean, clean
+from analysis.pulses.clean import Clean, clean, name_lines
 from analysis.pulses.edges import Edges, place_edges
 from analysis.pulses.errors import OnlyHum, TooFewPulses
 from analysis.pulses.likelihood import search
@@ -19,7 +19,7 @@ from analysis.pulses.matched import Match, match, window_of
 from analysis.pulses.regression import Fit, Grid, fit_turns, median
 from analysis.pulses.result import Finding, Method, SpinFrequency
 from analysis.pulses.search import Events, find_events, shorten
-from analysis.pulses.times import FEWEST, Train, check_times, findings_of_fit, fit_train
+from analysis.pulses.times import FEWEST, Train, check_times, findings_of_fit, fit_train, without_thirds
 from analysis.uncertainty import Estimate, student
 
 Choice = Literal["auto", "edges", "matched", "likelihood"]
@@ -102,7 +102,8 @@ def spin_of_trace(
         if cleaned.lines:
             raise OnlyHum(seen=error.seen, needed=error.needed, duration=error.duration) from None
         raise
-    return _result(found, start, rate, degree)
+    named = name_lines(found.notes, cleaned.lines, found.match.fit, x.size / rate)
+    return _result(replace(found, notes=named), start, rate, degree)
 
 
 class Trace:
@@ -128,7 +129,8 @@ class Trace:
     @cached_property
     def train(self) -> Train:
         """The events, numbered and fitted.  Raises TooFewPulses."""
-        return fit_train(self.places, degree=self.degree, step=1 / self.rate)
+        train = fit_train(self.places, degree=self.degree, step=1 / self.rate)
+        return without_thirds(self.places, train, self.degree, pulses=2)
 
     @property
     def places(self) -> Array:

@@ -1,6 +1,7 @@
 """Findings about pulses and lines, as sentences."""
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from types import MappingProxyType
 
 from analysis.numbers import digits
@@ -40,10 +41,10 @@ def finding_text(found: Finding, part: str = "window") -> str:
     return Text(sample, which=which, parts=f"{part}s", part=part, first=first, text=text)
 
 
-def _hum(*lines: float) -> str:
+def _hum(*lines: float, said: str = "hum of amplitude {each} was taken off") -> str:
     pairs = zip(lines[::2], lines[1::2], strict=True)
     each = [Text("{size:n} at {hertz:.5g} Hz", size=digits(size), hertz=hertz) for hertz, size in pairs]
-    return Text("hum of amplitude {each} was taken off", each=enumeration(each))
+    return Text(said, each=enumeration(each))
 
 
 def _jump(lost_s: float, at_s: float) -> str:
@@ -142,6 +143,7 @@ _SENTENCES: Mapping[tuple[str, str], str | Callable[..., str]] = MappingProxyTyp
     ("double", "place"): _double("is not half-way between its neighbours"),
     ("mains", ""): "the frequency is {hertz:g} Hz and stays: is it the mains (a lamp, hum), or a drive locked to them?",
     ("hum", ""): _hum,
+    ("hum", "harmonic"): partial(_hum, said="{each} was taken off: hum of the mains, or a harmonic of the spin"),
     ("clipped", ""): "the tops of the pulses are flat: the detector or the converter is saturated",
     ("gap", ""): lambda seconds: Text("the signal is constant for {s:n} s in all", s=digits(seconds, 3)),
     ("not-finite", ""): "{n} samples are no finite numbers and do not count",

@@ -128,6 +128,14 @@ def test_two_equal_marks_that_are_not_opposite_are_one_top():
     assert opposite.notes == ()
 
 
+@pytest.mark.parametrize("apart", [0.3, 1 / 3, 0.35])
+@pytest.mark.parametrize("method", ["auto", "edges"])
+def test_two_marks_a_third_of_a_turn_apart_are_no_top_of_three_times_the_spin(apart, method):
+    found = spin_of_trace(light(PHASE) + 0.6 * light(PHASE, 0.5 + apart) + noise(), RATE, method=method)
+    assert found.frequency.value == pytest.approx(29.8, abs=0.01)
+    assert found.missing == 0
+
+
 @pytest.mark.parametrize("part", [0.5, 0.25])
 def test_half_the_frequency_of_a_weak_trace_is_seen_and_named(part):
     """A phase that starts at half or a quarter of the frequency, as a weak trace with missing pulses can have it."""
@@ -150,6 +158,18 @@ def test_the_pulses_own_harmonics_are_no_hum(spin, reflection, method):
     hum = spin_of_trace(samples + 0.3 * np.sin(2 * np.pi * 100 * TIME + 1), RATE, method=method)
     assert next(note.values[0] for note in hum.notes if note.name == "hum") == pytest.approx(100, abs=0.1)
     assert abs(hum.frequency.value - spin) < 5 * hum.frequency.u
+
+
+@pytest.mark.parametrize("spin", [15.174, 20.152, 16.85])
+def test_a_line_beside_a_multiple_of_the_mains_is_no_hum(spin):
+    turns = (spin * TIME)[:10_000]  # 2 s: 8, 3 and 3 times the spin lie 0.5 to 1.4 Hz beside one
+    samples = light(turns) + 0.6 * light(turns, 0.1) + noise()[: turns.size]
+    assert "hum" not in names(spin_of_trace(samples, RATE))
+
+
+def test_a_line_at_a_harmonic_of_the_spin_may_be_that_harmonic():
+    samples = light(50.02 * TIME) + np.sin(2 * np.pi * 50.02 * TIME)
+    assert "harmonic" in {note.of for note in spin_of_trace(samples + noise(), RATE).notes if note.name == "hum"}
 
 
 def test_a_trace_without_noise_holds_no_hum_and_no_wandering_baseline():
