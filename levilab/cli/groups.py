@@ -31,12 +31,14 @@ def of_class(
     **given: Any,
 ) -> None:
     """Put the groups of a class beside each other."""
+    from levilab.present.terminal import draw, terminal
     from levilab.report.groups.document import write_class
     from levilab.report.reproduction import Heading
 
     heading = Heading(**{one.name: given.pop(one.name) for one in HEADING})
     with interruptible("nothing is written"):
-        written = write_class(paths or (), out, read_options(given, typed=True), message, heading)
+        options, show = read_options(given, typed=True), lambda one: terminal().print(draw(one))
+        written = write_class(paths or (), out, options, tell=message, show=show, heading=heading)
     result(Text("the class is in {file:s}", file=written))
 
 

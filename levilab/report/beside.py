@@ -19,6 +19,7 @@ from analysis.spindown.drag import LAWS
 from analysis.uncertainty import Estimate, mean, student
 from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import unquote
+from levilab.pipelines.inputs.names import seed_of_group, short_paths
 from levilab.present.numbers import enumeration, plain, with_sign, with_uncertainty
 from levilab.present.units import unit
 from levilab.texts.note import is_doubt, weight_of
@@ -65,7 +66,7 @@ class Compared:
         symbol: for people.
         unit: of results.
         estimates: of each group, as its analysis has them; None where it has no value with u.
-        widths: factors of their u where groups are compared: above 1 where u is of few repetitions alone.
+        widths: how much farther a value may be off by chance: above 1 where u is of few repetitions alone.
         truths: of each group; None where it is not known.
         mean: of those that are used, by the rule of several runs in a report; None where there are none.
         together: whether those agree; None where there are none.
@@ -121,6 +122,11 @@ class Compared:
         of_mean = np.hypot(np.sqrt(np.sum(u**2 - shared**2)) / len(used), shared.mean())
         return float(truths.mean()), float((values - truths).mean() / of_mean), float(of_mean)
 
+    @property
+    def difference(self) -> Estimate | None:
+        """The mean of value − truth; None where a truth is not known."""
+        return Estimate(self.truth[1] * self.truth[2], self.truth[2], self.unit) if self.truth else None
+
     @cached_property
     def from_class(self) -> tuple[float | None, ...]:
         """The distance of each group from the mean of the others, in u."""
@@ -129,11 +135,16 @@ class Compared:
 
     @cached_property
     def from_truth(self) -> tuple[float | None, ...]:
-        """The distance of each group from its truth, in its widened u."""
+        """The distance of each group from its truth, in its u."""
         return tuple(
             None if one is None or truth is None else (one.value - truth) / one.u  # type: ignore[operator]
-            for one, truth in zip(self.widened, self.truths, strict=True)
+            for one, truth in zip(self.estimates, self.truths, strict=True)
         )
+
+    def off(self, most: float) -> tuple[bool, ...]:
+        """Return whether each group is farther from its truth than a normal number `most` from zero [u]."""
+        pairs = zip(self.from_truth, self.widths, strict=True)
+        return tuple(distance is not None and abs(distance) > most * width for distance, width in pairs)
 
 
 @dataclass(frozen=True)
@@ -160,6 +171,13 @@ class Class:
     def marks(self) -> tuple[Mark, ...]:
         """The mark of each group."""
         return tuple(_mark(self, k) for k in range(len(self.groups)))
+
+    @property
+    def places(self) -> list[str]:
+        """The name of each run's folder, and of each file with the folders that distinguish it."""
+        files = [group.source.path for group in self.groups if not group.source.run]
+        names = dict(zip(files, short_paths(files), strict=True)) if files else {}
+        return [names.get(group.source.path, group.source.path.name) for group in self.groups]
 
     @property
     def knows_truth(self) -> bool:
@@ -275,8 +293,7 @@ def _quantity(
             analysis.shared_u(run, model, name, one["u"]) if one else 0.0 for run, one in zip(runs, good, strict=True)
         ),
     )
-    far = [distance is not None and abs(distance) > FAR for distance in of.from_truth]
-    used = tuple(bool(one) and not (doubt or off) for one, doubt, off in zip(good, doubts, far, strict=True))
+    used = tuple(bool(one) and not (doubt or far) for one, doubt, far in zip(good, doubts, of.off(FAR), strict=True))
     used = used if any(used) else of.used
     known, widened = ([*filter(None, compress(each, used))] for each in (of.estimates, of.widened))
     if not known:
@@ -318,7 +335,7 @@ def _mark(of: Class, k: int) -> Mark:
         truth, others = one.from_truth[k], one.from_class[k]
         if one.estimates[k] is None:
             wrong.append(Text("{symbol}: no value with u", symbol=one.symbol))
-        elif truth is not None and abs(truth) > FAR:
+        elif truth is not None and one.off(FAR)[k]:
             said = (
                 "{symbol}: {times:n} u from its truth: look at the residuals; a disturbed run, laws that fit as well "
                 "or another seed can be the cause"
@@ -330,7 +347,7 @@ def _mark(of: Class, k: int) -> Mark:
     remarks = tuple(text for text in group.warnings if text not in group.doubts)
     if (short := _too_short(of, k)) or group.doubts:
         return Mark(REPEAT if wrong else LOOK, (*[short] * bool(short), *wrong, *odd), remarks)
-    odd += remarks
+    odd += [*filter(None, [_other_seed(of, k)]), *remarks]
     return Mark(REPEAT if wrong else LOOK if odd else GOOD, (*wrong, *odd))
 
 
@@ -349,6 +366,20 @@ def _too_short(of: Class, k: int) -> str:
         goes_on = "the run was interrupted, levilab acquire {name:s} --resume {folder:s} continues it"
         advice = Text(goes_on, run.record.experiment, run.folder)
     return Text(said, n=lasts[k], usual=usual, advice=advice) if lasts[k] < usual / 2 else ""
+
+
+def _other_seed(of: Class, k: int) -> str:
+    """Return that a group has another seed than its worksheet lists, where most groups have theirs; else nothing."""
+    seeds = [group.source.run.record.seed if group.source.run else None for group in of.groups]
+    numbers = [seed_of_group(group.source.group, 0) for group in of.groups]
+    pairs = zip(seeds, numbers, strict=True)
+    firsts = [None if seed is None or number is None else seed - number for seed, number in pairs]
+    known = Counter(first for first in firsts if first is not None)
+    first, count = max(known.items(), key=lambda one: one[1], default=(0, 0))
+    if firsts[k] in {None, first} or 2 * count <= known.total():
+        return ""
+    said = "seed {seed:d}, where the worksheet of the other groups lists {listed:d}"
+    return Text(said, seed=seeds[k], listed=seed_of_group(of.groups[k].source.group, first))
 
 
 def count_readings(group: Group) -> int:
@@ -409,8 +440,12 @@ def verdict(of: Class) -> str:
 def _beside_truth(of: Compared) -> str:
     if of.truth is None:
         return ""
-    agrees = "agrees with" if abs(of.truth[1]) <= _AGREES else "disagrees with"
-    return Text(", and {agrees} the truth ({times:n} u)", agrees=agrees, times=with_sign(of.truth[1], 1))
+    _, distance, u = of.truth
+    agrees = "agrees with" if abs(distance) <= _AGREES else "disagrees with"
+    shown = of.show(distance * u, u)
+    return (
+        Text(", and {agrees} the truth (mean − truth = {difference})", agrees, with_uncertainty(shown)) if shown else ""
+    )
 
 
 def agreement(of: Class) -> str:
@@ -517,12 +552,12 @@ def _known_to(freedom: int) -> str:
 
 
 def _truth(of: Class) -> str:
-    distances = [one for quantity in of.quantities for one in quantity.from_truth if one is not None]
-    near = sum(abs(one) <= 2 for one in distances)
+    known = sum(one is not None for quantity in of.quantities for one in quantity.from_truth)
+    near = known - sum(sum(quantity.off(2)) for quantity in of.quantities)
     return Text(
         "On the virtual bench the truth is known: {near} of {values} lie within 2 u of it, where {percent:.0f} % are "
         "expected.",
         near=near,
-        values=how_many(len(distances), "value"),
+        values=how_many(known, "value"),
         percent=100 * _WITHIN_2_U,
     )

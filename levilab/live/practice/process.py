@@ -26,9 +26,10 @@ from levilab.live.practice.commands import CommandRefused, Voice
 from levilab.live.practice.drive import GATE_S, TRIGGER_V, PracticeDrive
 from levilab.live.practice.experiments import PRACTICE, PracticeExperiment, settings_for
 from levilab.live.practice.fall import cause_of_fall, masses_that_float
-from levilab.live.practice.seeds import keys_of_seed, seed_of_group
+from levilab.live.practice.seeds import keys_of_seed
 from levilab.live.practice.tasks import TASKS, Look, Tasks
 from levilab.live.practice.top import PracticeTop
+from levilab.pipelines.inputs.names import seed_of_group
 from levilab.pipelines.spindown.readings import release_of
 from levilab.runs.events import RunEvent
 from levilab.simulator.scene import Scene, read_scene

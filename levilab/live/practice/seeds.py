@@ -1,6 +1,5 @@
 """What a seed makes of the bench for practice: a top and a base of one's own, and the noise of the light."""
 
-import re
 from typing import Any
 
 import numpy as np
@@ -12,17 +11,6 @@ _DRAG_SCATTER = 0.02
 #: A base is stronger or weaker by this, at most three times.  The moment of its top makes up for it, since what lifts
 #: is their product: all float, though the masses that do lie within 3 %.
 _BASE_SCATTER, _MOST = 0.01, 3.0
-_NUMBER = re.compile(r"(\d{1,6})\s*$")
-
-
-def seed_of_group(group: str, first: int) -> int | None:
-    """Return the seed of a group by the number at the end of its name, as `levilab worksheet --seed FIRST` lists it.
-
-    >>> seed_of_group("Group 7", 100), seed_of_group("Lions", 100)
-    (106, None)
-    """
-    number = _NUMBER.search(group)
-    return first + int(number[1]) - 1 if number and int(number[1]) else None
 
 
 def keys_of_seed(scene: Scene, seed: int) -> dict[str, Any]:

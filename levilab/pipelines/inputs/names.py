@@ -55,3 +55,17 @@ def _natural(name: str) -> Iterator[tuple[float, str]]:
     """Yield the parts of a name, numbers as numbers, so that names are in a person's order."""
     for digits, letters in re.findall(r"([0-9]+)|([^0-9]+)", name):
         yield (float(digits), "") if digits else (math.inf, letters.casefold())
+
+
+#: At the end of a group's name.
+_NUMBER = re.compile(r"(\d{1,6})\s*$")
+
+
+def seed_of_group(group: str, first: int) -> int | None:
+    """Return the seed of a group by the number at the end of its name, as `levilab worksheet --seed FIRST` lists it.
+
+    >>> seed_of_group("Group 7", 100), seed_of_group("Lions", 100)
+    (106, None)
+    """
+    number = _NUMBER.search(group)
+    return first + int(number[1]) - 1 if number and int(number[1]) else None

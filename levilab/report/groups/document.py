@@ -12,7 +12,7 @@ from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from levilab.errors import DataError, check_ending
+from levilab.errors import DataError, as_typed, check_ending
 from levilab.files import check_writable
 from levilab.formats.texts import locate
 from levilab.pipelines.analyzed import A
@@ -25,7 +25,6 @@ from levilab.pipelines.inputs.unread import (
     Skipped,
     kind_of_unused,
     number_by_kind,
-    skipped_by_all,
 )
 from levilab.pipelines.recall import recall_suiting
 from levilab.present.document.blocks import (
@@ -44,7 +43,7 @@ from levilab.present.document.blocks import (
     in_language_of_reader,
 )
 from levilab.present.numbers import column, enumeration, plain, with_sign, without_unit
-from levilab.present.tables import Row, table
+from levilab.present.tables import Row, Table, table
 from levilab.report.beside import (
     FAR,
     GOOD,
@@ -71,7 +70,7 @@ from levilab.runs.find import RECORD
 from levilab.runs.run import Run, read_record
 from levilab.texts.note import Note as OneNote
 from levilab.texts.note import of_file
-from levilab.texts.text import Sentences, Text, spoken, verbatim
+from levilab.texts.text import Sentences, Text, in_language, spoken, verbatim
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -123,16 +122,16 @@ def class_document(
 def _left_out(results: Results) -> tuple[dict[Path, str], str]:
     """Return why inputs that can hold readings were not used, and a sentence about all other files."""
     said = (
-        "{file}: a table whose columns are not certain, which no search reads: name the file itself, or keep its "
-        "columns with `levilab open`"
+        "{file}: a table whose columns are not certain, which no search reads: `levilab open {typed}` asks for them, "
+        "and with --keep keeps the answer"
     )
     used = {source.path for _, found in results for source in found.sources}
-    skipped = skipped_by_all([found.skipped for _, found in results])
+    skipped = dict.fromkeys(one for _, found in results for one in found.skipped)  # not all analyses search all folders
     unread = {one.path: one.reason for one in skipped if isinstance(one, Skipped) and one.path}
-    left_out = [one for one in skipped if isinstance(one, LeftOut)]
+    left_out = [one for one in skipped if isinstance(one, LeftOut) and one.path not in used]
     for one in left_out:
-        if one.kind == OTHER_COLUMNS:
-            unread.setdefault(one.path, Text(said, file=str(one.path)))
+        if one.kind == OTHER_COLUMNS or (one.why and len(results) > 1):
+            unread.setdefault(one.path, Text(said, file=str(one.path), typed=as_typed(one.path)))
         elif one.kind.may_hold_readings:
             why = Text("{file:s}: {kind} ({advice})", str(one.path), kind=one.kind.name, advice=one.kind.advice)
             unread.setdefault(one.path, one.why or why)
@@ -145,11 +144,14 @@ def _left_out(results: Results) -> tuple[dict[Path, str], str]:
     return {path: unread[path] for path in sorted(unread) if path not in used | left_out_paths}, about
 
 
-def _why_unread(path: Path) -> str:
+def _why_unread(path: Path, why: str) -> Text:
+    """Return why an input was not read, with a command in the place of the option that would answer its question."""
+    typed = f"levilab open {as_typed(path)} --columns"
+    problem = re.sub(r'`columns` = ("[^"]*"|\S+)', lambda said: f"{typed} {said[1]} --keep", in_language(why))
     with suppress(DataError):
         if Run.load(path).status == "interrupted":
-            return "not read, and the run was interrupted: {problem}"
-    return "not read: {problem}"
+            return Text("not read, and the run was interrupted: {problem}", problem=plain_text(problem))
+    return Text("not read: {problem}", problem=plain_text(problem))
 
 
 def _copies(results: Results) -> dict[Path, Path]:
@@ -211,11 +213,14 @@ def _names_of_unread(paths: Sequence[Path], results: Results, folder_of: Callabl
     """Return names of inputs that could not be used: the folder of a group that has no other one, or a short path."""
     folders = [*map(folder_of, paths)]
     known = Counter([*folders, *(source.group for _, found in results for source in found.sources)])
-    names = [
-        folder if folder and known[folder] == 1 else ", ".join(filter(None, [folder, path.name]))
-        for path, folder in zip(paths, folders, strict=True)
-    ]
-    return names if len({*names}) == len(names) else short_paths(paths)
+    for files in ([path.name for path in paths], short_paths(paths)):
+        names = [
+            folder if folder and known[folder] == 1 else ", ".join(filter(None, [folder, file]))
+            for file, folder in zip(files, folders, strict=True)
+        ]
+        if len({*names}) == len(names):
+            break
+    return names
 
 
 def _each_reading_once(results: Results) -> Results:
@@ -298,32 +303,50 @@ def _marks(of: Class) -> Iterator[Tabular]:
         yield Tabular(f"{of.analysis.name}-marks", shown, note, first_column_wraps=True, wraps=("why",), narrow="stack")
 
 
+def _short_table(of: Class) -> Table:
+    """Return a row for each group: its mark, the value that is compared first, and why it is not good."""
+    shown = [
+        (one.head, [one.show(each.value, each.u) if each else None for each in one.estimates]) for one in of.quantities
+    ]
+    head, estimates = shown[0] if shown else ("", [None] * len(of.groups))
+    names = (group.source.name for group in of.groups)
+    rows = [*zip(names, of.marks, column(estimates), strict=True), *((*one, "") for one in of.unread.items())]
+    cells = [(name, mark.word, value, Sentences(*mark.why, between="\n")) for name, mark, value in rows]
+    heads = ["group", "result", head, *["why"] * any(row[-1] for row in cells)]
+    return table(_subject(of), heads, (row[: len(heads)] for row in cells), numbers=[head])
+
+
 def _values(of: Class, quantity: Compared) -> Tabular:
     """Return a row for each group: its value, how far it lies from the others, and from the truth."""
     estimates = [quantity.show(one.value, one.u) if one else None for one in quantity.estimates]
-    mean = quantity.show(quantity.mean.value, quantity.mean.u) if quantity.mean else None
-    marks = [*(mark.word for mark in of.marks), ""]
-    columns = [column([*estimates, mean]), [*map(_distance, quantity.from_class), ""]]
+    mean, difference = (
+        quantity.show(one.value, one.u) if one else None for one in (quantity.mean, quantity.difference)
+    )
+    marks = [*(mark.word for mark in of.marks), "", ""]
+    columns = [column([*estimates, mean, difference]), [*map(_distance, quantity.from_class), "", ""]]
     heads = ["group", quantity.head, _FROM_CLASS]
     if of.knows_truth:
         truth, distance, _ = quantity.truth or (None, None, None)
         columns += [
-            [*map(truth_text, map(quantity.show, (*quantity.truths, truth)), (*estimates, mean))],
-            [*map(_distance, (*quantity.from_truth, distance))],
+            [*map(truth_text, map(quantity.show, (*quantity.truths, truth)), (*estimates, mean)), ""],
+            [*map(_distance, quantity.from_truth), "", _distance(distance)],
         ]
         heads += [_TRUTH, _FROM_TRUTH]
     columns, numbers, heads = [marks, *columns], heads[1:], [heads[0], "result", *heads[1:]]  # what a phone shows first
-    names = [*(group.source.name for group in of.groups), "class mean"]
-    kinds = [*(_ROWS[mark.word] for mark in of.marks), "together"]
+    names = [*(group.source.name for group in of.groups), "class mean", "mean − truth"]
+    kinds = [*(_ROWS[mark.word] for mark in of.marks), "together", "together"]
     rows = [Row(cells, kind) for kind, cells in zip(kinds, zip(names, *columns, strict=True), strict=True)]
-    rows = rows if len(of.groups) > 1 and mean else rows[:-1]
+    several = len(of.groups) > 1
+    rows = rows[: len(of.groups) + (several and mean is not None) + (several and difference is not None)]
     note = "value(u): the digits in parentheses are u of the last digits."
     if max(quantity.widths) > 1:
-        note = Sentences(note, "Groups are compared with a larger u, as few repetitions give it (Student's t).")
-    if quantity.truth and len(of.groups) > 1:
-        note = Sentences(
-            note, "The distance of the mean from the truth is in its u without the differences of the tops."
+        said = (
+            "u is of few repetitions: only a value more than {far:.1f} u from its truth is far off (Student's t); "
+            "distances from the others allow for that."
         )
+        note = Sentences(note, Text(said, far=FAR * max(quantity.widths)))
+    if difference and several:
+        note = Sentences(note, "mean − truth: each top has its own truth, so their differences are not in this u.")
     if mean and any(one and not use for one, use in zip(quantity.estimates, quantity.used, strict=True)):
         note = Sentences(note, "The mean is without results to repeat.")
     name = f"{of.analysis.name}-{quantity.name.replace('_', '-')}"
@@ -353,9 +376,9 @@ def _groups(of: Class) -> Tabular:
             plain(group.statistics.get("rms_residual")),
             plain(group.statistics.get("reduced_chi_square"), 2),
             group.best_model,
-            verbatim(group.source.path.name),
+            verbatim(place),
         )
-        for group in of.groups
+        for group, place in zip(of.groups, of.places, strict=True)
     ]
     full = [k for k in range(len(heads)) if any(row[k] not in {"", "—"} for row in rows)]
     heads, rows = [heads[k] for k in full], [tuple(row[k] for k in full) for row in rows]  # type: ignore[misc]
@@ -400,7 +423,9 @@ def write_class(
     paths: Sequence[Path],
     output: Path,
     given: Mapping[str, Any] | None = None,
-    tell: Callable[[str], None] | None = None,
+    *,
+    tell: Callable[[str], None] = lambda _: None,
+    show: Callable[[Table], None] = lambda _: None,
     heading: Heading | None = None,
 ) -> Path:
     """Put the groups of a class beside each other; what has no result yet is analyzed, and nothing is stored.
@@ -410,6 +435,7 @@ def write_class(
         output: the file to write; its ending, .html, .pdf or .xlsx, chooses the format.
         given: options of analyses by their names.
         tell: called with what lies there and is of no use.
+        show: called with a table of the groups by each analysis.
         heading: title, course, authors and date above it.
 
     Returns:
@@ -437,7 +463,7 @@ def write_class(
     results = _with_folders_as_groups(results, folder_of)
     classes = [class_of(analysis, found) for analysis, found in results]
     classes.sort(key=lambda of: -len(of.groups))  # what one group alone measured comes last
-    missing = {path: Mark(REPEAT, (Text(_why_unread(path), problem=plain_text(why)),)) for path, why in unread.items()}
+    missing = {path: Mark(REPEAT, (_why_unread(path, why),)) for path, why in unread.items()}
     names = {source.path: source.name for _, found in results for source in found.sources}
     copies = {
         path: first for path, first in copies.items() if first in names and _of_two_groups(path, first, folder_of)
@@ -454,10 +480,8 @@ def write_class(
     else:
         content = class_workbook(classes, date)
     write_content(output, content)
-    if tell:
-        unusable = (Text("not read: {problem}", why) for why in unread.values())
-        for text in dict.fromkeys([*_notes_of(classes), *unusable, *([others] if others else [])]):
-            tell(text)
-        found = tuple(Text("{subject} ({n})", subject=_subject(one), n=len(one.groups)) for one in classes)
-        tell(Text("groups or runs side by side: {found}", found=found))
+    for text in dict.fromkeys([*_notes_of(classes), *([others] if others else [])]):
+        tell(text)
+    for of in classes:
+        show(_short_table(of))
     return output

@@ -90,13 +90,13 @@ def _groups(of: Class) -> tuple[list[str], list[list[Cell]]]:
     names = "rms_residual", "reduced_chi_square"
     heads += ["readings", *names, "best_model"]
     rows = []
-    for k, (group, mark) in enumerate(zip(of.groups, of.marks, strict=True)):
+    for k, (group, mark, place) in enumerate(zip(of.groups, of.marks, of.places, strict=True)):
         source, record = group.source, group.source.run.record if group.source.run else None
         about: list[Cell] = [
             source.group or source.name,
             in_language(mark.word),
             "\n".join(map(in_language, mark.why)),
-            source.path.name,
+            place,
             source.note,
             (record.started_utc if record else None) or "",
             record.seed if record else None,

@@ -97,11 +97,13 @@ def test_of_results_that_share_an_input_a_class_counts_that_once_and_all_others(
     save(row, row.analyze([a, b]), tmp_path / "x1")
     save(row, row.analyze([a, c], row.options_from({"laws": laws} if laws else {})), tmp_path / "x2")
     paths = [tmp_path / "x1", tmp_path / "x2"]
-    page = Page(write_class(paths, tmp_path / "class.html", tell=(told := []).append).read_text(encoding="utf-8")).text
+    told, shown = [], []
+    written = write_class(paths, tmp_path / "class.html", tell=told.append, show=shown.append)
+    page = Page(written.read_text(encoding="utf-8")).text
     assert [text.partition(";")[0] for text in told if "not counted" in text] == [
         "a.csv (x2): not counted, as a.csv (x1) is a result of the same readings"
     ]
-    assert "groups or runs side by side: spin-down (3)" in told
+    assert [(one.title, len(one.rows)) for one in shown] == [("spin-down", 3)]
     save(row, row.analyze([a, b, c]), tmp_path / "x3")
     once = Page(write_class([tmp_path / "x3"], tmp_path / "class.html").read_text(encoding="utf-8")).text
     mean = r"class mean \S* ?\d\S+"

@@ -138,6 +138,18 @@ def test_the_only_folder_beside_runs_is_a_group(of_three, tmp_path):
     assert re.search(r"Group 5\s+(good|look)", page)
 
 
+def test_files_with_one_name_are_listed_with_their_folders(tmp_path):
+    for seed, name in enumerate(("Anna", "Ben")):
+        (tmp_path / name).mkdir()
+        spin_down_csv(tmp_path / name / "spin.csv", seed=seed)
+    page = Page(write_class([tmp_path], tmp_path / "class.html").read_text(encoding="utf-8")).text
+    assert re.search(r"Anna [^A-Z]*Anna/spin.csv Ben [^A-Z]*Ben/spin.csv", page.split("Runs")[-1])
+    book = CalamineWorkbook.from_path(write_class([tmp_path], tmp_path / "class.xlsx"))
+    assert [row[3] for row in book.get_sheet_by_name("spindown groups").to_python()] == [
+        "run", "Anna/spin.csv", "Ben/spin.csv",
+    ]  # fmt: skip
+
+
 def test_files_of_one_folder_and_runs_of_no_group_are_each_by_itself(tmp_path):
     """The folder that holds all of them is no group; a browser's duplicate and a run copied there are none, too."""
     for name in ("anna", "ben"):
@@ -315,6 +327,35 @@ def test_lower_and_upper_limits_have_no_mean(tmp_path):
     )
 
 
+def test_a_file_of_a_folder_that_only_one_analysis_searches_is_named(of_three, tmp_path):
+    """Analyses of the runs do not search the folder with files; one file has a question that a command answers."""
+    measured(tmp_path / "runs", ["Group 1"], "field", "field.settle_s=0")
+    (files := tmp_path / "files").mkdir()
+    spin_down_csv(files / "good.csv")
+    (files / "rpm.csv").write_text("t,f\n" + "".join(f"{10 * k},{2400 - 60 * k}\n" for k in range(15)), "utf-8")
+    write_class([tmp_path / "runs", files], tmp_path / "class.html", show=(shown := []).append)
+    assert f"levilab open {files / 'rpm.csv'} asks for them" in " ".join(str(shown).replace("`", "").split())
+    write_class([of_three, files / "rpm.csv"], tmp_path / "class.html", show=(shown := []).append)
+    assert f'say levilab open {files / "rpm.csv"} --columns "t=1,f=2 [rpm]" --keep' in str(shown)
+
+
+def test_a_group_with_a_seed_that_is_not_its_worksheets_is_named(tmp_path):
+    for group, seed in (("Group 1", 7), ("Group 2", 8), ("Group 3", 5), ("Lions", 90)):
+        acquired("spin", seed=seed, group=group, out=tmp_path, settings=RAISED_QUICKLY)
+    of = compared(tmp_path)
+    whys = {group.source.name: mark.why for group, mark in zip(of.groups, of.marks, strict=True)}
+    assert whys["Group 3"] == ("seed 5, where the worksheet of the other groups lists 9",)
+    assert not any("worksheet" in why for name, why in whys.items() if name != "Group 3")
+
+
+def test_the_u_beside_a_mean_and_its_distance_from_the_truth_are_of_one_number(of_three, tmp_path):
+    page = Page(write_class([of_three], tmp_path / "class.html").read_text(encoding="utf-8")).text
+    value, digits, distance = re.search(r"mean − truth (−?[\d.]+)\(([\d.]+)\)×10\S+ (\S+) value", page).groups()
+    shown = float(value.replace("−", "-")) / float(digits)  # 1.0(1.6)
+    assert float(distance.replace("−", "-")) == pytest.approx(shown, rel=0.1, abs=0.06)  # of rounded digits
+    assert f"truth (mean − truth = {value}({digits})×10⁻" in page
+
+
 def test_page_and_pdf_begin_with_the_result(of_three, tmp_path):
     page = write_class([of_three], tmp_path / "new" / "class.html").read_text(encoding="utf-8")
     places = [page.index(f">{title}<") for title in ("Result", "Figure", "Runs")]
@@ -358,17 +399,19 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
     (root / "photo.jpg").write_bytes(b"\xff\xd8\xff" + bytes(300))
     unread = {
         "Group 4.csv": ", line 1: holds 2 readings.* line 3: '10,abc' is no reading",
-        "Group 5.csv": ": a table whose columns are not certain, which no search reads: name the file itself",
+        "Group 5.csv": r': a table whose columns are not certain, which no search reads: `?levilab open "[^"]+5.csv"',
         "Group 6.xlsx": ": is a damaged ZIP or Excel file",
         "Group 7.csv": r": an empty file \(record again\)",
     }
     for paths in ([root], [*root.iterdir()]):
-        written = write_class(paths, tmp_path / "class.html", tell=(told := []).append)
+        written = write_class(paths, tmp_path / "class.html", tell=(told := []).append, show=(shown := []).append)
         page = Page(written.read_text("utf-8")).text
         assert f"2 of 7 results are good. To repeat: Group 2, {', '.join([*unread][:-1])} and Group 7.csv." in page
         for name, why in unread.items() if paths == [root] else ():
             assert re.search(rf"{name} repeat not read: \S*{name[:-4]}.*{why}", page)
-            assert sum(name in text for text in told) == 1
+            assert not any(name in text for text in told)
+            (cells,) = (row.cells for row in shown[0].rows if row.cells[0] == name)
+            assert re.search(why, cells[-1])
         assert "without readings: a picture (photo.jpg)" in told
         assert "without readings: a picture (photo.jpg)" in page
         assert "1 note" in page
@@ -409,7 +452,7 @@ def test_a_table_that_was_analyzed_without_doubtful_rows_is_not_called_unusable(
     table.write_text("t in s,f in Hz\n" + "".join(f"{10 * k},{40 - k}\n" for k in range(12)) + "130,2l\n", "utf-8")
     save(row := ANALYSES["spindown"], row.analyze([table], row.options_from({"skip_doubtful": True})))
     write_class([tmp_path], tmp_path / "class.html", tell=(told := []).append)
-    assert told == ["groups or runs side by side: spin-down (1)"]
+    assert told == []
 
 
 def test_page_and_spreadsheet_of_a_mixed_class_have_the_same_groups_and_numbers(of_three, tmp_path):
@@ -434,9 +477,10 @@ def test_page_and_spreadsheet_of_a_mixed_class_have_the_same_groups_and_numbers(
     row, mean = dict(zip(heads, own, strict=True)), dict(zip(of_class, together, strict=True))
     assert (row["mean_hz"], row["mean_u_hz"], row["readings"]) == (mean["mean"], mean["u"], 8)
     assert row["mean_u_hz"] == compared(root, "limit").found.runs[0].statistics.mean.u  # that of levilab analyze
-    expected = (row["mean_hz"] - row["mean_truth_hz"]) / row["mean_u_hz"] / _width(7)
+    expected = (row["mean_hz"] - row["mean_truth_hz"]) / row["mean_u_hz"]
     assert row["mean_from_the_truth_in_u"] == pytest.approx(expected)
-    assert mean["from_the_truth_in_u"] == pytest.approx(expected)
+    assert mean["from_the_truth_in_u"] == pytest.approx(expected / _width(7))
+    assert mean["u_without_tops"] == pytest.approx(row["mean_u_hz"] * _width(7))
 
 
 def test_a_run_of_few_readings_is_named_before_what_the_analysis_says(of_three, tmp_path):
