@@ -240,6 +240,11 @@ def analyze(
 ) -> AnalysisResult:
     """Analyze runs, data files or DataFrames.  Nothing is written; `save(folder)` of the result does.
 
+    >>> result = analyze("sample_data/spin-down-1")  # or a file, a DataFrame; arrays: analyze((t, f))
+    >>> result["c32"], result.best_model
+    (0.0002369(4) (rad/s)^-1/2/s, 'disc')
+    >>> figure = result.plot()  # in a notebook the last line of a cell shows it
+
     Args:
         data: a run, the path of a run folder, of a data file or of a folder to search, a pattern of paths, a DataFrame
             with columns as in data files (`time_s`, `spin_frequency_hz`, …, or titles that files may have, with their

@@ -85,6 +85,8 @@ def setup(app: Sphinx) -> dict[str, bool]:
     names = {stringify_annotation(kind, "smart"): f"~numpy.typing.{name}" for name, kind in kinds.items()}
 
     def sign(*of: Any) -> tuple[str | None, ...]:
+        if of[1] == "class" and of[2].startswith("levilab.notebook.") and not of[2].endswith(".Quantity"):
+            return "", None  # functions return it
         return tuple(text and shorten(text, names) for text in of[-2:])
 
     app.connect("autodoc-process-signature", sign)

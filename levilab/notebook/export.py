@@ -17,6 +17,8 @@ from levilab.runs.run import Run
 
 def export_data(data: Any, output: str | PathLike[str], **options: Any) -> list[Path]:
     """Write data for other programs; see `levilab.export`."""
+    if isinstance(data, AnalysisResult) and Path(output).suffix == ".json":
+        raise UsageError("output", "to_json(path) of a result writes it, save(folder) with its figure", value=output)
     return export(lambda: _contents(data), Path(output), **options)
 
 

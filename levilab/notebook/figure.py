@@ -98,6 +98,7 @@ def drawn(
     *,
     title: str | None = None,
     logy: bool = False,
+    figsize: tuple[float, float] | None = None,
     synthetic: Sequence[bool] = (True,),
 ) -> Figure | Axes:
     """Draw one panel into the given axes, which are returned, or into a figure of its own.
@@ -107,6 +108,7 @@ def drawn(
         ax: a person's axes, whose style stays as it is; None: there are none.
         title: above it.
         logy: whether the ordinate is logarithmic.
+        figsize: width and height of its own figure [inch].
         synthetic: whether each input is synthetic, which a figure of its own says.
     """
     with mpl.rc_context({} if ax else STYLE):
@@ -119,7 +121,7 @@ def drawn(
             ax.set_title(title)
         if logy:
             axes.set_yscale("log")
-    return ax or for_notebooks(figure)
+    return ax or for_notebooks(figure, figsize)
 
 
 def _bars(frame: pd.DataFrame, column: str) -> np.ndarray | None:

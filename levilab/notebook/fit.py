@@ -68,9 +68,18 @@ def _covariance(of: FittedModel) -> Array | None:
     return None if of.covariance is None else np.array(of.covariance, dtype=float)
 
 
-def _correlation(of: FittedModel) -> Array | None:
+def _correlation(of: FittedModel) -> pd.DataFrame | None:
     table = _covariance(of)
-    return None if table is None else table / np.sqrt(np.outer(np.diagonal(table), np.diagonal(table)))
+    if table is None:
+        return None
+    import pandas as pd
+
+    return pd.DataFrame(table / np.sqrt(np.outer(np.diagonal(table), np.diagonal(table))), [*of], [*of])
+
+
+def _r_squared(of: FittedModel) -> float:
+    _, y, used = of._readings
+    return float(1 - np.nanmean(_residual(of) ** 2) / np.var(y[used])) if used.any() else math.nan
 
 
 #: lmfit's name → its meaning here, and how it is found.  The reference has them.
@@ -85,12 +94,13 @@ FIT: Mapping[str, tuple[str, Callable[[FittedModel], Any]]] = MappingProxyType({
     "nfree": ("ndata less nvarys", _statistic("degrees_of_freedom")),
     "dof": ("`nfree`", _statistic("degrees_of_freedom")),
     "covar": ("covariance of `var_names`, an array", _covariance),
-    "correl": ("correlations of `var_names`, an array", _correlation),
+    "correl": ("correlations, a DataFrame: `correl['c32']['start_frequency']`", _correlation),
     "var_names": ("names of the parameters", lambda of: [*of]),
     "params": ("parameter → quantity", lambda of: of),
     "best_values": ("parameter → number", lambda of: {name: one.n for name, one in of.items()}),
     "valuesdict": ("a function that gives `best_values`", lambda of: lambda: {name: one.n for name, one in of.items()}),
     "best_fit": ("the curve at the readings, in SI", lambda of: of.eval()),
+    "rsquared": ("share of the readings' variance that the curve takes; near 1 even for a wrong law", _r_squared),
     "success": ("whether the fit converged", lambda of: bool(getattr(of._entry, "converged", True))),
     "priors": ("names of parameters to which the readings add little", lambda of: getattr(of._entry, "priors", [])),
     "residual": ("reading less curve, in SI; NaN: not used.  lmfit's is divided by u, with the other sign", _residual),
@@ -103,7 +113,6 @@ _OWN = ("weight", "rms_residual", "difference", "durbin_watson", "runs_test_p", 
 METHODS = ("eval", "eval_uncertainty", "conf_interval", "ci_report")
 #: Names that lmfit alone has → what to type here, of a fit and of a result.
 INSTEAD: Mapping[str, str] = MappingProxyType({
-    "rsquared": "redchi",
     "model": "best_model, its name, or models, all laws with their fits",
     "method": "kind, the analysis: the values are of least squares",
     "weights": "data, which has u of each reading; analyze((t, f, u)) takes other ones",

@@ -255,7 +255,7 @@ def write_frame(frame: pd.DataFrame, path: Path) -> None:
 
 def is_frame(data: Any) -> bool:
     """Return whether data are a DataFrame: pandas need not be loaded to know."""
-    return hasattr(data, "to_csv") and hasattr(data, "columns")
+    return hasattr(data, "reset_index") and hasattr(data, "columns")
 
 
 def has_numbers_for_titles(frame: pd.DataFrame) -> bool:

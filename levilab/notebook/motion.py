@@ -78,11 +78,9 @@ class SimulatedMotion(Exportable, Trajectory):
         "data": "to_dataframe()",
         "notes": "warnings",
         "theta": "tilt",
-        "to_netcdf": "export",
         **{name: lambda motion, name=name: getattr(motion.to_xarray(), name) for name in ("sel", "isel", "interp")},
     }
     instead: ClassVar[Mapping[str, str]] = {
-        "to_csv": "to_dataframe().to_csv(path), or export('motion.csv')",
         **dict.fromkeys(("coords", "dims"), "to_xarray(), which has it"),
         **dict.fromkeys(("samples", "dt", "step"), "time; rate=… of simulate chooses the states per second"),
     }
@@ -161,7 +159,13 @@ class SimulatedMotion(Exportable, Trajectory):
 
     @bare
     def plot(
-        self, what: str | None = None, *, ax: Axes | None = None, title: str | None = None, logy: bool = False
+        self,
+        what: str | None = None,
+        *,
+        ax: Axes | None = None,
+        title: str | None = None,
+        logy: bool = False,
+        figsize: tuple[float, float] | None = None,
     ) -> Figure | Axes:
         """Draw path, height, spin, tilt and energy in time, and the spectrum of the axis; it needs no display.
 
@@ -171,6 +175,7 @@ class SimulatedMotion(Exportable, Trajectory):
             ax: axes into which it is drawn, and which are returned.
             title: of the panel.
             logy: whether the ordinate is logarithmic.
+            figsize: width and height [inch].
 
         Raises:
             UsageError: there is no such quantity.
@@ -182,11 +187,12 @@ class SimulatedMotion(Exportable, Trajectory):
             frame = self.to_dataframe().assign(tilt_rad=self.tilt)
             if column not in frame:
                 raise UsageError("what", meant(column, [*_COLUMNS, *map(str, frame.columns)]), value=what)
-            return drawn(lambda axes: draw_column(axes, "time_s", column, frame), ax, title=title, logy=logy)
+            look: Any = {"title": title, "logy": logy, "figsize": figsize}
+            return drawn(lambda axes: draw_column(axes, "time_s", column, frame), ax, **look)
         from levilab.motion.figure import motion_figure  # with matplotlib
         from levilab.present.style import for_notebooks
 
-        return for_notebooks(motion_figure(self._found))
+        return for_notebooks(motion_figure(self._found), figsize)
 
     def write(self, folder: Path) -> Path:
         """Return its run folder, which is made in this one where there is none yet.  Raises CannotWrite."""

@@ -22,8 +22,13 @@ _OTHERS = {
     **dict.fromkeys(("sigma", "yerr", "dy", "u"), ("reading_u",)),
     **dict.fromkeys(("t", "x"), ("time", "x")),
     **dict.fromkeys(("f", "y", "freq", "frequency"), ("frequency", "spin_frequency_hz")),
-    **dict.fromkeys(("model", "law"), ("laws",)),
+    **dict.fromkeys(("model", "law"), ("laws", "best_model")),
     "n": ("exponent",),
+    **dict.fromkeys(("best_law", "best"), ("best_model",)),
+    **dict.fromkeys(("chi2", "chisq", "chi_square"), ("chisqr",)),
+    **dict.fromkeys(("chi2_red", "rchi2", "reduced_chi_square", "reduced_chi2"), ("redchi",)),
+    **dict.fromkeys(("r2", "r_squared"), ("rsquared",)),
+    "kind": ("what",),
     "correlation": ("correl",),
     **dict.fromkeys(("ci", "confidence", "confidence_interval"), ("conf_interval", "interval")),
 }
@@ -55,7 +60,7 @@ def meant(name: str, known: Iterable[str], lists: str = "dir()") -> str:
         return f"take {other}, {how}"
     others = [one for one in _OTHERS.get(name, ()) if one in names]
     whole = [one for one in names if {*name.split("_")} <= {*one.split("_")}]
-    near = others or whole or get_close_matches(name, names, n=3, cutoff=_ALIKE)
+    near = dict.fromkeys(others or whole or get_close_matches(name, names, n=3, cutoff=_ALIKE))
     if near:
         return f"did you mean {' or '.join(near)}?"
     more = f" and {len(names) - _MOST_NAMES} more, which {lists} lists" * (len(names) > _MOST_NAMES)
@@ -152,6 +157,9 @@ class Helpful:
 class Exportable(Helpful):
     """Such an object that other programs can read."""
 
+    @bare
     def export(self, output: str | PathLike[str], **options: Any) -> list[Path]:
         """Write it for other programs; the same as `levilab.export(self, output, …)`."""
         return levilab.export(self, output, **options)  # type: ignore[arg-type]
+
+    to_csv = to_excel = to_netcdf = export

@@ -28,7 +28,7 @@ ALSO: Mapping[str, str] = MappingProxyType({
 })  # fmt: skip
 #: Name in lmfit → where it stands.
 _INSTEAD = {
-    "correl": "correl of its model, as result.correl, or result.fit_report()",
+    "correl": "correl of its model, as result.correl['c32'], or result.fit_report()",
     "init_value": "value: the fit finds its own start",
     "vary": "result.var_names, the parameters that were fitted",
 }

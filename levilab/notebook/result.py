@@ -16,7 +16,7 @@ import numpy as np
 
 import levilab
 from levilab.errors import UsageError, unquote
-from levilab.files import CannotWrite, as_json, check_folder, replace_atomically
+from levilab.files import CannotWrite, as_json, check_folder, replace_atomically, writing
 from levilab.notebook.fit import FIT, INSTEAD, LEAST_CORRELATION, METHODS, FittedModel, axes_of
 from levilab.notebook.labels import dataset_of_contents
 from levilab.notebook.names import Exportable, bare, meant
@@ -91,11 +91,9 @@ class AnalysisResult(Exportable):
         "residual": "residuals",
         "df": "to_dataframe()",
         "message": "verdict",
-        "to_netcdf": "export",
         "notes": "warnings",
     }
     instead: ClassVar[Mapping[str, str]] = {
-        **dict.fromkeys(("to_csv", "to_excel"), "export('result.csv') or export('result.xlsx')"),
         "to_pandas": "to_dataframe()",
         "savefig": "plot().savefig(path)",
         "laws": "models",
@@ -113,7 +111,11 @@ class AnalysisResult(Exportable):
         "userkws": "document['settings']",
         **dict.fromkeys(("dump", "dumps"), "to_json(), or save(folder)"),
         **dict.fromkeys(("pull", "pulls"), "data, which has residuals and u of each reading"),
-        **dict.fromkeys(("x", "y"), "time, or data, which has all readings"),
+        **dict.fromkeys(("x", "y", "t", "f", "frequency", "spin"), "time, or data, which has all readings"),
+        **dict.fromkeys(("u", "errors", "stderr", "bse", "uncertainties"), "u of a quantity, as result['c32'].u"),
+        **dict.fromkeys(("head", "describe", "to_numpy", "to_markdown"), "to_dataframe(), which has it"),
+        **dict.fromkeys(("rms", "rmse"), "fit.rms_residual"),
+        **dict.fromkeys(("show", "print"), "plot(), or print(….summary())"),
         **dict.fromkeys(("sel", "isel", "interp", "coords", "dims", "data_vars", "attrs"), "to_xarray(), which has it"),
     }
 
@@ -411,9 +413,13 @@ class AnalysisResult(Exportable):
         """Return name → value, u, unit, in plain types."""
         return {name: {"value": one.value, "u": one.u, "unit": one.unit} for name, one in self.items()}
 
-    def to_json(self) -> str:
-        """Return the text of result.json, which has all of it."""
-        return as_json(self.document)
+    def to_json(self, path: str | PathLike[str] | None = None) -> str:
+        """Return the text of result.json, which has all of it; write it into a file, too, where one is named."""
+        text = as_json(self.document)
+        if path is not None:
+            with writing(Path(path)):
+                Path(path).write_text(text, "utf-8")
+        return text
 
     def to_latex(self) -> str:
         """Return the values as a small table of LaTeX; `levilab.report(result, …, tables=True)` writes all tables."""
@@ -516,6 +522,7 @@ class AnalysisResult(Exportable):
         title: str | None = None,
         model: str | None = None,
         logy: bool = False,
+        figsize: tuple[float, float] | None = None,
     ) -> Figure | Axes:
         """Draw the figure; it needs no display, a notebook shows it, and `savefig` writes it.
 
@@ -526,6 +533,7 @@ class AnalysisResult(Exportable):
             title: of the panel.
             model: whose curve and residuals; None: the best one.
             logy: whether the ordinate is logarithmic.
+            figsize: width and height [inch].
 
         Raises:
             UsageError: there is no such figure.
@@ -540,11 +548,12 @@ class AnalysisResult(Exportable):
         if what == "all":
             if of_panel:
                 raise UsageError("what", "ax, title, model and logy go with one panel: fit or residuals", value=what)
-            return for_notebooks(self.analysis.figure(self.found))
+            return for_notebooks(self.analysis.figure(self.found), figsize)
         if not of_panel and what == "residuals":
-            return for_notebooks(self._residuals_figure())
+            return for_notebooks(self._residuals_figure(), figsize)
         panel = self._panel(model)
-        return drawn(lambda axes: draw_fit(axes, what, *panel), ax, title=title, logy=logy, synthetic=self._synthetic)
+        look: Any = {"title": title, "logy": logy, "figsize": figsize, "synthetic": self._synthetic}
+        return drawn(lambda axes: draw_fit(axes, what, *panel), ax, **look)
 
     def _panel(self, model: str | None) -> tuple[pd.DataFrame, str, dict[str, Any]]:
         """Return the readings with a model's residuals, their column, and its curves.  Raises UsageError."""

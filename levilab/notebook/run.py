@@ -64,7 +64,6 @@ class RecordedRun(Exportable, Run):
         "experiment": "record.experiment",
         "note": "record.note",
         "name": "folder.name",
-        "to_netcdf": "export",
         **{name: lambda run, name=name: getattr(run.to_xarray(), name) for name in ("sel", "isel")},
     }
 
@@ -94,7 +93,6 @@ class RecordedRun(Exportable, Run):
         return self.to_dataframe()
 
     instead: ClassVar[Mapping[str, str]] = {
-        "to_csv": "df.to_csv(path), or export('run.csv')",
         "values": "df.to_numpy(), or analyze().values",
         "truth": "record.synthetic_how",
     }
@@ -125,7 +123,13 @@ class RecordedRun(Exportable, Run):
 
     @bare
     def plot(  # type: ignore[override]
-        self, what: str | None = None, *, ax: Axes | None = None, title: str | None = None, logy: bool = False
+        self,
+        what: str | None = None,
+        *,
+        ax: Axes | None = None,
+        title: str | None = None,
+        logy: bool = False,
+        figsize: tuple[float, float] | None = None,
     ) -> Figure | Axes:
         """Return the readings as they are, a panel for each channel; or one column in a panel.
 
@@ -134,14 +138,17 @@ class RecordedRun(Exportable, Run):
             ax: axes into which it is drawn, and which are returned.
             title: of the panel.
             logy: whether the ordinate is logarithmic.
+            figsize: width and height [inch].
 
         Raises:
             UsageError: there is no such column.
             DataError: the readings cannot be read.
         """
-        if what is None and ax is None and title is None and not logy:
-            return super().plot()
         from levilab.notebook.figure import draw_column, drawn  # with matplotlib
+        from levilab.present.style import for_notebooks
+
+        if what is None and ax is None and title is None and not logy:
+            return for_notebooks(super().plot(), figsize)
 
         frame = self.df
         x = next((name for name in ("height_m", "time_s") if name in frame), str(frame.columns[0]))
@@ -152,6 +159,7 @@ class RecordedRun(Exportable, Run):
             ax,
             title=title,
             logy=logy,
+            figsize=figsize,
             synthetic=[self.record.synthetic],
         )
 

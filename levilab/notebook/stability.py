@@ -71,17 +71,21 @@ class FloatingTop(Helpful):
         return as_document(self.found)
 
     @bare
-    def plot(self, *, ax: Axes | None = None, title: str | None = None) -> Figure | Axes:
+    def plot(
+        self, *, ax: Axes | None = None, title: str | None = None, figsize: tuple[float, float] | None = None
+    ) -> Figure | Axes:
         """Draw the spins that hold the top, at each height where field and weight balance.
 
         Args:
             ax: axes into which they are drawn, and which are returned.
             title: of the panel.
+            figsize: width and height [inch].
         """
         from levilab.notebook.figure import draw_windows, drawn  # with matplotlib
 
         frame = self.to_dataframe()
-        return drawn(lambda axes: draw_windows(axes, frame), ax, title=title or headline(self.found))
+        title = title or headline(self.found)
+        return drawn(lambda axes: draw_windows(axes, frame), ax, title=title, figsize=figsize)
 
     def __repr__(self) -> str:
         return f"<FloatingTop: {headline(self.found)}>"

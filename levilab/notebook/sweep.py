@@ -141,8 +141,17 @@ class SimulatedMap(Exportable):
             nearest = ", or method='nearest'" if how == "sel" else ""
             raise UsageError(how, f"values of an axis are expected{nearest}: {axes}", value=asked) from None
 
-    def plot(self, column: str | None = None) -> Figure:
-        """Draw an observable, by default the first one: a curve over one axis, a map over more.  Raises UsageError."""
+    @bare
+    def plot(self, column: str | None = None, *, figsize: tuple[float, float] | None = None) -> Figure:
+        """Draw an observable, by default the first one: a curve over one axis, a map over more.
+
+        Args:
+            column: the observable.
+            figsize: width and height [inch].
+
+        Raises:
+            UsageError: there is no such observable, or a table of points, which is no map.
+        """
         from levilab.notebook.figure import draw_column, drawn  # with matplotlib
         from levilab.present.style import for_notebooks  # with matplotlib
         from levilab.sweeps.figure import has_figure, map_figure
@@ -154,11 +163,13 @@ class SimulatedMap(Exportable):
         if len(plan.axes) == 1 and not plan.is_table:
             frame, y = self.to_dataframe(), column or names[0]
             title = headline(summarise(self.store))
-            figure = drawn(lambda axes: draw_column(axes, plan.axes[0].key, y, frame, ".-"), None, title=title)
+            figure = drawn(
+                lambda axes: draw_column(axes, plan.axes[0].key, y, frame, ".-"), None, title=title, figsize=figsize
+            )
             return cast("Figure", figure)
         if not has_figure(plan):
             raise UsageError("plot", "a table of points is no map: draw columns of to_dataframe()")
-        return for_notebooks(map_figure(self.store.load(), column or names[0]))
+        return for_notebooks(map_figure(self.store.load(), column or names[0]), figsize)
 
 
 def stored_map(path: str | PathLike[str]) -> SimulatedMap:

@@ -134,8 +134,10 @@ def _for_a_page(svg: str, prefix: str, title: str) -> str:
     return f"{head.replace('<svg', own, 1)}>{body}"
 
 
-def for_notebooks(figure: Figure) -> Figure:
-    """Let a notebook show the figure as a picture, whether pyplot is imported there or not; returns the figure."""
+def for_notebooks(figure: Figure, figsize: tuple[float, float] | None = None) -> Figure:
+    """Let a notebook show the figure as a picture, in the size wanted [inch]; returns the figure."""
+    if figsize is not None:
+        figure.set_size_inches(figsize)
     vars(figure)["_repr_png_"] = partial(as_png, figure)
     return figure
 

@@ -236,8 +236,7 @@ class PracticeDrive:
         limits = self.generator.limits
         self._hold = Hold(self._set.frequency_hz, Grip(spin, limits.drive_lowest_hz, limits.drive_frequency_hz))
         self._voice.say(
-            "drive on at the top's spin: at first its frequency goes after the top, and from within 20 s on the top "
-            "follows it"
+            "drive on at the top's spin: its frequency follows the top for at most 20 s, then the top follows the drive"
         )
 
     def _yield(self, hold: Hold, spin: float | None) -> None:

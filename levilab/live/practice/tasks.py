@@ -115,7 +115,7 @@ TASKS: dict[str, Task] = {
     ),
     "hold": Task(
         "Hold it for three minutes", "A free top is down after 90 s. Keep this one up, with a drive that holds it.",
-        "the drive gives back what the air takes: the tape lags behind it until the two are equal",
+        "the drive gives back what the air takes: the top turns behind it by the angle at which both torques are equal",
         "drive", lambda look: look.is_held, for_s=180.0,
     ),
     "mass": Task(

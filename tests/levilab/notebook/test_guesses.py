@@ -223,10 +223,21 @@ GUESSES = {
     "2 ** result['c32']": lambda number: 1 < number.n < 1.001 and number.s > 0,
     "levilab.runs(folder)['spin-down-1'].name": lambda name: name == "spin-down-1",
     "levilab.analyze(pd.DataFrame({'a': t, 'b': f}), columns={'time': 'a', 'frequency': 'b'}).ndata": lambda n: n == 20,
-    "result.correl[0, 1] * result.params['c32'].sigma * result.params['start_frequency'].u / result.covar[0, 1]": (
+    "(p := result.params, p.correl['c32']['start_frequency'] * p.covar.diagonal().prod() ** 0.5 / p.covar[0, 1])[1]": (
         lambda ratio: ratio == pytest.approx(1)
     ),
     "result.dof == result.nfree == 18": bool,
+    "(1 - result.rsquared) * np.var(run.df.spin_frequency_hz) / np.mean(result.residuals**2)": lambda ratio: (
+        ratio == pytest.approx(1)
+    ),
+    "result.plot(figsize=(9, 4)).get_size_inches().tolist()": lambda size: size == [9, 4],
+    "result.plot('residuals', figsize=(9, 4)).get_size_inches().tolist()": lambda size: size == [9, 4],
+    "result.plot('fit', figsize=(9, 4)).get_size_inches().tolist()": lambda size: size == [9, 4],
+    "[of.to_csv(new / 'e.csv', force=True)[0].name for of in (result, run, motion)]": lambda names: (
+        {*names} == {"e.csv"}
+    ),
+    "result.to_excel(new / 'e.xlsx')[0].name": lambda name: name == "e.xlsx",
+    "result.to_json(new / 'e.json') == (new / 'e.json').read_text('utf-8')": bool,
     "run.sel(time_s=190.0).spin_frequency_hz.item()": lambda spin: spin == 21.75,
     "levilab.sweep('undriven', spin_hz=[18, 30], duration=0.5).plot().axes[0].lines[0].get_ydata().tolist()": (
         lambda survived: survived == [0, 1]
@@ -306,8 +317,12 @@ REFUSED = {
     "result.foo_bar_baz": "known are ",
     "result.c1": "take result.models['stokes']['c1']",
     "result.redchisq": "did you mean redchi",
-    "result.to_csv('x.csv')": "export('result.csv')",
-    "result.to_excel('x.xlsx')": "export('result.xlsx')",
+    "result.export('x.json')": "to_json(path) of a result writes it",
+    "result.chi2_red": "did you mean redchi?",
+    "result.law": "did you mean best_model?",
+    "result.stderr": "take u of a quantity, as result['c32'].u",
+    "result.plot(kind='residuals')": "did you mean what?",
+    "result.params['c32'].err": "did you mean error or stderr?",
     "result.to_pandas()": "take to_dataframe()",
     "result.units": "result['c32'].unit",
     "result.savefig('x.png')": "take plot().savefig",
