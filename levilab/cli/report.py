@@ -36,7 +36,7 @@ def report(
         ),
     ] = True,
     short: Annotated[
-        bool, flag("Answer, values, figure and notes alone; of a few spin-downs one page.", "--short")
+        bool, flag("Answer, values, figure and notes alone; of one experiment a page.", "--short")
     ] = False,
     language: Language = "en",  # noqa: ARG001 - its callback speaks it
     **given: Any,

@@ -288,7 +288,8 @@ def _picture(writer: Writer, block: Picture, _: int) -> Html:
     caption = element("figcaption", element("strong", words(block.title)), " ", words(block.caption))
     width, height = figure.get_size_inches()
     size = "card short" if math.isfinite(block.most_inch) else "card wide" if height < _WIDE * width else "card"
-    return element("figure", element("div", drawn, class_=size, tabindex="0"), caption, id=prefix)
+    card = element("div", drawn, class_=size, tabindex="0", style=f"--shape: {height / width:.3f}")
+    return element("figure", card, caption, id=prefix)
 
 
 def _count_marks(svg: str, group: str) -> int:

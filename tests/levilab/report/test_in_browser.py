@@ -183,6 +183,22 @@ def test_a_short_report_and_a_worksheet_are_a_page_with_the_margins_of_a_printer
             assert page.pdf(prefer_css_page_size=True).count(b"/Type /Page\n") == 1, file.name
 
 
+@pytest.mark.parametrize("sample", ["spin-down-1", "sway/track.csv", "lower-limits", "hold/45-hz", "precession-sweep"])
+def test_the_figure_of_a_short_report_has_the_room_that_the_rest_leaves_of_its_page(browser, tmp_path, sample):
+    with with_drawing(), watch(browser, viewport={"width": 680, "height": 1020}) as page:  # A4 at 96 dpi less margins
+        page.goto(write_report([SAMPLE_DATA / sample], tmp_path / "report.html", short=True).as_uri())
+        page.emulate_media(media="print")
+        figure, whole = page.locator(".short").bounding_box(), page.locator(".short svg").bounding_box()
+        assert figure == whole
+        width, height = page.locator(".short svg").evaluate(
+            "svg => [svg.viewBox.baseVal.width, svg.viewBox.baseVal.height]"
+        )
+        end = page.locator("main > :last-child").bounding_box()
+        left = 1020 - end["y"] - end["height"]
+        assert left < 40 or figure["height"] > 0.98 * figure["width"] * height / width  # it is as wide as the page
+        assert page.pdf(prefer_css_page_size=True).count(b"/Type /Page\n") == 1
+
+
 def test_on_paper_a_section_of_nothing_but_what_is_left_out_there_has_no_title(browser, report):
     with watch(browser) as page:
         page.goto(report.as_uri())
