@@ -3,7 +3,8 @@
 The readings are fitted with the closed form of `analysis.field.ring` and a background that is the same everywhere (the
 probe's zero, the earth's field).  The calliper's values and the instrument's data sheet add Gaussian residuals to
 those of the readings, so that the covariance holds all that is known.  An uncertainty of height counts by the slope of
-the field at that height (effective variance: Orear, Am. J. Phys. 50, 912 (1982)).
+the field at that height (effective variance: Orear, Am. J. Phys. 50, 912 (1982)).  An unknown uncertainty of
+readings or of heights is found by restricted maximum likelihood (Patterson & Thompson, Biometrika 58, 545 (1971)).
 """
 
 import math
@@ -23,7 +24,7 @@ from analysis.field.ring import Ring, on_axis, reversal, slopes
 from analysis.least_squares import solve
 from analysis.remarks import Remark
 from analysis.residuals import durbin_watson, gross_errors, runs_test_p, studentise
-from analysis.uncertainty import Estimate, curvature
+from analysis.uncertainty import Estimate, curvature, student
 
 #: The parameters in the order of the covariance, and their units.
 UNITS: Mapping[str, str] = {
@@ -41,6 +42,10 @@ FEWEST_HEIGHTS = 4
 SAME_HEIGHT_M = 1e-5
 #: The effective variance depends on the fitted slope; after these iterations it has settled to 1e-6.
 _MOST_TURNS = 8
+#: Readings of unknown u are rounded to this part of the largest.
+_ROUNDING = 1e-9
+#: Unknown scatters are searched over these logarithms, in units of the residuals, and one of two from a small one.
+_LOGS, _SMALL = (-7.0, 3.0), -2.0
 #: A field below this multiple of the background's u counts as none.
 _NO_FIELD = 5.0
 #: The Durbin–Watson statistic of residuals in no order; it is smaller where neighbours are alike.
@@ -105,7 +110,7 @@ class Statistics:
         n: readings.
         n_parameters: fitted.
         rms_residual: [T].
-        chi_square: of readings and priors, None where no uncertainty of the readings was given.
+        chi_square: of readings and priors, None where uncertainties of readings or heights are unknown.
         degrees_of_freedom: readings and priors less parameters.
         durbin_watson, runs_test_p: of the residuals in the order of the heights.
     """
@@ -144,6 +149,7 @@ class FieldScan:
         height: of the readings, rising [m], shape (n,).
         flux_density: of the readings [T], shape (n,).
         u: of each reading against the model, with that of its height [T], shape (n,).
+        u_by_height: the part of it from the height [T], shape (n,).
         remarks: what to know before using the numbers.
     """
 
@@ -155,6 +161,7 @@ class FieldScan:
     height: Array
     flux_density: Array
     u: Array
+    u_by_height: Array
     remarks: tuple[Remark, ...] = ()
 
     @property
@@ -209,7 +216,7 @@ def fit_scan(
     flux_density: ArrayLike,
     known: Known,
     u: ArrayLike | None = None,
-    height_u: ArrayLike | float = 0.0,
+    height_u: ArrayLike | float | None = 0.0,
     *,
     free_radii: bool = False,
 ) -> FieldScan:
@@ -221,7 +228,7 @@ def fit_scan(
         known: what calliper and data sheet say.
         u: standard uncertainty of each reading without what is common to all (`known` holds that) [T], shape (n,).
             None: unknown, so all count alike and their scatter about the model gives it.
-        height_u: standard uncertainty of each height without what is common to all [m].
+        height_u: standard uncertainty of each height without what is common to all [m].  None: unknown, likewise.
         free_radii: fit the radii, too, with the calliper's values as priors.
 
     Raises:
@@ -239,35 +246,32 @@ def fit_scan(
     z, b, u_b, u_z = _check_columns(height, flux_density, u, height_u)
     _refuse_bad_scans(z, b, known)
     problem = _Problem(z, b, u_b, u_z, known, _free_parameters(known, free_radii=free_radii))
-    values, sigma = problem.solve()
-    return _describe_scan(problem, values, sigma)
+    return _describe_scan(problem, *problem.solve())
 
 
 # --- the input ---
 
 
 def _check_columns(
-    height: ArrayLike, flux_density: ArrayLike, u: ArrayLike | None, height_u: ArrayLike | float
-) -> tuple[Array, Array, Array | None, Array]:
+    height: ArrayLike, flux_density: ArrayLike, u: ArrayLike | None, height_u: ArrayLike | float | None
+) -> tuple[Array, Array, Array | None, Array | None]:
     """Check all columns, and return them in the order of the heights."""
     z = np.asarray(height, dtype=float)
     columns = {"height": z, "flux density": np.asarray(flux_density, dtype=float)}
-    columns["uncertainty of height"] = np.broadcast_to(np.asarray(height_u, dtype=float), z.shape)
-    if u is not None:
-        columns["uncertainty"] = np.broadcast_to(np.asarray(u, dtype=float), z.shape)
+    for quantity, given in (("uncertainty of height", height_u), ("uncertainty", u)):
+        if given is not None:
+            columns[quantity] = np.broadcast_to(np.asarray(given, dtype=float), z.shape)
     for quantity, values in columns.items():
         if values.shape != z.shape or z.ndim != 1:
             raise ShapesDiffer(quantity=quantity, seen=values.shape, expected=z.shape)
         check_finite(quantity, values)
-    for quantity, allowed in (("uncertainty of height", columns["uncertainty of height"] >= 0),) + (
-        () if u is None else (("uncertainty", columns["uncertainty"] > 0),)
-    ):
-        if not allowed.all():
-            index = int(np.flatnonzero(~allowed)[0])
-            raise NotPositive(quantity=quantity, unit="", index=index, value=float(columns[quantity][index]))
+    for quantity, refused in (("uncertainty of height", np.less), ("uncertainty", np.less_equal)):
+        wrong = np.flatnonzero(refused(columns.get(quantity, np.ones(1)), 0))
+        if wrong.size:
+            raise NotPositive(quantity=quantity, unit="", index=int(wrong[0]), value=float(columns[quantity][wrong[0]]))
     order = np.argsort(z, kind="stable")
-    u_b = columns["uncertainty"][order] if u is not None else None
-    return z[order], columns["flux density"][order], u_b, columns["uncertainty of height"][order]
+    u_b, u_z = (columns[name][order] if name in columns else None for name in ("uncertainty", "uncertainty of height"))
+    return z[order], columns["flux density"][order], u_b, u_z
 
 
 def _refuse_bad_scans(z: Array, b: Array, known: Known) -> None:
@@ -318,7 +322,7 @@ class _Problem:
         z: heights [m].
         b: readings [T].
         u_b: their u [T], None if not known.
-        u_z: u of the heights [m].
+        u_z: u of the heights [m], None if not known.
         known: the priors.
         free: the parameters to fit.
     """
@@ -326,7 +330,7 @@ class _Problem:
     z: Array
     b: Array
     u_b: Array | None
-    u_z: Array
+    u_z: Array | None
     known: Known
     free: tuple[str, ...]
 
@@ -347,18 +351,55 @@ class _Problem:
         by_ring = slopes(_ring(values), self.z)
         return np.vstack([by_ring[:3], np.ones_like(self.z), by_ring[3:]])
 
-    def sigma(self, values: Array) -> Array:
-        """Return u of each reading against the model [T], shape (n,)."""
-        by_height = on_axis(_ring(values), self.z, orders=2)[1] * self.u_z
-        u_b = self._scatter(values) if self.u_b is None else self.u_b
-        return np.asarray(np.hypot(u_b, by_height))
+    def sigma(self, values: Array) -> tuple[Array, Array]:
+        """Return u of each reading against the model, and the part of it from the height [T], shape (n,) each."""
+        slope = np.abs(on_axis(_ring(values), self.z, orders=2)[1])
+        ones = np.ones_like(slope)
+        u_b = _ROUNDING * np.abs(self.b).max() * ones if self.u_b is None else self.u_b
+        by_height = np.zeros_like(slope) if self.u_z is None else slope * self.u_z
+        unknown = [shape for shape, u in ((ones, self.u_b), (slope, self.u_z)) if u is None]
+        if not unknown:
+            return np.hypot(u_b, by_height), by_height
+        found = self._scatters(values, np.hypot(u_b, by_height), np.array(unknown))
+        if self.u_b is None:
+            u_b = np.hypot(u_b, found[0])
+        if self.u_z is None:
+            by_height = found[-1]
+        return np.hypot(u_b, by_height), by_height
 
-    def _scatter(self, values: Array) -> Array:
-        """Return the scatter about the model, or the rounding if that is larger [T], shape (n,)."""
-        left = self.b - self.model(values)
-        freedom = max(len(self.b) - len(self.free) + len(self.priors()), 1)
-        size = math.sqrt(float(left @ left) / freedom)
-        return np.full(len(self.b), max(size, 1e-9 * float(np.abs(self.b).max())))
+    def _scatters(self, values: Array, known: Array, shapes: Array) -> Array:
+        """Return the standard deviations of unknown size that residuals most likely have [T], shape (k, n).
+
+        The residuals are those of a fit that is linear about `values`.  Student's factor widens what few of them tell.
+
+        Args:
+            values: of the parameters.
+            known: standard uncertainty of each reading [T], shape (n,).
+            shapes: of the standard deviations, shape (k, n).
+        """
+        from scipy.optimize import minimize
+
+        n = len(known)
+        left = np.append(self.b - self.model(values), [(p.value - values[k]) / p.u for k, p in self.priors()])
+        slopes = self.weighted_slopes(values, np.ones(n))[self.indices]
+        slopes = slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
+        size = math.hypot(float(np.sqrt(np.mean(left[:n] ** 2))), float(known.min()))
+        shapes = size * shapes / np.sqrt(np.mean(shapes**2, axis=1, keepdims=True))
+
+        def weigh(logs: Array) -> tuple[Array, Array, Array]:
+            sigma = np.append(np.sqrt(known**2 + np.exp(2 * logs) @ shapes**2), np.ones(left.size - n))
+            return sigma, *np.linalg.qr((slopes / sigma).T)
+
+        def misfit(logs: Array) -> float:
+            sigma, basis, triangle = weigh(logs)
+            rest = left / sigma - basis @ (basis.T @ (left / sigma))
+            return float(np.log(sigma).sum() + np.log(np.abs(np.diagonal(triangle))).sum() + rest @ rest / 2)
+
+        starts = np.where(np.eye(len(shapes)) > 0, 0.0, _SMALL)
+        found = [minimize(misfit, start, method="L-BFGS-B", bounds=[_LOGS] * len(shapes)) for start in starts]
+        logs = min(found, key=lambda one: float(one.fun)).x
+        freedom = n - float(np.sum(weigh(logs)[1][:n] ** 2))
+        return np.asarray(student(freedom) * np.exp(logs)[:, None] * shapes)
 
     def start(self) -> Array:
         """Return starting values: the calliper's, or else the origin with the best fit of the strength alone."""
@@ -376,17 +417,17 @@ class _Problem:
             best = min(best, (float(left @ left), values), key=lambda one: one[0])
         return best[1]
 
-    def solve(self) -> tuple[Array, Array]:
-        """Fit; return the parameters and the uncertainty of each reading at them."""
+    def solve(self) -> tuple[Array, Array, Array]:
+        """Fit; return the parameters, the uncertainty of each reading at them, and its part from the height."""
         values = self.start()
         scale = self._scale(values)
         for _ in range(_MOST_TURNS):
-            sigma = self.sigma(values)
+            sigma, _ = self.sigma(values)
             before, values = values, self._iterate(values, sigma, scale)
             if np.all(np.abs(values - before) <= 1e-7 * scale):
                 break
         values[2] = abs(values[2])  # the field does not change with its sign
-        return values, self.sigma(values)
+        return values, *self.sigma(values)
 
     def _scale(self, start: Array) -> Array:
         """Return for each parameter a step that changes the field noticeably."""
@@ -425,7 +466,7 @@ class _Problem:
 # --- the result ---
 
 
-def _describe_scan(problem: _Problem, values: Array, sigma: Array) -> FieldScan:
+def _describe_scan(problem: _Problem, values: Array, sigma: Array, by_height: Array) -> FieldScan:
     known, free, moved = problem.known, problem.free, problem.indices
     jacobian = problem.weighted_slopes(values, sigma)
     found = curvature(jacobian[moved])
@@ -440,7 +481,7 @@ def _describe_scan(problem: _Problem, values: Array, sigma: Array) -> FieldScan:
         name: Estimate(float(value), float(size), unit)
         for (name, unit), value, size in zip(UNITS.items(), values, u, strict=True)
     }
-    scan = FieldScan(parameters, covariance, free, known, statistics, problem.z, problem.b, sigma)
+    scan = FieldScan(parameters, covariance, free, known, statistics, problem.z, problem.b, sigma, by_height)
     leverage = found.leverage[: len(problem.z)]
     return replace(scan, remarks=(*misfit, *_doubts(scan), *_outliers(scan, leverage)))
 
@@ -449,11 +490,12 @@ def _statistics(problem: _Problem, values: Array, sigma: Array) -> Statistics:
     left, priors = problem.b - problem.model(values), problem.priors()
     pulls = sum(((values[index] - prior.value) / prior.u) ** 2 for index, prior in priors)
     n, n_free = len(left), len(problem.free)
+    all_known = problem.u_b is not None and problem.u_z is not None
     return Statistics(
         n=n,
         n_parameters=n_free,
         rms_residual=float(np.sqrt(np.mean(left**2))),
-        chi_square=None if problem.u_b is None else float(np.sum((left / sigma) ** 2) + pulls),
+        chi_square=float(np.sum((left / sigma) ** 2) + pulls) if all_known else None,
         degrees_of_freedom=n + len(priors) - n_free,
         durbin_watson=durbin_watson(left / sigma),
         runs_test_p=runs_test_p(left),
@@ -504,15 +546,11 @@ class UPart:
     size: float
 
 
-def parts_of(scan: FieldScan, height_u: ArrayLike | float) -> dict[str, tuple[UPart, ...]]:
+def parts_of(scan: FieldScan) -> dict[str, tuple[UPart, ...]]:
     """Return the parts of each parameter's u.
 
     The covariance of the fit is H = (Σ s sᵀ/σ² + Σ p pᵀ)⁻¹ = H (Σ s sᵀ u_b²/σ⁴ + Σ s sᵀ (B′u_z)²/σ⁴ + Σ p pᵀ) H: a sum
     of what readings, heights and each of the priors leave.
-
-    Args:
-        scan: the fit.
-        height_u: standard uncertainty of each height, in the order of `scan.height` [m].
     """
     problem = _Problem(scan.height, scan.flux_density, None, np.zeros_like(scan.height), scan.known, scan.fitted)
     moved, values = problem.indices, scan.values
@@ -524,8 +562,7 @@ def parts_of(scan: FieldScan, height_u: ArrayLike | float) -> dict[str, tuple[UP
     n = len(scan.height)
     gain = np.zeros((6, n + len(problem.priors())))  # of each parameter, by each residual of unit variance
     gain[moved] = h @ jacobian[moved]
-    of_height = np.abs(on_axis(scan.ring, scan.height)[1] * np.broadcast_to(height_u, scan.height.shape)) / scan.u
-    of_height = np.minimum(of_height, 1.0)
+    of_height = scan.u_by_height / scan.u
     sizes: dict[str, Array] = {
         "readings": np.linalg.norm(gain[:, :n] * np.sqrt(1 - of_height**2), axis=1),
         "heights": np.linalg.norm(gain[:, :n] * of_height, axis=1),

@@ -95,7 +95,7 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
         readings.flux_density,
         known,
         readings.u,
-        0.0 if readings.height_u is None else readings.height_u,
+        readings.height_u,
         free_radii=options.free_radii,
     )
     floating = follow(scan, top) if scan.is_of_a_ring else None
@@ -105,7 +105,7 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
     if readings.u is None:
         warnings.append("no uncertainty of the readings is given: their scatter about the fit stands for it")
     if readings.height_u is None:
-        warnings.append("no uncertainty of the heights is given: they are taken as exact")
+        warnings.append("no uncertainty of the heights is given: their scatter about the fit stands for it")
     return FieldRun(scan, top, floating, tuple(warnings), taken)
 
 

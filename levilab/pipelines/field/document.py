@@ -40,9 +40,7 @@ _TYPE_A = frozenset({"readings", "excess"})
 
 def budget_of_run(source: Source[FieldReadings], run: FieldRun, _: FieldOptions) -> tuple[Budget, ...]:
     """Return the budgets of the parameters of one scan."""
-    scan, readings = run.scan, source.readings
-    u_z = np.zeros(len(readings)) if readings.height_u is None else readings.height_u
-    parts = parts_of(scan, u_z[np.argsort(readings.height, kind="stable")])
+    scan, parts = run.scan, parts_of(run.scan)
     return tuple(
         Budget(
             name, found.value, found.u, found.unit,
@@ -71,15 +69,15 @@ def _input(source: Source[FieldReadings], scan: FieldScan, part: UPart) -> tuple
     if prior is not None:
         return prior.u, UNITS[part.name], "before the scan, common to all readings"
     readings = source.readings
+    if {"heights": readings.height_u, "readings": readings.u}.get(part.name, part) is None:
+        return None, "", "their scatter about the fit"
     if part.name == "heights" and readings.height_u is not None:
         return (
             float(np.sqrt(np.mean(readings.height_u**2))),
             "m",
             "each height by itself, by the slope of the field there",
         )
-    if part.name == "readings":
-        if readings.u is None:
-            return None, "", "their scatter about the fit"
+    if part.name == "readings" and readings.u is not None:
         number = source.number(EXPERIMENT, "readings")
         text = Text("mean of {n:g} readings; the last digit is in it", n=number) if number else "each reading by itself"
         return float(np.sqrt(np.mean(readings.u**2))), "T", text

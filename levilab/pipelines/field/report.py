@@ -236,7 +236,7 @@ def _meaning(analysis: FieldAnalysis) -> Iterator[str]:
     yield "What the base holds up is in proportion to its strength: 1 % stronger, and the top weighs 1 % more."
     reduced = scan.statistics.reduced_chi_square
     if reduced is None:
-        yield "No uncertainty of the readings is given, so whether a ring describes the field is not tested."
+        yield "Uncertainties of readings or heights are not given, so whether a ring describes the field is not tested."
     elif all(remark.kind != "scan scatters" for remark in scan.remarks):
         yield Text("A uniform ring describes the readings to their uncertainties (χ²/dof = {chi:n}).", digits(reduced))
     else:

@@ -46,6 +46,21 @@ def test_uncertainties_predict_the_scatter(free_radii):
     assert np.mean(reduced) == pytest.approx(1.0, abs=3 * np.sqrt(2 / 16 / 25) + 0.05)  # 0.05: radii that are held
 
 
+@pytest.mark.parametrize(("u_b", "u_z"), [(1e-6, U_Z), (1e-4, 0.0)])
+def test_of_heights_and_readings_without_u_the_fit_finds_which_scatter(u_b, u_z):
+    pulls = []
+    for seed in range(25):
+        ring, background = drawn(seed)
+        found = fit_scan(Z, scan(seed, ring, background, u_b, u_z), KNOWN, None, None)
+        pulls.append(
+            (found.values - [ring.strength, ring.origin, ring.thickness, background, 0, 0])[:4]
+            / np.sqrt(np.diagonal(found.covariance))[:4]
+        )
+    assert np.std(pulls, axis=0) == pytest.approx(
+        np.ones(4), abs=0.43
+    )  # as above; 1.9 for the origin by heights that are exact
+
+
 def test_a_scan_without_noise_gives_the_ring_back():
     known = replace(
         KNOWN, inner_radius=Prior(0.0301, 0.0), outer_radius=Prior(0.0549, 0.0), thickness=None, origin=None
