@@ -180,7 +180,7 @@ class SimulatedMotion(Exportable, Trajectory):
         Raises:
             UsageError: there is no such quantity.
         """
-        if what is not None or ax is not None or title is not None or logy:
+        if what is not None or ax is not None or title is not None or logy or figsize:
             from levilab.notebook.figure import draw_column, drawn  # with matplotlib
 
             column = _COLUMNS.get(what or "z", what or "z")
@@ -192,7 +192,7 @@ class SimulatedMotion(Exportable, Trajectory):
         from levilab.motion.figure import motion_figure  # with matplotlib
         from levilab.present.style import for_notebooks
 
-        return for_notebooks(motion_figure(self._found), figsize)
+        return for_notebooks(motion_figure(self._found))
 
     def write(self, folder: Path) -> Path:
         """Return its run folder, which is made in this one where there is none yet.  Raises CannotWrite."""

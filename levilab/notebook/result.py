@@ -542,13 +542,14 @@ class AnalysisResult(Exportable):
         from levilab.present.style import for_notebooks
 
         of_panel = ax is not None or title is not None or model is not None or logy
-        what = what or ("fit" if of_panel else "all")
+        what = what or ("fit" if of_panel or figsize else "all")
         if what not in {"all", "fit", "residuals"}:
             raise UsageError("what", meant(what, ("all", "fit", "residuals")), value=what)
         if what == "all":
-            if of_panel:
-                raise UsageError("what", "ax, title, model and logy go with one panel: fit or residuals", value=what)
-            return for_notebooks(self.analysis.figure(self.found), figsize)
+            if of_panel or figsize:
+                expected = "ax, title, model, logy and figsize go with one panel: fit or residuals"
+                raise UsageError("what", expected, value=what)
+            return for_notebooks(self.analysis.figure(self.found))
         if not of_panel and what == "residuals":
             return for_notebooks(self._residuals_figure(), figsize)
         panel = self._panel(model)
@@ -574,6 +575,8 @@ class AnalysisResult(Exportable):
 
         best = self.best_model
         title = f"{self.kind}{f', {best}' * bool(best)}: readings, and residuals"
+        if getattr(self.found, "is_doubtful", False):
+            title = self.verdict
         frame, residual, curves = self._panel(None)
         return residuals_figure(frame, residual, title, self._synthetic, curves)
 

@@ -147,7 +147,7 @@ class SimulatedMap(Exportable):
 
         Args:
             column: the observable.
-            figsize: width and height [inch].
+            figsize: width and height of a curve [inch].
 
         Raises:
             UsageError: there is no such observable, or a table of points, which is no map.
@@ -169,7 +169,9 @@ class SimulatedMap(Exportable):
             return cast("Figure", figure)
         if not has_figure(plan):
             raise UsageError("plot", "a table of points is no map: draw columns of to_dataframe()")
-        return for_notebooks(map_figure(self.store.load(), column or names[0]), figsize)
+        if figsize:
+            raise UsageError("figsize", "a map has its own size: savefig(path, dpi=300) makes it larger", value=figsize)
+        return for_notebooks(map_figure(self.store.load(), column or names[0]))
 
 
 def stored_map(path: str | PathLike[str]) -> SimulatedMap:

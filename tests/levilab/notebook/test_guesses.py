@@ -231,6 +231,10 @@ GUESSES = {
         ratio == pytest.approx(1)
     ),
     "result.plot(figsize=(9, 4)).get_size_inches().tolist()": lambda size: size == [9, 4],
+    "[len(of.plot(figsize=(9, 4)).axes) for of in (result, run, motion, swept)]": lambda panels: panels == [1] * 4,
+    "levilab.analyze((t, 1000 * f)).plot('residuals').texts[0].get_text()": lambda text: text.startswith(
+        "The unit comes"
+    ),
     "result.plot('residuals', figsize=(9, 4)).get_size_inches().tolist()": lambda size: size == [9, 4],
     "result.plot('fit', figsize=(9, 4)).get_size_inches().tolist()": lambda size: size == [9, 4],
     "[of.to_csv(new / 'e.csv', force=True)[0].name for of in (result, run, motion)]": lambda names: (
