@@ -1,4 +1,4 @@
-"""Tables in the dress of the program that wrote them: Markdown, Arduino's monitor and plotter, LabVIEW, CASSY.
+"""Tables in the dress of what wrote them: Markdown, Arduino's monitor and plotter, a person's notes, LabVIEW, CASSY.
 
 Each is rewritten line by line, so that the n-th line stays the n-th, with tabs between the fields.
 """
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf
 
-from levilab.formats.dialect import Dialect, find_dialect
+from levilab.formats.dialect import Dialect, clock_time, find_dialect
 from levilab.formats.titles import read_title
 
 #: Lines that are looked at, and the part of them that has to be in a dress: a log may begin in the middle of a line.
@@ -118,6 +118,23 @@ def _monitor(lines: Sequence[str]) -> Dressed:
     return Dressed(_content(["\t".join(row) for row in rows]), titles)
 
 
+# --- notes ---------------------------------------------------------------------------------------------
+
+#: A time and a spin with their units, words or a dash before them, and no other number.
+_NOTE = re.compile(
+    r"\s*(?:[^\W\d]|[-*•]\s)\D*?"
+    r"((?:\d+\s?h\s?)?(?:\d+\s?min\s?)?\d+(?:[.,]\d+)?\s?(?:s|se[ck]|min)\b)\.?"
+    r"\D*?(\d+(?:[.,]\d+)?\s?(?:Hz|rpm|(?:U|1)/min))\W*$",
+    re.IGNORECASE,
+)
+
+
+def _notes(lines: Sequence[str]) -> Dressed:
+    """After 1 min 30 s: 34.2 Hz."""
+    found = [_NOTE.match(line) for line in lines]
+    return Dressed(_content([f"{clock_time(one[1]):g}\t{one[2]}" if one else "" for one in found]), ("t [s]", "f"))
+
+
 # --- CASSY --------------------------------------------------------------------------------------------
 
 _DEFINITION = re.compile(r"(?:.*\t)?\s*DEF\s*=\s*")
@@ -173,6 +190,7 @@ _DRESSES: Sequence[tuple[Callable[[Sequence[str]], Dressed], Callable[[Sequence[
     (_labview, lambda lines: any(map(_SETTINGS.match, lines))),
     (_cassy, lambda lines: any(_DEFINITION.match(line) for line in lines)),
     (_markdown, lambda lines: any(map(_RULE.fullmatch, lines))),
+    (_notes, _mostly(_NOTE)),
     *((partial(_plotter, label=label, more=more), _mostly(_pairs(label, more))) for label, more in (_COLON, _WORD)),
     (_monitor, _mostly(_STAMP)),
 )

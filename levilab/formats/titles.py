@@ -103,7 +103,7 @@ PERIODS = (
 )  # fmt: skip
 TURNS = (
     "turns", "rotations", "revolutions", "revs", "rev", "umdrehungen", "umdr.", "umdr", "umlaufe", "rotationen",
-    "tours", "varv", "vueltas",
+    "tours", "varv", "vueltas", "pulses", "pulse", "impulse", "counts",
 )  # fmt: skip
 #: The time of N turns: 10 Umdrehungen, 10 T, time for 10 turns.
 _TIME_OF_TURNS = re.compile(
@@ -237,7 +237,7 @@ _FOLDED_UNITS = frozenset(name.casefold() for units in UNITS.values() for name i
 def plain_unit(text: str) -> str:
     """Return a unit as the table spells it: µ as μ, min⁻¹ as /min, without blanks, dots, carets and brackets."""
     plain = re.sub(r"[\s^·*()\[\]]", "", unicodedata.normalize("NFKC", text).replace("−", "-"))
-    return re.sub(r"\.?(s|min)-1$", r"/\1", plain)
+    return re.sub(r"\.?(s|min)-1$", r"/\1", plain).removesuffix(".")
 
 
 def factor_of(text: str, units: Mapping[str, float]) -> float | None:

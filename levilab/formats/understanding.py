@@ -86,6 +86,10 @@ _NO_U = re.compile(r"(?i)2 ?(σ|sigma)|k ?= ?2|fehler|error|unsicherheit|uncerta
 _UNITS, _UNITS_OF_TIME = ("Hz", "rpm", "rad/s", "°/s"), ("s", "ms", "min", "h", "μs")
 #: Uncertainties of a spreadsheet, in % or without a unit, below which they may be parts of one, shown in %.
 _LEAST_PERCENT = 0.02
+_NO_TIMES_OF_PERIODS = (
+    "no column is known to be time_s, at which the turns were timed: say `columns` = t=NAME; where each row is the "
+    "next turn, keep the times of the turns alone in a file, titled as dt [ms]"
+)
 #: Columns of a spin-down.
 SPIN = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 _SPIN = "spin_frequency_hz"
@@ -312,10 +316,11 @@ def _question(
     numbers = _numbers(layout, index)
     total = _spins_of_total(layout, numbers, time)
     units = [TOTAL] if total else [*possible_spins(median(numbers))] if numbers else []
-    if units == ["Hz"] and not always:
+    per_reading = "" if total else _turns_per_reading(layout, numbers, time)
+    counts = is_total("".join(layout.header[index : index + 1]))
+    if units == ["Hz"] and not always and not (counts and per_reading):
         return None
-    if numbers and not total and (per_reading := _turns_per_reading(layout, numbers, time)):
-        units = [per_reading, *units]
+    units = [*filter(None, [per_reading]), *units]
     spins = {unit: total or [number * (unit_factor(unit, "frequency") or 1.0) for number in numbers] for unit in units}
     if not spins and numbers[-1:] > numbers[:1]:  # the turns of a top that slows down last ever longer
         spins = _likely(_spins_of_periods(numbers))
@@ -713,7 +718,7 @@ def _plan(path: Path, text: Text, layout: Layout, part: Part, request: Request) 
         )
     for name in needed:
         if name not in {column.name for column in chosen}:
-            raise _total_of_turns(path, name, layout, chosen, request) or no_column(
+            raise _of_turns(path, name, layout, chosen, request) or no_column(
                 path, name, meant, _which_columns(layout, [name])
             )
     warnings += _notes_on_u(path, layout, chosen, wanted=companion(_SPIN) in quantities)
@@ -813,10 +818,13 @@ def _key(name: str) -> str:
     return next((short for short, long in SHORTHANDS.items() if long == name), name)
 
 
-def _total_of_turns(
-    path: Path, name: str, layout: Layout, chosen: Sequence[Column], request: Request
-) -> NoSuchColumn | None:
-    """Return the question for a table that has no spin but turns counted since the beginning, which only grow."""
+def _of_turns(path: Path, name: str, layout: Layout, chosen: Sequence[Column], request: Request) -> NoSuchColumn | None:
+    """Return the error for a table of turns that were timed without their own times, or were counted without a spin.
+
+    Counted since the beginning, they only grow.
+    """
+    if name == "time_s" and any(column.inverse for column in chosen):
+        return NoSuchColumn(path, _NO_TIMES_OF_PERIODS, doubt=_which_columns(layout, [name]))
     time = next((column for column in chosen if column.name == "time_s"), None)
     for k, title in enumerate(layout.header if name == _SPIN else ()):
         if nearly_a_frequency(title) == OVER_TIME and _spins_of_total(layout, _numbers(layout, k), time):
@@ -874,6 +882,13 @@ def _with_time(wanted: Mapping[str, str], filled: Sequence[str]) -> Mapping[str,
     return {"t": left[0], **wanted} if alone and left else wanted
 
 
+def _is_numbered(layout: Layout, filled: Sequence[str]) -> bool:
+    """Return whether the first of three columns has the numbers of the rows beside times, which grow."""
+    first, second = ([*pairwise(_numbers(layout, int(number) - 1))] for number in [*filled, "1", "1"][:2])
+    counts, grows = {after - before for before, after in first} == {1}, all(a < b for a, b in second)
+    return len(filled) == len(TITLES_WITHOUT_HEADER) and counts and grows
+
+
 def _spin_comes_first(layout: Layout, filled: Sequence[str]) -> bool:
     """Return whether the first column falls beside a second that rises from where no top spins: times."""
     first, second = ([*pairwise(_numbers(layout, int(number) - 1))] for number in [*filled, "1", "1"][:2])
@@ -908,6 +923,7 @@ def _titles(
         what = '{width} columns and no header; add one, or say `columns` = "t=1,f=2"'
         raise NoSuchColumn(path, what, layout.width, line=layout.first_line)
     time, spin, u = TITLES_WITHOUT_HEADER
+    filled = filled[_is_numbered(layout, filled) :]
     names = (spin, time, u) if _spin_comes_first(layout, filled) else TITLES_WITHOUT_HEADER
     taken = taken or dict(zip(names, filled, strict=False))
     said = "{path:s}: no header; the columns are taken as {names:s}"

@@ -1,14 +1,14 @@
 """Lists of pulse times: one number a line, with a title or without."""
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.formats.columns import TableError, shorten
+from levilab.formats.columns import SHORTHANDS, TableError, find_column, shorten
 from levilab.formats.dialect import Dialect
 from levilab.formats.titles import is_unit, plain_unit, read_title, unit_factor
 from levilab.formats.waveforms.header import NoRate, NoWaveform
@@ -27,17 +27,21 @@ _TURNS_S = (1 / 75, 1 / 14)
 _UNITS, _BETWEEN = ("s", "ms", "us"), re.compile(r"(d|δ|Δ|delta)[ _]?t\b|interval|pulse to pulse", re.IGNORECASE)
 #: What a title of times may say: nothing known, times, or Δt, the uncertainty of times in a table.
 _TIMES = {None, "time_s", "time_u_s"}
+OTHER_COLUMNS = "holds readings: its columns are named"
 #: Lines that may stand above the first number.
 _MOST_TITLES = 20
 
 
-def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool = True) -> PulseTimes | Waveform:
+def read_column(
+    head: Head, dialect: Dialect, rate: float | None, *, columns: Mapping[str, str] | None = None, guess: bool = True
+) -> PulseTimes | Waveform:
     """Read a file with one number a line: times that increase, or with a rate samples.
 
     Args:
         head: the beginning of the file.
         dialect: of its lines.
         rate: samples per second [Hz], of samples.
+        columns: `t` or `f` for times, or times from pulse to pulse, may state their unit: 1 [us].
         guess: whether a column without a title of times is taken for times.
 
     Raises:
@@ -51,6 +55,7 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
     titles = [" ".join(row) for row in fields[:first] if row]
     if first is None or len(titles) > _MOST_TITLES or any(any(row[1:]) for row in fields[first : first + 100]):
         raise NoWaveform(path, "holds no samples and no pulse times")
+    titles = _stated(path, titles, columns or {})
     blocks = partial(read_blocks, head, dialect, first + 1, [0])
     if rate is not None:
         return _samples(head, rate, blocks)
@@ -78,6 +83,19 @@ def read_column(head: Head, dialect: Dialect, rate: float | None, *, guess: bool
     return PulseTimes(path, "list of pulse times", times, tuple(warnings))
 
 
+def _stated(path: Path, titles: list[str], columns: Mapping[str, str]) -> list[str]:
+    """Return the titles, or in their place one that says what is stated of the column.  Raises TableError."""
+    for key, column in columns.items():
+        name, (_, unit) = SHORTHANDS.get(key, key), find_column(path, titles[-1:] or ["1"], key, column)
+        if name == "spin_frequency_hz" and unit_factor(unit, "time"):
+            titles = [f"dt [{unit}]"]
+        elif name != "time_s":
+            raise NoWaveform(path, OTHER_COLUMNS)
+        elif unit:
+            titles = [f"t [{unit}]"]
+    return titles
+
+
 def _must_be_of_turns(path: Path, times: NDArray[np.float64], line: int) -> None:
     """Raise TableError for times too far apart for a top's pulses, NoRate for times too near."""
     apart = float(np.median(np.diff(times)))
@@ -86,8 +104,8 @@ def _must_be_of_turns(path: Path, times: NDArray[np.float64], line: int) -> None
         raise TableError(path, what, apart, line=line)
     if apart < _SHORTEST_S:
         what = (
-            "as times of pulses its numbers are {apart:.3g} s apart, and no top turns so fast: of times from pulse to "
-            "pulse write dt with the unit above them, of samples say the `rate` in Hz"
+            "as times of pulses its numbers are {apart:.3g} s apart, and no top turns so fast: for times from pulse to "
+            'pulse say their unit, as `columns` = "f=1 [us]", of samples say the `rate` in Hz'
         )
         raise NoRate(path, what, apart)
 
@@ -109,8 +127,8 @@ def _turns(path: Path, numbers: NDArray[np.float64], unit: str, titles: list[str
         return None
     if not unit and not any(_BETWEEN.match(text) or read_title(text).inverse for text in titles):
         what = (
-            "holds one column of numbers without a unit: times from pulse to pulse are titled as dt [{unit:s}]; of "
-            "samples say the `rate` in Hz"
+            "holds one column of numbers without a unit: for times from pulse to pulse say "
+            '`columns` = "f=1 [{unit:s}]", of samples say the `rate` in Hz, of spins add a column of their times'
         )
         raise NoRate(path, what, found)
     return numbers * (unit_factor(found, "time") or 1.0)

@@ -11,7 +11,7 @@ from levilab.formats.texts import SPREADSHEETS, TEXTS, locate, texts_of
 from levilab.formats.waveforms.audio import read_audio
 from levilab.formats.waveforms.header import NoWaveform, dialect_of, says_its_step
 from levilab.formats.waveforms.npy import read_npy
-from levilab.formats.waveforms.pulse_times import read_column
+from levilab.formats.waveforms.pulse_times import OTHER_COLUMNS, read_column
 from levilab.formats.waveforms.rows import read_head
 from levilab.formats.waveforms.samples import read_samples
 from levilab.formats.waveforms.scope_binary import SUFFIXES, read_scope_binary
@@ -30,7 +30,8 @@ def read_record(
 
     Args:
         path: the file.
-        columns: `t` names the column of times of a table whose titles are not known.
+        columns: `t` names the column of times of a table whose titles are not known; `f` that of times from pulse to
+            pulse, with their unit: 1 [us].
         rate: samples per second [Hz]; goes before what the file says.
         guess: whether one column without a title is taken for pulse times.
 
@@ -51,12 +52,12 @@ def read_record(
             what = "is read for readings alone, as several sheets or runs and serial logs are: save samples as CSV"
             raise NoWaveform(path, what)
         head = read_head(path, texts[0])
-        if set(columns or ()) - {"t", "time_s"}:
-            raise NoWaveform(path, "holds readings: its columns are named")
         dialect = ALIGNED if texts[0].aligned else dialect_of(head)
         alone = dialect.separator is None and all(len(dialect.split(line)) < 2 for line in head.lines[-20:])
         if alone and not says_its_step(head, dialect):
-            return read_column(head, dialect, rate, guess=guess)
+            return read_column(head, dialect, rate, columns=columns or {}, guess=guess)
+        if set(columns or ()) - {"t", "time_s"}:
+            raise NoWaveform(path, OTHER_COLUMNS)
         return read_samples(head, dialect, columns=columns or {}, rate=rate)
 
 

@@ -21,6 +21,8 @@ BLOCK = 1 << 17
 FEWEST_SAMPLES, FEWEST_PULSES = 16, 4
 #: No sampling interval of a laboratory lies outside [s]; beyond, the numbers are no measurement.
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-15, 1e6
+#: A given rate is off by less than this factor: a film in slow motion by 32, one in kHz by a thousand.
+MOST_OFF = 100.0
 #: Values beyond are no voltage of a laboratory: scopes write 9.9E37 where a sample is missing.
 HIGHEST = 1e30
 
@@ -145,6 +147,9 @@ class Waveform:
         """Return the record at a given rate [Hz], with a warning where it differs from the file's."""
         if rate is None:
             return self
+        if not 1 / MOST_OFF < rate * self.step < MOST_OFF:
+            said = "holds {known:.6g} samples a second, {rate:.6g} are asked for: give `rate` in Hz, or leave it out"
+            raise TableError(self.path, said, 1 / self.step, rate)
         warnings = (*self.warnings, *about_rate(self.path, self.step, rate))
         return replace(self, step=1 / rate, step_u=0.0, times=None, warnings=warnings)
 

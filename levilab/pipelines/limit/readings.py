@@ -18,7 +18,7 @@ from levilab.formats.columns import NoSuchColumn, NoTable, TableError
 from levilab.formats.table import FEWEST, Table, must_be_positive, read_table
 from levilab.formats.texts import locate, texts_of
 from levilab.formats.titles import read_title, unit_factor
-from levilab.formats.understanding import LEAST_TREND, trend_of
+from levilab.formats.understanding import LEAST_TREND, is_possible_spin, trend_of
 from levilab.pipelines.inputs.source import Readings
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.spin.magnetometer import FieldRecord, read_field_record
@@ -155,10 +155,10 @@ def single_column(path: Path, *, guess: bool) -> Table | None:
     factor = 1.0 if title is None or title.unit is None else unit_factor(title.unit, "frequency")
     if factor is None or not (guess or named):
         return None
-    values = np.array([float(line.replace(",", ".")) for _, line in numbers])
-    return Table(
-        path, {NEEDED[0]: values * factor}, (), tuple(titles), np.array([k for k, _ in numbers], dtype=np.int64)
-    )
+    values = factor * np.array([float(line.replace(",", ".")) for _, line in numbers])
+    if not (named or is_possible_spin(float(np.median(values)))):
+        return None
+    return Table(path, {NEEDED[0]: values}, (), tuple(titles), np.array([k for k, _ in numbers], dtype=np.int64))
 
 
 def read_limit_run(run: Run, _: InputOptions) -> LimitReadings:

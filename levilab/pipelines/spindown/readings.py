@@ -20,7 +20,7 @@ from analysis.spindown.fall import FALLS_BETWEEN_HZ
 from analysis.spindown.readings import check_readings
 from analysis.spindown.tilt import Release
 from levilab.errors import DataError, DoesNotSuit
-from levilab.formats.columns import SHORTHANDS, TableError
+from levilab.formats.columns import SHORTHANDS, NoTable, TableError
 from levilab.formats.table import FEWEST, Table, read_table, refuse
 from levilab.formats.understanding import (
     LEAST_FALL,
@@ -131,13 +131,13 @@ def _between(readings: SpinReadings, options: "InputOptions", path: "Path") -> S
 
 
 def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings:
+    asks: NoRate | None = None
     try:
         record = read_record(path, columns=options.columns, rate=options.rate, guess=options.guess)
     except NoRate as error:
         if not options.guess:
             raise DoesNotSuit(text_of(error)) from error
-        if path.suffix.casefold() == ".npy":
-            raise
+        asks = error
     except NoWaveform:
         pass
     except DataError as error:
@@ -146,7 +146,10 @@ def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings
         raise
     else:
         return record_readings(record, options)
-    return spin_readings(_read_spin_table(path, options))
+    try:
+        return spin_readings(_read_spin_table(path, options))
+    except NoTable as error:
+        raise asks or error from None
 
 
 def _read_spin_table(path: "Path", options: "InputOptions") -> Table:

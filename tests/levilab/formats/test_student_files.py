@@ -678,3 +678,40 @@ def test_a_count_of_turns_costs_no_row_of_another_analysis(write):
 
 def test_of_two_columns_without_titles_the_other_one_is_the_time(write):
     assert read_table(write(rows("{t} {f}")), columns={"f": "2 [Hz]"}).column("time_s")[1] > 0
+
+
+@pytest.mark.parametrize("line", [
+    "nach {t} s: {de} Hz", "- {t} s: {f} Hz", "t={t}s;f={de}Hz", "after {m} min {s} s  {f} Hz",
+])  # fmt: skip
+def test_times_and_spins_in_the_notes_of_a_person_are_read(line, write):
+    times = (0, 10, 20, 70, 80, 90, 100)
+    said = [line.format(t=t, m=t // 60, s=t % 60, f=35 - t / 10, de=f"{35 - t / 10}".replace(".", ",")) for t in times]
+    table = read_table(write("Kreisel 2, 12.11.\n" + "\n".join(said) + "\n"))
+    np.testing.assert_allclose(table.column("time_s"), times)
+    np.testing.assert_allclose(table.column("spin_frequency_hz"), 35 - np.array(times) / 10)
+
+
+@pytest.mark.parametrize("number", ["{}", "{}."])
+def test_numbers_of_the_rows_are_no_times(number, write):
+    rows = [f"{number.format(k)} {10 * k} {35 - k / 2:.1f}\n" for k in range(1, 9)]
+    assert read_table(write("".join(rows))).column("time_s")[0] == 10
+    rows = [f"{number.format(k)} {35 - k / 2:.1f} 0.1\n" for k in range(1, 9)]
+    assert read_table(write("".join(rows))).column("time_s")[0] == 1
+
+
+def test_counts_at_even_times_are_no_spins(write):
+    path = write("t [s];Counts\n" + "".join(f"{2 * k};{70 - k}\n" for k in range(20)))
+    with pytest.raises(NoSuchColumn, match=r"turns in 2 s \(35 to 25\.5 Hz\), Hz"):
+        read_table(path, quantities=SPIN, needed=SPIN[:2])
+
+
+@pytest.mark.parametrize("title", ["Pulse pro Minute", "Pulse/min", "Drehzahl (Umdr./min)", "n (1/Min.)"])
+def test_pulses_a_minute_and_units_with_a_point_are_spins(title, write):
+    path = write(f"Zeit (Sek.);{title}\n" + "".join(f"{2 * k};{2100 - 9 * k}\n" for k in range(20)))
+    assert read_table(path).column("spin_frequency_hz")[0] == pytest.approx(35)
+
+
+def test_times_of_turns_without_their_own_times_say_what_is_missing(write):
+    path = write("n,T\n" + "".join(f"{k},{25 + k / 100}\n" for k in range(20)))
+    with pytest.raises(NoSuchColumn, match=r"at which the turns were timed: .* keep the times of the turns alone"):
+        read_table(path, columns={"f": "2 [ms]"}, quantities=SPIN, needed=SPIN[:2])

@@ -352,6 +352,16 @@ def test_times_from_pulse_to_pulse_are_added(title, unit, write):
     assert "are times from pulse to pulse, of 19.94 to 40 Hz" in record.warnings[0]
 
 
+@pytest.mark.parametrize("title", ["", "T\n", "pulse times\n"])
+def test_the_unit_of_one_column_may_be_stated(title, write):
+    path = write(title + "".join(f"{25_000 + 2 * k}\n" for k in range(60)))
+    assert read_record(path, columns={"f": "1 [us]"}).times[1] == pytest.approx(50.002e-3)
+    with pytest.raises(NoWaveform, match="its columns are named"):
+        read_record(path, columns={"f": "1 [rpm]"})
+    times = write(title + "".join(f"{25_000 * k}\n" for k in range(60)))
+    assert read_record(times, columns={"t": "1 [us]"}).times[1] == pytest.approx(25e-3)
+
+
 @pytest.mark.parametrize("turn", ["0", "-4294"])
 def test_a_time_from_pulse_to_pulse_below_0_is_named_with_its_line(turn, write):
     lines = ["25", "25.01", turn, *(f"{25 + k / 100}" for k in range(20))]
@@ -368,7 +378,7 @@ def test_a_time_from_pulse_to_pulse_below_0_is_named_with_its_line(turn, write):
     ],
 )
 def test_numbers_without_a_unit_that_may_be_turns_are_not_guessed(numbers, unit, write):
-    with pytest.raises(TableError, match=rf"times from pulse to pulse are titled as dt \[{unit}\]; of samples say the"):
+    with pytest.raises(TableError, match=rf'pulse to pulse say `columns` = "f=1 \[{unit}\]", of samples'):
         read_record(write("".join(f"{number:.2f}\n" for number in numbers)))
 
 
@@ -385,7 +395,7 @@ def test_the_last_word_of_another_title_is_no_unit(title, write):
 
 
 def test_times_too_near_are_no_times_of_pulses(write):
-    with pytest.raises(TableError, match=r"2\.3e-06 s apart, and no top turns so fast: of times from"):
+    with pytest.raises(TableError, match=r"2\.3e-06 s apart, and no top turns so fast: for times from"):
         read_record(write("dt [ms]\n" + "".join(f"{2.5 + 0.0023 * k:.4f}\n" for k in range(300))))
 
 
@@ -422,6 +432,8 @@ def test_a_given_rate_goes_before_that_of_a_wav(sample_data, write):
     record = waveform(sample_data / "scope-files" / "recording.wav", rate=8000.0)
     assert record.step == 1 / 8000
     assert "8000 Hz takes the place of 4000 Hz" in record.warnings[0]
+    with pytest.raises(TableError, match="holds 4000 samples a second, 1 are asked for: give `rate` in Hz, or leave"):
+        read_record(sample_data / "scope-files" / "recording.wav", rate=1.0)
 
 
 def test_a_recording_that_is_cut_off_says_so(sample_data, tmp_path):

@@ -220,7 +220,9 @@ def test_limits_that_grow_under_an_unknown_title_are_no_table_of_times(tmp_path)
     assert (group.which, group.statistics.n, round(group.statistics.mean.value, 1)) == ("lower", 6, 23.9)
 
 
-@pytest.mark.parametrize("text", ["time [s]\n21.7\n21.4\n", "21.7\nhigh\n21.9\n", "height [mm]\n21.7\n"])
+@pytest.mark.parametrize(
+    "text", ["time [s]\n21.7\n21.4\n", "21.7\nhigh\n21.9\n", "28571\n28605\n28700\n", "height [mm]\n21.7\n"]
+)
 def test_another_column_is_no_limit(tmp_path, text):
     file = tmp_path / "my.csv"
     file.write_text(text, encoding="utf-8")
