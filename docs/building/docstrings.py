@@ -53,6 +53,15 @@ def _shorten_properties(_app: Sphinx, page: Any, _name: str) -> None:
             node.children = [Text(shown)]
 
 
+def _put_functions_first(_app: Sphinx, page: Any) -> None:
+    """Put functions before the classes that they return."""
+    from docutils.nodes import section
+    from sphinx.addnodes import desc
+
+    for part in page.findall(section):
+        part.children.sort(key=lambda node: isinstance(node, desc) and (node["objtype"] != "function") + 1)
+
+
 def shorten(signature: str, names: dict[str, str]) -> str:
     """Return a signature with the names of types, without their checks, and with ... for a value that a factory makes.
 
@@ -90,6 +99,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
         return tuple(text and shorten(text, names) for text in of[-2:])
 
     app.connect("autodoc-process-signature", sign)
+    app.connect("doctree-read", _put_functions_first)
     app.connect("doctree-resolved", _shorten_properties)
     app.connect("autodoc-process-docstring", _process, priority=100)  # before napoleon
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -20,6 +20,13 @@ def test_docstrings_are_whole_and_signatures_are_short(page):
 
 
 @pytest.mark.skipif(not PAGES, reason="make site makes them")
+@pytest.mark.parametrize(("page", "first"), [("python", "acquire"), ("python-spin", "fit_spin_down")])
+def test_a_page_begins_with_its_functions(page, first):
+    text = (ROOT / f"build/site/reference/{page}.html").read_text(encoding="utf-8")
+    assert re.findall(r'<dt class="sig.*?id="([\w.]+)"', text, re.DOTALL)[0].rpartition(".")[2] == first
+
+
+@pytest.mark.skipif(not PAGES, reason="make site makes them")
 def test_indices_and_powers_of_the_physics_are_set():
     text = (ROOT / "build/site/physics.html").read_text(encoding="utf-8")
     assert "ν<sub>d</sub> turns the top" in text
