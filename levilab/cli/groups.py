@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from levilab.cli.analyze import takes_options
 from levilab.cli.options import HEADING, Language, Paths, among, argument, flag, option, place
-from levilab.cli.output import interruptible, message, result
+from levilab.cli.output import interruptible, message, place_of_report, result
 from levilab.errors import UsageError
 from levilab.pipelines.options import OF_REPORT, read_options
 from levilab.report.worksheets.sheets import SHEETS
@@ -35,11 +35,12 @@ def of_class(
     from levilab.report.groups.document import write_class
     from levilab.report.reproduction import Heading
 
+    place = place_of_report(out, "the class is in {file:s}")
     heading = Heading(**{one.name: given.pop(one.name) for one in HEADING})
     with interruptible("nothing is written"):
         options, show = read_options(given, typed=True), lambda one: terminal().print(draw(one))
-        written = write_class(paths or (), out, options, tell=message, show=show, heading=heading)
-    result(Text("the class is in {file:s}", file=written))
+        write_class(paths or (), out, options, tell=message, show=show, heading=heading)
+    result(place)
 
 
 def worksheet(

@@ -47,10 +47,10 @@ def silence(stream: TextIO) -> None:
         os.dup2(nowhere.fileno(), stream.fileno())
 
 
-def place_of_report(report: Path) -> str:
-    """Return where a report will be, as a line; a folder that it makes may be a typing error."""
-    there = "the report is in {file:s}" if report.parent.exists() else "the report is in {file:s}, in a new folder"
-    return Text(there, file=report)
+def place_of_report(report: Path, said: str = "the report is in {file:s}") -> str:
+    """Return where a report will be, as a line; a folder that it makes, or a file that it replaces, may be an error."""
+    there = ", in place of an earlier file" * report.exists() if report.parent.exists() else ", in a new folder"
+    return Text("{place}{there}", place=Text(said, file=report), there=there)
 
 
 @contextlib.contextmanager

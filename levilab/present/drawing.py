@@ -213,10 +213,10 @@ _RAISED = re.compile(r"\^(?:\(([^()]+)\)|(−?(?:½|\d+/\d+)))")
 
 
 def in_mathtext(text: str) -> str:
-    """Return plain notation as matplotlib's labels have it: what follows ^ is raised, the fraction of C₃/₂ lowered.
+    """Return plain notation as matplotlib's labels have it: what follows ^ is raised, the index of a letter lowered.
 
-    >>> in_mathtext("ω̇ = −C₃/₂ω^(3/2)"), in_mathtext("(rad/s)^−½/s")
-    ('ω̇ = −C$_{3/2}$ω$^{3/2}$', '(rad/s)$^{−1/2}$/s')
+    >>> in_mathtext("ω̇ = −C₃/₂ω^(3/2)"), in_mathtext("(rad/s)^−½/s"), in_mathtext("Ω_g/2π")
+    ('ω̇ = −C$_{3/2}$ω$^{3/2}$', '(rad/s)$^{−1/2}$/s', 'Ω$_g$/2π')
     """
     raised = _RAISED.sub(lambda found: f"$^{{{(found[1] or found[2]).replace('½', '1/2')}}}$", text)
-    return raised.replace("₃/₂", "$_{3/2}$")
+    return re.sub(r"(?<=[Α-ω])_(\w)", r"$_\1$", raised.replace("₃/₂", "$_{3/2}$"))

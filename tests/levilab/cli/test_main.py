@@ -125,6 +125,9 @@ def test_the_spin_of_a_record_is_printed_and_written_beside_it(levilab, sample_d
         assert (tmp_path / name).stat().st_size > 1000
     said = levilab("report", path, "-o", "new/page.html", "--no-crosscheck").stdout
     assert said.endswith("page.html, in a new folder\n")
+    said = levilab("class", path, "-o", "new/page.html").stdout
+    assert said.endswith("page.html, in place of an earlier file\n")
+    levilab("report", path, "-o", "new/page.html", "--no-crosscheck")
     page = (tmp_path / "new" / "page.html").read_text(encoding="utf-8")
     assert "as levilab analyze found it" in page
     assert re.search(r"30\.00\d\d\(\d+\)", page)
