@@ -283,6 +283,7 @@ function show() {
   put(by("state-text"), {title: by("state-text").textContent});
   put(by("synthetic"), {hidden: !(about?.synthetic || (!about && bench?.virtual))});
   const elapsed = about?.status === "running" ? bench?.elapsed_s ?? last.time_s : state === "idle" ? NaN : last.time_s;
+  write("run-label", state === "idle" && seen.run ? phrase("Last run") : phrase("Run"));
   write("elapsed", Number.isFinite(elapsed) ? lapse(elapsed) : "");
   const left = leftOf(about, bench, elapsed);
   const isPaced = practice && bench?.speed !== 1;

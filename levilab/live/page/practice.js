@@ -35,9 +35,11 @@ export function openPractice(about, command, run, isOwn, allowed) {
   async function send(what, values = {}, field = null) {
     const wrongs = what === "record a run" || values.task ? document.querySelector("#controls [aria-invalid=true]") : null;
     if (wrongs) return write("said", phrase("First correct this: {field}, {why}", {field: wrongs.ariaLabel || wrongs.labels[0].firstChild.data.trim(), why: by(`${wrongs.id}-wrong`).textContent}));
-    if (values.task) await command({do: "set the speed", speed: 1});  // at 10 × the top is down before a person has read the task
+    const slows = values.task && Number(by("speed").value) > 1;  // at 10 × the top is down before a person has read the task
+    if (slows) await command({do: "set the speed", speed: 1});
     if (allowed) write("said", "");  // and not later: what the bench says may come before the answer
     const wrong = await command({do: what, ...values});
+    if (allowed && slows && !wrong) write("said", phrase("Time goes at 1 × again, so that the top is up while you read the task."));
     if (!allowed || !wrong) return;
     write("said", field ? "" : wrong);
     field?.refuse(wrong);
@@ -197,7 +199,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     if (shownTask && !row) reached = bench.tasks_done.includes(shownTask) ? shownTask : "";
     put(by("task"), {hidden: !row, inert: !allowed});
     put(by("guide"), {hidden: Boolean(row) || !isGuided || lies});
-    put(by("to-back"), {hidden: Boolean(row) || !isGuided || !lies});
+    put(by("to-back"), {hidden: !lies});
     put(by("offer"), {hidden: Boolean(row) || !(reached || !isGuided && next), inert: !allowed});
     write("offer-text", reached ? `✓ ${phrase(tasks[reached].title)}: ${phrase(tasks[reached].teaches)}` : phrase("These were the first steps. Now a task:"));
     put(by("next-task"), {hidden: !next, value: next?.name ?? "", textContent: next ? phrase(next.title) : ""});
@@ -265,9 +267,10 @@ export function openPractice(about, command, run, isOwn, allowed) {
     }
     if (bench.seed !== now.seed) seed.set(String(now.seed = bench.seed));  // else a person may be typing
     names.forEach((name, k) => knobs[k].show(bench.what_if[name]));
-    const lies = Boolean(down && steps && steps !== "analyze");
+    const task = tasks[bench.task], isMeasured = Boolean(task?.measures) && readings > 0 && about_run?.experiment === task.measures;
+    const lies = Boolean(down && (task ? task.needs !== "washers_g" && !isMeasured : steps && steps !== "analyze"));  // a top of another mass is no use back
     showTask(bench, Boolean(steps), lies);
-    const next = now.busy ? "" : tasks[bench.task]?.needs ?? (lies ? "back" : steps);
+    const next = now.busy ? "" : lies ? "back" : task?.needs ?? steps;
     need(next, Boolean(bench.task));
     for (const id of ["match", "back", "record", "analyze"]) by(id).classList.toggle("main", id === (next || (down ? "back" : "record")));  // one at most
     for (const part of ["what-if", "tasks", "offer"]) put(by(part), {inert: now.busy || !allowed});

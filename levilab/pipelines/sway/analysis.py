@@ -74,7 +74,10 @@ class SwayRun:
     @property
     def text(self) -> str:
         """What the swings say, in a few sentences."""
-        return _in_words(self.geometry)
+        low, high, spin = float(min(self.spin)), float(max(self.spin)), self.geometry.spin
+        said = "The spins seen are {low:.1f} to {high:.1f} Hz: the value at {spin:g} Hz is in proportion to the spin."
+        beyond = [] if low <= spin <= high else [Text(said, low, high, spin)]
+        return Sentences(_in_words(self.geometry), *beyond)
 
     @property
     def warnings(self) -> tuple[Text, ...]:

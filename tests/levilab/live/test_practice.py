@@ -319,8 +319,12 @@ def test_a_task_opens_the_control_that_it_needs_and_leads_to_the_next(starting, 
     assert page.inner_text("#to-back") == "Put the top back: it floats again."
     page.evaluate("levilab.data.up = true")
     until(page, f"{NEEDED} === 'match' && document.getElementById('to-back').hidden")
+    page.evaluate("levilab.data.up = false")
+    publish(starting.watches[""], replace(here, time_s=2.5, task="hold"))
+    until(page, f"{NEEDED} === 'back' && !document.getElementById('to-back').hidden")
     publish(starting.watches[""], replace(here, time_s=3.0, task="mass"))
     until(page, f"{NEEDED} === 'washers_g'")
+    page.evaluate("levilab.data.up = true")
     assert page.locator("#washers_g").is_visible()
     assert not page.locator("#guide").is_visible()
     page.get_by_role("tab", name="Tasks").click()  # a person may go elsewhere
@@ -354,10 +358,12 @@ def test_a_run_and_a_task_wait_until_no_field_is_wrong(starting, page):
     with page.expect_request(lambda one: "record a run" in (one.post_data or "")):
         page.click("#record")
     assert page.inner_text("#said") == ""
+    page.select_option("#speed", "10")
     page.get_by_role("tab", name="Tasks").click()
     with page.expect_request(lambda one: "begin a task" in (one.post_data or "")):
         page.click("#task-list button >> nth=0")
     assert {"do": "set the speed", "speed": 1} in asked  # at 10 × it would be down before the task is read
+    until(page, "document.getElementById('said').textContent.startsWith('Time goes at 1 × again')")
 
 
 def test_after_a_run_the_last_minutes_show_what_a_person_does(starting, page, tmp_path):
@@ -372,13 +378,15 @@ def test_after_a_run_the_last_minutes_show_what_a_person_does(starting, page, tm
     publish(watch, off)
     until(page, "document.body.dataset.state === 'finished' && levilab.data.bench")
     assert page.inner_text("#readings-title") == "Readings"
+    assert page.text_content("#run-label") == "Run"
     publish(watch, replace(off, time_s=2.1, task="guess"))  # n is asked for
     until(page, "document.getElementById('fit-head').textContent.startsWith('The fit is shown once')")
     publish(watch, replace(off, time_s=2.2, task="stem"))  # of a precession
     until(page, "!document.getElementById('fit-head').textContent.startsWith('The fit is shown once')")
     is_of_minutes = "document.getElementById('readings-title').textContent === 'The last minutes'"
+    is_over = "document.getElementById('run-label').textContent === 'Last run'"  # the bench is ready, and shown
     publish(watch, replace(off, time_s=3.0, drive=Drive("SQU", 30.0, 10.0, output=True)))
-    until(page, f"{is_of_minutes} && document.body.dataset.state === 'idle'")
+    until(page, f"{is_of_minutes} && {is_over} && document.body.dataset.state === 'idle'")
     page.select_option("#drawn", "all")  # the run is still there
     until(page, f"!({is_of_minutes}) && document.body.dataset.state === 'finished'")
     page.set_viewport_size({"width": 1366, "height": 650})  # a laptop: the plot is as high as its two parts need

@@ -270,3 +270,10 @@ def test_report_figure_and_table_of_many_show_it(found):
     row = analyze_one(Task(TRACK, False, True, "sway", SWAY.options_from({"device": DEVICE}), TRACK.parent))
     assert isinstance(row, Row)
     assert not row.problem
+
+
+def test_a_value_at_a_spin_that_was_not_seen_says_so(found):
+    run = found.runs[0]
+    assert "The spins seen" not in run.text
+    slower = replace(run, spin=run.spin - run.spin.max() + 29)
+    assert "to 29.0 Hz: the value at 30 Hz is in proportion to the spin." in slower.text
