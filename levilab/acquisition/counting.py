@@ -217,10 +217,9 @@ class FreeTop(Generic[S]):
         session.saw("spin_frequency_hz", spin)
         if spin is None:
             return None
-        end, found, u = session.now(), session.bench.counter.last, session.settings.reading_u_hz
-        time = (gate_began(end, session.settings.gate_s, spin) + end) / 2
+        time, found, u = middle_of_count(session, spin), session.bench.counter.last, session.settings.reading_u_hz
         if found is not None:
-            time, u = found.time - (session.zero or 0.0), found.u
+            u = found.u
             if found.gaps:
                 gaps = ", ".join(f"{gap:.2g}" for gap in found.gaps)
                 text = Text("the samples of this count have gaps of {gaps} s", gaps=gaps)
@@ -265,6 +264,17 @@ def free_top(session: Session[S], before: Sequence[Row] = ()) -> FreeTop[S]:
     if session.bench.counter.ESTIMATES:
         prepare_counter_again(session)
     return FreeTop(session, list(before))
+
+
+def middle_of_count(session: Session[S], count: float) -> float:
+    """Return the middle of the count that has just ended, or as the counter estimates it [s].
+
+    count: [Hz].
+    """
+    if session.bench.counter.last is not None:
+        return session.bench.counter.last.time - (session.zero or 0.0)
+    end = session.now()
+    return (gate_began(end, session.settings.gate_s, count) + end) / 2
 
 
 def gate_began(end: float, gate_s: float, count: float) -> float:

@@ -95,9 +95,9 @@ class CounterSettings(ExperimentSettings):
         nearest = min(fitting, key=lambda gate: max(gate / self.gate_s, self.gate_s / gate))
         return self.model_copy(update={"gate_s": nearest})
 
-    def with_jitter(self, jitter_s: float) -> Self:
-        """Add the uncertainty of a reading from pulses that scatter by this much [s]: √2 jitter/gate turns."""
-        u = self.reading_u_hz or round(2**0.5 * jitter_s / self.gate_s, 6)
+    def with_jitter(self, jitter: float) -> Self:
+        """Add the uncertainty of a reading from pulses that scatter by this much [turns]: √2 jitter/gate."""
+        u = self.reading_u_hz or round(2**0.5 * jitter / self.gate_s, 6)
         return self.model_copy(update={"reading_u_hz": u})
 
 

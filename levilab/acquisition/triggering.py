@@ -15,7 +15,7 @@ import numpy as np
 from analysis.arrays import Array
 from analysis.limits import U_OF_WAY
 from analysis.uncertainty import Estimate
-from levilab.acquisition.counting import prepare_counter_again, spin_now
+from levilab.acquisition.counting import middle_of_count, prepare_counter_again, spin_now
 from levilab.acquisition.session import DidNotFollow, ExperimentFailed, NotHeld, Session
 from levilab.runs.events import RunEvent
 from levilab.texts.text import Text
@@ -103,7 +103,7 @@ def slope_of(times: Sequence[float], spins: Sequence[float]) -> tuple[float, flo
 class Climb:
     """A way up under the full amplitude of the drive.
 
-    times, spins: ends of the counts [s], and counts [Hz], shape (n,); first_missed: when the first count without the
+    times, spins: middles of the counts [s], and counts [Hz], shape (n,); first_missed: when the first count without the
     top would have ended [s], later than which a dark counter answers; lost: what was seen in its place; levels_off_at:
     the spin at which pull and drag are equal, of a top that was not lost [Hz].
     """
@@ -325,9 +325,9 @@ class Motor:
             if self._missed > missed:
                 first_missed = asked + lasts if missed == 0 else first_missed
                 continue
-            times.append(session.now())
+            times.append(middle_of_count(session, self.spin))
             spins.append(self.spin)
-            lasts = times[-1] - asked
+            lasts = session.now() - asked
             if self.spin > highest:
                 raise _too_fast(session, highest)
             session.progress(Text("speeds up, {spin:.2f} Hz", spin=self.spin), (self.spin - start) / (highest - start))

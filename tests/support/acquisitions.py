@@ -112,7 +112,7 @@ def texts(run, *kinds):
 
 def in_world(request, world):
     """The same at the virtual bench of this world."""
-    return replace(request, wiring=lambda: virtual_wiring(world, request.config.limits))
+    return replace(request, wiring=lambda: virtual_wiring(world, request.config.limits, request.named))
 
 
 def of_scene(out, scene, settings=None):

@@ -310,8 +310,8 @@ def _climb(session: Session[LimitSettings], motor: Motor, keep: Callable[[Row], 
             raise DidNotFollow(
                 "the top was lost {size} counts after the way up began", "float it again", size=climb.spins.size
             )
-        between = (float(climb.times[-1]), climb.first_missed)
-        spin = spin_at_loss(climb.times - settings.gate_s / 2, climb.spins, between)
+        between = (float(climb.times[-1]) + settings.gate_s / 2, climb.first_missed)
+        spin = spin_at_loss(climb.times, climb.spins, between)
     assert spin.value is not None
     assert spin.u is not None
     amplitude, seen = settings.drive_amplitude_vpp / 2, float(climb.spins[-1])

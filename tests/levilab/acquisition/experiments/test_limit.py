@@ -435,6 +435,15 @@ def test_a_top_that_leaves_the_window_has_its_limit_where_it_fell(tmp_path):
     assert "1 of 3 tops got no faster than" in str(analysis.sources[0].warnings)
 
 
+def test_the_counts_of_a_phone_are_of_the_middle_of_their_samples(tmp_path):
+    """They cover 3 s, in which this top gains 0.6 Hz; taken for the last 0.5 s they gave limits 2.5 u off."""
+    world = SpinWorld(SpinScene(edges_hz=(35.0,), put_back_after_s=60.0, seed=2), VirtualClock())
+    request = mock(tmp_path, *TRIGGERED[:-1], "limit.repetitions=3", counter="phyphox")
+    lost = acquire(in_world(request, world), Silent()).readings().frame
+    pulls = (lost["spin_frequency_hz"] - 35) / lost["spin_frequency_u_hz"]
+    assert abs(pulls.mean()) < 1.5
+
+
 def test_a_top_that_gets_slower_under_its_drive_is_no_limit(tmp_path):
     """Its trigger's cable is off after the start phase was found."""
 
