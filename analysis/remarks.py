@@ -40,6 +40,7 @@ Kind = Literal[
     "sweep scatters",  # scatter in units of the stated u, probability of such a χ²
     "sweep overstated",  # χ², degrees of freedom
     "sweep exact",
+    "few left",  # number of points, the half of a 68 % interval in u
     "moves the slope",  # the point, change of the slope, the same in u
     "holds the line",  # the point, its leverage
     "uncertain drive",  # greatest u of the drive in u of the precession

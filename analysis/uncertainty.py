@@ -17,6 +17,9 @@ ROUNDING = 64 * float(np.finfo(float).eps)
 #: u that was given is believed within a quarter of it: as of 8 degrees of freedom (GUM G.4.2).
 BELIEVED = 8.0
 
+#: Degrees of freedom with which an interval of 68 % is 1.3 u or wider.
+FEW_LEFT = 2
+
 
 def partly_believed(chi_square: float, freedom: int) -> float:
     """Return the factor of standard uncertainties that were given, from χ² and its degrees of freedom."""

@@ -12,12 +12,14 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.precession.gates import Gates, whole_counts
-from analysis.uncertainty import Estimate
+from analysis.uncertainty import Estimate, student
 
 #: From more points every k-th, in the order of x, is used: there are n²/2 pairs.
 MOST_PAIRED = 500
 #: A point farther off the line, in standard deviations, is examined.
 FAR = 5.0
+#: The median line goes through two points: of so many none shows a scatter.
+_NO_SCATTER = 3
 #: Counted over true frequency when a threshold sees each period twice, misses every other one, and the like.
 RATIOS = ((1, 2), (2, 1), (1, 3), (3, 1), (2, 3), (3, 2))
 #: Turns differ, so a miscount in every turn has these ratios to within 1 %.
@@ -110,6 +112,9 @@ def find_miscounts(
 ) -> list[Miscount]:
     """Find the points far off the median line, and what the counter counted there.
 
+    Without u few points show their scatter: one that no miscount explains is as far off as chance makes it with the
+    probability of `FAR`, by Student's t.
+
     Args:
         x: shape (n,) [Hz].
         y: shape (n,) [Hz].
@@ -121,6 +126,9 @@ def find_miscounts(
     line = float(robust.intercept.value or 0.0) + float(robust.slope.value or 0.0) * x
     usual = np.maximum(robust.scatter, 1e-9 * np.abs(line))
     deviation = usual if u is None else np.maximum(u, usual)
+    far = FAR
+    if u is None:
+        far = student(x.size - 2, FAR) if x.size > _NO_SCATTER else math.inf
     found = []
     for i in np.flatnonzero(np.abs(y - line) > FAR * deviation).tolist():
         sigma, expected = float(deviation[i]), float(line[i])
@@ -131,6 +139,8 @@ def find_miscounts(
             found.append(Miscount(i, counts=whole_counts(gates[i], expected) or None))
         else:
             found.append(Miscount(i, counts=_counts(float(y[i]) - expected, sigma, gate_s)))
+        if not found[-1].named and abs(float(y[i]) - expected) <= far * sigma:
+            found.pop()
     return found
 
 

@@ -18,6 +18,7 @@ from analysis.precession.line import FEWEST, NO_FIT, Line, fit_line, fit_orthogo
 from analysis.precession.miscounts import Miscount, Robust, find_miscounts, robust_line
 from analysis.precession.power import Power, power_of
 from analysis.remarks import Remark
+from analysis.uncertainty import FEW_LEFT, student
 
 #: A joint test below this excludes slope 1 and intercept 0.
 EXCLUDED_P = 0.01
@@ -278,6 +279,8 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[Remark]:
         said.append(Remark("sweep overstated", values=(line.chi_square, line.degrees_of_freedom)))
     if fit.p_locked is None:
         said.append(Remark("sweep exact"))
+    elif sweep.u is None and line.freedom <= FEW_LEFT:
+        said.append(Remark("few left", values=(line.n, student(line.freedom))))
     said += [
         Remark("moves the slope", values=(k, change, share))
         for k, p in enumerate(fit.points)

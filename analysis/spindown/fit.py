@@ -18,13 +18,12 @@ from analysis.spindown.readings import Readings, check_readings
 from analysis.spindown.selection import NO_FIT, Statistics, weigh
 from analysis.spindown.tilt import THESIS_TOP, Release, Top
 from analysis.spindown.verdict import Verdict, verdict
-from analysis.uncertainty import ROUNDING, Estimate, student
+from analysis.uncertainty import FEW_LEFT, ROUNDING, Estimate, student
 
 __all__ = ["Estimate", "LawFit", "SpinDown", "Statistics", "Verdict", "fit_spin_down"]
 
 
 FEWEST_FOR_OUTLIERS = 7  # with three parameters and one reading doubted, three are left to judge it by
-FEW_LEFT = 2  # degrees of freedom: an interval of 68 % is 1.3 u or wider
 
 
 class UnknownName(AnalysisError):

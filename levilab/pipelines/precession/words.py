@@ -130,6 +130,9 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Weighed] = MappingProxyType(
             "advice",
         ),
         "sweep exact": "the points lie on the line to the last digit: without their u nothing can be tested; give it",
+        "few left": (
+            "{n:.0f} readings hardly show their scatter: a 68 % interval is {width:.2g} u to each side (Student's t)"
+        ),
         "moves the slope": lambda points, k, change, share: Text(
             "{point}, alone moves the slope by {change:n}, {share:.1f} of its u",
             point=_point(points, k),

@@ -77,6 +77,15 @@ def test_noise_alone_is_no_miscount():
     assert all(point.used for fit in fits for point in fit.points)
 
 
+@pytest.mark.parametrize("n", [3, 5, 9])
+def test_a_few_points_without_u_are_seldom_off_their_line_by_chance(n):
+    drive, random = np.linspace(44, 28, n), np.random.default_rng(n)
+    fits = [fit_sweep(Sweep(drive, drive + NOISE * random.standard_normal(n))) for _ in range(50)]
+    kinds = [{of.kind for of in fit.remarks} for fit in fits]
+    assert sum("unexplained" in said for said in kinds) <= 3  # 1 % each; by five standard deviations 50, 14, 5
+    assert all(("few left" in said) == (n == 3) for said in kinds)
+
+
 def test_counts_that_are_mostly_alike_have_a_line():
     drive = np.array([30.0, 30.0, 30.0, 36.0, 30.0])
     exact = fit_sweep(Sweep(drive, drive))

@@ -34,6 +34,7 @@ OF_SWEEP = {
     of("sweep scatters", 2.0, 1e-5): "the points scatter 2 times as much as their u says (p = 1×10⁻⁵)",
     of("sweep overstated", 0.1, 8.0): "much less than their u says (χ² of 0.1 for 8 degrees of freedom)",
     of("sweep exact"): "without their u nothing can be tested",
+    of("few left", 3.0, 1.84): "3 readings hardly show their scatter: a 68 % interval is 1.8 u to each side",
     of("moves the slope", 0.0, 0.01, 4.0): "point 1, at 32 Hz, alone moves the slope by 0.01, 4.0 of its u",
     of("holds the line", 0.0, 0.95): "point 1, at 32 Hz, holds the line nearly by itself (leverage 0.95)",
     of("uncertain drive", 1.0): "up to 1 u of the precession: let it count with `orthogonal` = True",
