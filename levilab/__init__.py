@@ -240,7 +240,8 @@ def analyze(
 ) -> AnalysisResult:
     """Analyze runs, data files or DataFrames.  Nothing is written; `save(folder)` of the result does.
 
-    >>> result = analyze("sample_data/spin-down-1")  # or a file, a DataFrame; arrays: analyze((t, f))
+    >>> import levilab
+    >>> result = levilab.analyze("sample_data/spin-down-1")  # or a file, a DataFrame; arrays: levilab.analyze((t, f))
     >>> result["c32"], result.best_model
     (0.0002369(4) (rad/s)^-1/2/s, 'disc')
     >>> figure = result.plot()  # in a notebook the last line of a cell shows it

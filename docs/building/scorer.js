@@ -12,13 +12,15 @@ var share = (entry, typed) => (stemsOf(entry).every((stem) => typed.includes(ste
 Documentation.addTranslations({messages: {
   "Your search did not match any documents. Please make sure that all words are spelled correctly and that you've selected enough categories.":
   "No page has these words. Try others, in English or German, or look into “Glossary”, “Messages” and “Commands” in the menu."}});
-/** Where no page has all of the words: the pages with some of them. */
+/** Where no page has all of the words: the pages with some of them, or with words of the index in a compound. */
 var withAll = Search.performTermsSearch;
 Search.performTermsSearch = (words, excluded) => {
   const pages = {};
   const found = withAll(words, excluded);
   if (found.length) return found;
-  for (const result of [...words].flatMap((word) => withAll(new Set([word]), excluded))) {
+  const inside = (entry) => entry.length > 4 && [...words].some((word) => word.includes(entry));
+  const parts = Object.keys(Search._index.indexentries).filter(inside).flatMap(stemsOf);
+  for (const result of [...words, ...parts].flatMap((word) => withAll(new Set([word]), excluded))) {
     pages[result[0]] = result.with(4, result[4] + (pages[result[0]]?.[4] ?? 0));
   }
   return Object.values(pages);

@@ -21,7 +21,7 @@ FIRST = {
     "install": ("windows", "install", "download", "mac"),
     "class": ("grading", "worksheet", "seed", "teacher", "student", "Lehrer"),
     "glossary": ("lock", "C3/2", "C₃/₂", "c32", "uncertainty", "AICc", "undecided", "gate", "error bars", "Messfehler"),
-    "live": ("share", "QR code", "language"), "tutorial-de": ("Präzession", "Luftwiderstand"),
+    "live": ("share", "QR code", "language"), "tutorial-de": ("Präzession", "Luftwiderstand", "Magnetkreisel"),
     "messages": ("warning", "warnings", "error", "crashed", "Absturz"),
     "experiments/washers": ("washers", "weight", "mass", "Gewicht", "Unterlegscheiben"),
     "experiments/spin": ("tape", "lamp", "spin down", "spindown"), "experiments/trace": ("photodiode", "Lichtschranke"),
