@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -13,6 +14,7 @@ from levilab.crosscheck.table import blocks_of, not_right_as_text
 from levilab.errors import unquote
 from levilab.pipelines.analyzed import A, Analyzed
 from levilab.pipelines.document import Analysis
+from levilab.pipelines.inputs.names import each_once
 from levilab.pipelines.inputs.source import Source, mark_of
 from levilab.pipelines.part import ReportPart
 from levilab.present.document.blocks import (
@@ -56,7 +58,7 @@ def document_of(results: Results, others: Sequence[Section] = (), asked: Asked |
     asked = asked or Asked(crosscheck=False)
     parts = [analysis.part(found) for analysis, found in results]
     alone = len(results) == 1 and not others
-    sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
+    sources = each_once(source for _, found in results for source in found.sources)
     banner = _document_banner(results, sources, others)
     blocks: list[Block] = []
     for (analysis, found), part in zip(results, parts, strict=True):
@@ -256,6 +258,9 @@ def _measurements(results: Results, parts: Sequence[ReportPart]) -> Section:
         for source, of_input in zip(found.sources, part.inputs, strict=True):
             abouts.setdefault(source.path.resolve(), []).append(About(source, part, of_input, several))
     inputs = [describe(of_input) for of_input in abouts.values()]
+    if len({one.name for one in inputs}) < len(inputs):
+        sources = each_once(source for _, found in results for source in found.sources)
+        inputs = [replace(one, name=source.name) for one, source in zip(inputs, sources, strict=True)]
     return Section("What was measured, and with what", tuple(_overview(inputs)), anchor="inputs")
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from levilab.errors import LevilabError
 from levilab.formats.table import parse_columns
 from levilab.pipelines.document import Analysis
+from levilab.pipelines.inputs.names import each_once
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import OF_REPORT, OPTIONS, options_of, typed_name
 from levilab.present.document.blocks import (
@@ -98,7 +99,7 @@ def language_option() -> list[str]:
 
 def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked) -> Block:
     """Return the section at the end of a report of measurements; of a short one the command that made it."""
-    sources = list({source.path.resolve(): source for _, found in results for source in found.sources}.values())
+    sources = each_once(source for _, found in results for source in found.sources)
     if asked.short:
         return Note(Text("Made by: {command:s}", command=asked.command(sources)))
     data = (_data(sources), *_recording(sources))

@@ -3,9 +3,10 @@
 import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from levilab.pipelines.inputs.source import R, Source
 from levilab.present.numbers import short_name
@@ -18,6 +19,12 @@ def with_short_names(sources: Sequence[Source[R]]) -> tuple[Source[R], ...]:
     named = [_name_for_people(source, name, sources) for source, name in zip(sources, names, strict=True)]
     names = named if len({*named}) == len(named) else names
     return tuple(replace(source, name=verbatim(name)) for source, name in zip(sources, names, strict=True))
+
+
+def each_once(sources: Iterable[Source[Any]]) -> list[Source[Any]]:
+    """Return the sources of several analyses, each input once; where two have one name, with names that differ."""
+    once = list({source.path.resolve(): source for source in sources}.values())
+    return once if len({source.name for source in once}) == len(once) else [*with_short_names(once)]
 
 
 def short_paths(paths: Sequence[Path]) -> list[str]:

@@ -16,8 +16,8 @@ from levilab.errors import DataError, as_typed, check_ending
 from levilab.files import check_writable
 from levilab.formats.texts import locate
 from levilab.pipelines.analyzed import A
-from levilab.pipelines.inputs.files import is_archive_of
-from levilab.pipelines.inputs.names import short_paths, with_short_names
+from levilab.pipelines.inputs.files import data_files, is_archive_of
+from levilab.pipelines.inputs.names import each_once, short_paths, with_short_names
 from levilab.pipelines.inputs.search import Found
 from levilab.pipelines.inputs.unread import (
     OTHER_COLUMNS,
@@ -97,7 +97,7 @@ def class_document(
         others: about files that hold no readings.
         unread: groups of inputs that could not be used.
     """
-    sources = list({source.path.resolve(): source for of in classes for source in of.found.sources}.values())
+    sources = each_once(source for of in classes for source in of.found.sources)
     alone = len(classes) == 1
     warnings = dict.fromkeys(plain_text(text) for text in (*_notes_of(classes), others) if text)
     notes = [Section("Notes", (Warnings(tuple((text,) for text in warnings)),), anchor="notes")] if warnings else []
@@ -129,6 +129,10 @@ def _left_out(results: Results) -> tuple[dict[Path, str], str]:
     skipped = dict.fromkeys(one for _, found in results for one in found.skipped)  # not all analyses search all folders
     unread = {one.path: one.reason for one in skipped if isinstance(one, Skipped) and one.path}
     left_out = [one for one in skipped if isinstance(one, LeftOut) and one.path not in used]
+    for folder in [path for path in unread if path.is_dir() and not (path / RECORD).exists()]:
+        if files := data_files(folder):  # each has its own reason
+            left_out += [LeftOut(file, kind_of_unused(file)) for file in files]
+            del unread[folder]
     for one in left_out:
         if one.kind == OTHER_COLUMNS or (one.why and len(results) > 1):
             unread.setdefault(one.path, Text(said, file=str(one.path), typed=as_typed(one.path)))

@@ -1,5 +1,6 @@
 """A report of many runs: an overview, in which nothing is said a hundred times and nothing is left out."""
 
+import json
 import re
 import shutil
 
@@ -167,3 +168,14 @@ def test_a_file_with_a_result_and_another_result_of_it_are_both_shown(tmp_path):
     paths = [tmp_path / "a.csv", own, tmp_path / "x2"]
     page = write_report(paths, tmp_path / "report.html").read_text(encoding="utf-8")
     assert re.findall(r"<h2>[^<]*top: (a.csv[^<]*)</h2>", page) == ["a.csv", "a.csv (x2)"]
+
+
+@pytest.mark.usefixtures("undrawn_figures")
+def test_two_experiments_of_a_group_have_two_names_where_all_inputs_stand(tmp_path):
+    for name in ("spin-down-1", "field-scan"):
+        shutil.copytree(SAMPLE_DATA / name, tmp_path / name)
+        record = json.loads((tmp_path / name / "run.json").read_text(encoding="utf-8"))
+        (tmp_path / name / "run.json").write_text(json.dumps(record | {"group": "Group 1"}), encoding="utf-8")
+    page = Page(write_report([tmp_path], tmp_path / "report.html").read_text(encoding="utf-8")).text
+    for about in (r"Each by itself", "The data"):
+        assert re.search(rf"{about}.*?Group 1, spin-down-1.*?Group 1, field-scan", page)

@@ -336,6 +336,9 @@ def test_a_file_of_a_folder_that_only_one_analysis_searches_is_named(of_three, t
     write_class([tmp_path / "runs", files], tmp_path / "class.html", show=(shown := []).append)
     assert f"levilab open {files / 'rpm.csv'} asks for them" in " ".join(str(shown).replace("`", "").split())
     write_class([of_three, files / "rpm.csv"], tmp_path / "class.html", show=(shown := []).append)
+    (files / "good.csv").unlink()
+    page = Page(write_class([of_three, files], tmp_path / "class.html").read_text(encoding="utf-8")).text
+    assert re.search(r"repeat not read: \S+rpm.csv: a table.* levilab open \S+rpm.csv asks for them", page)
     assert f'say levilab open {files / "rpm.csv"} --columns "t=1,f=2 [rpm]" --keep' in str(shown)
 
 
