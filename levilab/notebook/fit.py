@@ -275,6 +275,7 @@ class FittedModel(Named[Quantity]):
         ends = [*((p, -k) for p, k in reversed(sides)), (0.0, 0.0), *sides]
         return {name: [(p, one.n + k * one.s if k else one.n) for p, k in ends] for name, one in self.items()}
 
+    @bare
     def ci_report(self, sigmas: ArrayLike = (1, 2, 3)) -> str:
         """Return the intervals of `conf_interval` as a table: the value, and the ends' distances from it."""
         found = self.conf_interval(sigmas)

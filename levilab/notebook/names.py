@@ -13,8 +13,8 @@ import levilab
 from levilab.errors import LevilabError, UsageError
 
 F = TypeVar("F", bound="Callable[..., Any]")
-#: Flag of a function's code: it takes any names.
-_TAKES_ANY = 0x08
+#: Flags of a function's code: it takes any names, any number of values.
+_TAKES_ANY, _TAKES_MORE = 0x08, 0x04
 #: Names less alike than this are not what was meant.
 _ALIKE = 0.65
 #: What others call an option → names that it may have here.
@@ -54,7 +54,7 @@ def meant(name: str, known: Iterable[str], lists: str = "dir()") -> str:
     >>> meant("law", ["model", "input"]), meant("modle", ["model", "input"])
     ('known are model, input', 'did you mean model?')
     """
-    names = [*known]
+    names, name = [*known], str(name)
     other, how = _OTHER_VALUES.get(name, ("", ""))
     if other in names:
         return f"take {other}, {how}"
@@ -93,6 +93,11 @@ def bare(function: F) -> F:
     @wraps(function)
     def call(*args: Any, **named: Any) -> Any:
         with border:
+            if len(args) > code.co_argcount and not code.co_flags & _TAKES_MORE:
+                own = code.co_varnames[0] == "self"
+                expected = f"at most {code.co_argcount - own} without a name are expected: name the others"
+                array = ", or put arrays into one, analyze((t, f, u))" * (function.__name__ == "analyze")
+                raise UsageError(function.__name__, expected + array, value=f"{len(args) - own} values")
             if not code.co_flags & _TAKES_ANY:
                 _refuse_unknown(function.__name__, named, names)
             return function(*args, **named)
