@@ -121,7 +121,7 @@ class HttpTransport:
             )
             raise BadAnswer(self.address, message, seen, expected) from None
         if answer.status != http.client.OK:
-            raise BadAnswer(self.address, message, f"{answer.status} {answer.reason}", "200 OK")
+            raise BadAnswer(self.address, message, f"{answer.status} {answer.reason}", "200 OK", self._advice)
         if len(whole) > LONGEST_ANSWER:
             raise BadAnswer(self.address, message, f"more than {LONGEST_ANSWER} bytes", "less than that")
         return document

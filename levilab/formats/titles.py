@@ -65,12 +65,12 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
         "time", "t", "zeit", "elapsed", "elapsed_time", "timestamp", "seconds", "sekunden", "milliseconds", "minutes",
         "ms", "millis", "micros", "x_value", "clock", "uhrzeit", "temps", "tiempo", "tempo", "tid", "laufzeit",
         "messzeit", "gesamtzeit", "zeitpunkt", "zeitstempel", "ts", "datetime", "epoch", "heure",
-        "hora", "tidpunkt", "secondes", "segundos", "sekunder")),
+        "datum/uhrzeit", "date/time", "hora", "tidpunkt", "secondes", "segundos", "sekunder")),
     "spin_frequency_hz": ("frequency", (
         "spin_frequency", "f", "freq", "frequency", "frequenz", "nu", "ν", "nu3", "ν3", "f3", "ν_3", "nu_3", "f_3",
         "spin", "spin_freq", "f_spin", "rotation_frequency", "rotation", "drehfrequenz", "hz", "hertz", "rpm", "rad/s",
         *ANGULAR, *NEED_UNITS, "frequence", "frekvens", "frecuencia", "umdrehungsfrequenz", "umlauffrequenz",
-        "rotationsfrequenz", "rotationsfrekvens", "frequence_de_rotation", "frecuencia_de_giro",
+        "1/t", "rotationsfrequenz", "rotationsfrekvens", "frequence_de_rotation", "frecuencia_de_giro",
         "frecuencia_de_rotacion", "spin_rate", "rotation_rate")),
     "precession_frequency_hz": ("frequency", (
         "precession_frequency", "precession", "f_precession", "f_p", "fp", "νp", "ν_p", "nu_p", "prazession",
@@ -99,7 +99,8 @@ IMPLIED_UNITS = dict.fromkeys((*ANGULAR, "rad/s"), "rad/s") | {
 # The time of a turn, and turns in a time, are read where the title says their unit: T [ms], turns in 10 s.
 PERIODS = (
     "period", "periode", "periodendauer", "rotation_period", "spin_period", "umlaufzeit", "umlaufdauer",
-    "drehperiode", "periode_de_rotation", "periodo", "periodo_de_rotacion", "periodtid", "omloppstid",
+    "umdrehungszeit", "umdrehungsdauer", "drehperiode", "periode_de_rotation", "periodo", "periodo_de_rotacion",
+    "periodtid", "omloppstid",
 )  # fmt: skip
 TURNS = (
     "turns", "rotations", "revolutions", "revs", "rev", "umdrehungen", "umdr.", "umdr", "umlaufe", "rotationen",
@@ -303,6 +304,8 @@ _UNIT_FORMS = tuple(
 
 _UNIT_WITHIN = re.compile(r"(?P<name>[^\[(]+?)\s*[\[(](?P<unit>[^\[\]()]+)[\])]\s.+")  # f [Hz] mean
 
+#: A unit behind a name and a blank: Laufzeit s, Drehzahl 1/min; no symbol of a quantity.
+_BARE_UNIT = re.compile(r"(?P<name>.+)\s(?P<unit>s|sec|sek|ms|min|[kmμ]?Hz|rpm|(?:1|U|tr|r|rev|°|rad)/(?:s|min))")
 #: A title that is longer names nothing that is known here: the forms above look at each pair of its places.
 LONGEST_TITLE = 200
 
@@ -315,8 +318,8 @@ def without_runs_of_blanks(text: str) -> str:
 def _name_and_unit(text: str) -> list[tuple[str, str]]:
     forms = [match for form in _UNIT_FORMS if (match := form.fullmatch(text))]
     found = [(m["name"], m["unit"]) for m in forms if m["unit"].count("(") == m["unit"].count(")")]  # ln(f/Hz) is none
-    within = _UNIT_WITHIN.fullmatch(text)
-    return [*found, (within["name"], within["unit"])] if within and is_unit(within["unit"]) else found
+    within, behind = _UNIT_WITHIN.fullmatch(text), _BARE_UNIT.fullmatch(text)
+    return [*found, *((m["name"], m["unit"]) for m in (within, behind) if m and is_unit(m["unit"]))]
 
 
 def read_title(text: str) -> Title:
@@ -345,16 +348,9 @@ def read_title(text: str) -> Title:
         title = _title_of_name(text[:place], text[place + 1 :])
         if title and (title.inverse or unit_factor(text[place + 1 :], dimension(title.column or "")) is not None):
             return title
-    behind = _BARE_UNIT.fullmatch(text)
-    if behind and not found:  # Laufzeit s, Frequenz Hz
-        return _title_of_name(behind["name"], behind["unit"]) or Title(None, behind["unit"])
     # a title may be a unit alone, as sec or 1/min; m, h, T and G are symbols of quantities, too
     units = [*[text] * (len(text) > 1 or text == "s"), *(unit for _, unit in found)]
     return Title(None, next((unit for unit in units if is_unit(unit)), found[0][1] if found else None))
-
-
-#: A unit behind a name and a blank: those alone that are no symbol of a quantity.
-_BARE_UNIT = re.compile(r"(?P<name>.+)\s(?P<unit>s|sec|sek|ms|min|[kmμ]?Hz|rpm|(?:1|U|tr|r|rev|°|rad)/(?:s|min))")
 
 
 def _title_without_unit(name: str) -> Title | None:

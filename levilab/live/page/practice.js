@@ -35,11 +35,10 @@ export function openPractice(about, command, run, isOwn, allowed) {
   async function send(what, values = {}, field = null) {
     const wrongs = what === "record a run" || values.task ? document.querySelector("#controls [aria-invalid=true]") : null;
     if (wrongs) return write("said", phrase("First correct this: {field}, {why}", {field: wrongs.ariaLabel || wrongs.labels[0].firstChild.data.trim(), why: by(`${wrongs.id}-wrong`).textContent}));
-    const slows = values.task && Number(by("speed").value) > 1;  // at 10 × the top is down before a person has read the task
-    if (slows) await command({do: "set the speed", speed: 1});
+    now.slowed = values.task ? Number(by("speed").value) > 1 : now.slowed;  // at 10 × the top is down before a person has read the task
+    if (values.task && now.slowed) await command({do: "set the speed", speed: 1});
     if (allowed) write("said", "");  // and not later: what the bench says may come before the answer
     const wrong = await command({do: what, ...values});
-    if (allowed && slows && !wrong) write("said", phrase("Time goes at 1 × again, so that the top is up while you read the task."));
     if (!allowed || !wrong) return;
     write("said", field ? "" : wrong);
     field?.refuse(wrong);
@@ -214,6 +213,7 @@ export function openPractice(about, command, run, isOwn, allowed) {
     write("answers-wrong", "");
     write("task-title", phrase(row.title));
     for (const place of ["task-does", "goal"]) write(place, phrase(row.does));
+    if (now.slowed) by("task-does").append(` ${phrase("Time goes at 1 × again.")}`);
     if (row.measures) Object.assign(by("experiment"), {value: row.measures}).dispatchEvent(new Event("change"));
     const answers = Object.entries(row.answers);
     put(by("task-share"), {hidden: answers.length > 0});

@@ -18,7 +18,7 @@ from analysis.limits import spin_at_fall
 from analysis.sway import swings_of
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError, DoesNotSuit, UsageError
-from levilab.formats.film import Film, open_film
+from levilab.formats.film import Film, NoFilm, check_reader, open_film
 from levilab.formats.kinds import AUDIO, kind_of_bytes
 from levilab.formats.table import file_errors
 from levilab.pipelines.analyzed import EachAlone
@@ -107,12 +107,22 @@ class FilmReadings(Readings):
     compared: ClassVar[tuple[str, ...]] = ("head",)
 
 
-def read_film(path: Path, options: VideoOptions) -> FilmReadings:
-    """Return the head of a film.  Raises DoesNotSuit for other files, and where no scale is given; UsageError."""
+def _head_of(path: Path) -> bytes:
+    """Return the first bytes of a film.  Raises DoesNotSuit for another file, and without the extra."""
     with file_errors(path), path.open("rb") as stream:
         head = stream.read(_HEAD)
     if kind_of_bytes(head, path.suffix) is not AUDIO:
         raise DoesNotSuit(Text("{path:s}: holds no film that can be read: give the file that the camera wrote", path))
+    try:
+        check_reader(path)
+    except NoFilm as error:
+        raise DoesNotSuit(text_of(error)) from error
+    return head
+
+
+def read_film(path: Path, options: VideoOptions) -> FilmReadings:
+    """Return the head of a film.  Raises DoesNotSuit for other files, and where no scale is given; UsageError."""
+    head = _head_of(path)
     given = [name for name in ("scale", "rim", "base") if getattr(options, f"{name}_m") is not None]
     wanted = Text(
         "`rim`, the diameter of the top's rim; `base`, the outer diameter of the base; or `scale`, metres in a pixel"

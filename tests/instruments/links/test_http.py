@@ -102,6 +102,12 @@ def test_anything_else_is_an_error(pieces, error):
         link_to(server).query("/get")
 
 
+def test_a_page_that_is_not_there_is_no_fault_of_a_cable():
+    with Server(b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n") as server, pytest.raises(BadAnswer) as caught:
+        link_to(server).query("/get")
+    assert str(caught.value).endswith("expected 200 OK: try this")
+
+
 def test_silence_and_an_answer_that_drips_end_with_the_time_out():
     for server in (Server(closes=False), Server(*([b"HTTP/1.1 200 OK\r\n"] + [b"A"] * 1000), pause=0.02)):
         with server:

@@ -705,10 +705,18 @@ def test_counts_at_even_times_are_no_spins(write):
         read_table(path, quantities=SPIN, needed=SPIN[:2])
 
 
-@pytest.mark.parametrize("title", ["Pulse pro Minute", "Pulse/min", "Drehzahl (Umdr./min)", "n (1/Min.)"])
+@pytest.mark.parametrize(
+    "title", ["Pulse pro Minute", "Pulse/min", "Drehzahl (Umdr./min)", "n (1/Min.)", "Drehzahl 1/min"]
+)
 def test_pulses_a_minute_and_units_with_a_point_are_spins(title, write):
     path = write(f"Zeit (Sek.);{title}\n" + "".join(f"{2 * k};{2100 - 9 * k}\n" for k in range(20)))
     assert read_table(path).column("spin_frequency_hz")[0] == pytest.approx(35)
+
+
+@pytest.mark.parametrize(("title", "factor"), [("1/T", 35.0), ("Umdrehungszeit [ms]", 1000 / 35)])
+def test_other_names_of_the_spin_and_its_period_are_known(title, factor, write):
+    rows = "".join(f"23.11.2026 14:00:{k:02d};{factor}\n" for k in range(20))
+    assert read_table(write(f"Datum/Uhrzeit;{title}\n{rows}")).column("spin_frequency_hz")[0] == pytest.approx(35)
 
 
 def test_times_of_turns_without_their_own_times_say_what_is_missing(write):

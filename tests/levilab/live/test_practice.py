@@ -363,7 +363,10 @@ def test_a_run_and_a_task_wait_until_no_field_is_wrong(starting, page):
     with page.expect_request(lambda one: "begin a task" in (one.post_data or "")):
         page.click("#task-list button >> nth=0")
     assert {"do": "set the speed", "speed": 1} in asked  # at 10 × it would be down before the task is read
-    until(page, "document.getElementById('said').textContent.startsWith('Time goes at 1 × again')")
+    publish(
+        starting.watches[""], State(3.0, last={"spin_frequency_hz": 30.0}, drive=Drive("SQU", 30.0, 10.0), task="catch")
+    )
+    until(page, "document.getElementById('task-does').textContent.endsWith(' Time goes at 1 × again.')")
 
 
 def test_after_a_run_the_last_minutes_show_what_a_person_does(starting, page, tmp_path):

@@ -377,3 +377,9 @@ def test_the_beat_of_the_slow_swings_is_in_the_u_of_the_vertical_swing():
         found = rising_of(times, 3e-4 * swing + 8e-5 * beat + random.normal(0, 4e-5, times.size)).swing
         pulls.append((found.value - 1.2) / found.u)
     assert 0.5 < np.std(pulls) < 1.4  # 6.2 by the noise alone
+
+
+def test_the_extra_is_asked_for_before_the_scale(path, monkeypatch):
+    monkeypatch.setattr("levilab.formats.film.find_spec", lambda _: None)
+    with pytest.raises(DataError, match="films need the extra video"):
+        ANALYSES["video"].analyze([path])
