@@ -289,12 +289,16 @@ def _blocks(of: Class, *, deeper: bool) -> Iterator[Block]:
         yield section("Notes of the groups", "notes-of-groups", Facts(notes))
 
 
+def _each(of: Class) -> list[tuple[str, Mark]]:
+    """Return the name and the mark of each group, and of what was not read."""
+    return [*zip((group.source.name for group in of.groups), of.marks, strict=True), *of.unread.items()]
+
+
 def _marks(of: Class) -> Iterator[Tabular]:
     """Yield a row for each group whose result is not good, and why; nothing where all are."""
-    names = (group.source.name for group in of.groups)
     rows = [
         Row((name, mark.word, Sentences(*mark.why, between="\n")), _ROWS[mark.word])
-        for name, mark in (*zip(names, of.marks, strict=True), *of.unread.items())
+        for name, mark in _each(of)
         if mark.word != GOOD
     ]
     note = Text(
@@ -308,16 +312,14 @@ def _marks(of: Class) -> Iterator[Tabular]:
 
 
 def _short_table(of: Class) -> Table:
-    """Return a row for each group: its mark, the value that is compared first, and why it is not good."""
+    """Return a row for each group: its mark, and the value that is compared first."""
     shown = [
         (one.head, [one.show(each.value, each.u) if each else None for each in one.estimates]) for one in of.quantities
     ]
     head, estimates = shown[0] if shown else ("", [None] * len(of.groups))
-    names = (group.source.name for group in of.groups)
-    rows = [*zip(names, of.marks, column(estimates), strict=True), *((*one, "") for one in of.unread.items())]
-    cells = [(name, mark.word, value, Sentences(*mark.why, between="\n")) for name, mark, value in rows]
-    heads = ["group", "result", head, *["why"] * any(row[-1] for row in cells)]
-    return table(_subject(of), heads, (row[: len(heads)] for row in cells), numbers=[head])
+    values = [*column(estimates), *[""] * len(of.unread)]
+    rows = [(name, mark.word, value) for (name, mark), value in zip(_each(of), values, strict=True)]
+    return table(_subject(of), ["group", "result", head], rows, numbers=[head])
 
 
 def _values(of: Class, quantity: Compared) -> Tabular:
@@ -488,4 +490,7 @@ def write_class(
         tell(text)
     for of in classes:
         show(_short_table(of))
+        for name, mark in _each(of):
+            if mark.why:
+                tell(Text("{subject}: {text}", verbatim(name), Sentences(*mark.why, between="; ")))
     return output
