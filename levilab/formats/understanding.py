@@ -95,6 +95,8 @@ SPIN = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 _SPIN = "spin_frequency_hz"
 #: First values that are shown.
 _SHOWN = 5
+#: Where a text has more numbers in a line than this factor times its lines, they are readings.
+_IN_LINE = 8
 
 
 # --- what is shown -------------------------------------------------------------------------------------
@@ -919,6 +921,9 @@ def _titles(
         what = 'is no header for the {width} columns below: correct it, or say `columns` = "t=1,f=2"'
         raise NoSuchColumn(path, what, layout.width, line=layout.header_line)
     taken = _by_units(layout, numbers)
+    if len(layout.sample) <= len(filled) // _IN_LINE:
+        what = "{width} numbers stand in one line: write a reading a line, its time and its spin"
+        raise NoSuchColumn(path, what, layout.width, line=layout.first_line)
     if (len(filled) > len(TITLES_WITHOUT_HEADER) and not taken) or not guess:
         what = '{width} columns and no header; add one, or say `columns` = "t=1,f=2"'
         raise NoSuchColumn(path, what, layout.width, line=layout.first_line)

@@ -719,6 +719,12 @@ def test_other_names_of_the_spin_and_its_period_are_known(title, factor, write):
     assert read_table(write(f"Datum/Uhrzeit;{title}\n{rows}")).column("spin_frequency_hz")[0] == pytest.approx(35)
 
 
+@pytest.mark.parametrize("form", ["{t}, {f}; ", "{t} {f} "])
+def test_readings_in_one_line_are_asked_for_a_line_each(form, write):
+    with pytest.raises(NoSuchColumn, match="numbers stand in one line: write a reading a line"):
+        read_table(write("".join(form.format(t=2 * k, f=35 - k / 10) for k in range(30)) + "\n"))
+
+
 def test_times_of_turns_without_their_own_times_say_what_is_missing(write):
     path = write("n,T\n" + "".join(f"{k},{25 + k / 100}\n" for k in range(20)))
     with pytest.raises(NoSuchColumn, match=r"at which the turns were timed: .* keep the times of the turns alone"):
