@@ -488,18 +488,26 @@ def _describe_scan(problem: _Problem, values: Array, sigma: Array, by_height: Ar
 
 def _statistics(problem: _Problem, values: Array, sigma: Array) -> Statistics:
     left, priors = problem.b - problem.model(values), problem.priors()
-    pulls = sum(((values[index] - prior.value) / prior.u) ** 2 for index, prior in priors)
     n, n_free = len(left), len(problem.free)
     all_known = problem.u_b is not None and problem.u_z is not None
     return Statistics(
         n=n,
         n_parameters=n_free,
         rms_residual=float(np.sqrt(np.mean(left**2))),
-        chi_square=float(np.sum((left / sigma) ** 2) + pulls) if all_known else None,
+        chi_square=_chi_square(problem, values, sigma) if all_known else None,
         degrees_of_freedom=n + len(priors) - n_free,
         durbin_watson=durbin_watson(left / sigma),
         runs_test_p=runs_test_p(left),
     )
+
+
+def _chi_square(problem: _Problem, values: Array, sigma: Array) -> float:
+    """Return χ² of readings and priors with the radii fitted, to first order: held, they are no misfit of a reading."""
+    whole = replace(problem, free=_free_parameters(problem.known, free_radii=True))
+    pulls = [(prior.value - values[k]) / prior.u for k, prior in whole.priors()]
+    left = np.append((problem.b - problem.model(values)) / sigma, pulls)
+    basis, _ = np.linalg.qr(whole.weighted_slopes(values, sigma)[whole.indices].T)
+    return float(np.sum((left - basis @ (basis.T @ left)) ** 2))
 
 
 def _misfit(statistics: Statistics) -> tuple[float, list[Remark]]:

@@ -61,6 +61,17 @@ def test_of_heights_and_readings_without_u_the_fit_finds_which_scatter(u_b, u_z)
     )  # as above; 1.9 for the origin by heights that are exact
 
 
+def test_radii_that_are_held_are_no_misfit_of_exact_readings():
+    pulls = []
+    for seed in range(25):
+        ring, background = drawn(seed)
+        found = fit_scan(Z, scan(seed, ring, background, 1e-6, 0.0), KNOWN, 1e-6)
+        truth = [ring.strength, ring.origin, ring.thickness, background]
+        pulls.append((found.values[:4] - truth) / np.sqrt(np.diagonal(found.covariance))[:4])
+        assert not {of.kind for of in found.remarks} & {"scan scatters", "no strength"}
+    assert np.std(pulls, axis=0) == pytest.approx(np.ones(4), abs=0.43)  # 0.01 to 0.6 with χ² of the held radii
+
+
 def test_a_scan_without_noise_gives_the_ring_back():
     known = replace(
         KNOWN, inner_radius=Prior(0.0301, 0.0), outer_radius=Prior(0.0549, 0.0), thickness=None, origin=None
