@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial.chebyshev import chebder, chebval, chebvander
+from numpy.polynomial.polynomial import polyvander
 from numpy.typing import NDArray
 
 from analysis.arrays import Array
@@ -45,6 +46,13 @@ _ORDER, _FREE, _SLOWS = 36, 3, 0.007
 #: What a drive adds to each order, as standard deviations: nothing, or each decade as probable [turns].  Orders above
 #: those of a swing at this frequency fall off as their fifth power [Hz].  One top in thirty is driven.
 _DRIVES, _DRIVE_HZ, _DRIVEN = np.append(0.0, 3 * 10.0 ** np.arange(-4, 4)), 0.1, 0.03
+#: A drive that is switched off, or begins to sweep, changes the slope of the spin at once, a kink: at any time, by the
+#: greatest relative slope of a free top as a standard deviation, in one film of a hundred.
+_KINK = 0.01
+#: Numbers of times that are tried for it, first in the whole film, then about the best one, and of pictures at most.
+_TRIED = ((400, 300), (40, 3000))
+#: Terms of the spin after a kink: a shift of its time, the change of the slope, and changes of that by drag.
+_TERMS = 6
 #: Length of a reading of the spin [s], and the fewest pictures in it.
 WINDOW_S, _FEWEST_IN_WINDOW = 1.0, 12
 
@@ -152,30 +160,27 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, aside: Array, 
     _follow(times[middle::-1], phase[middle::-1], turns[middle::-1], start, float(phase[middle]))
     turns += _NEARNESS * aside / (2 * np.pi)
     centre, half = float((times[0] + times[-1]) / 2), float(np.ptp(times)) / 2
-    late, count = (times - centre) / half, _ORDER + 1
+    late = (times - centre) / half
     swings = min(int(_SWING_HZ[1] * 4 * half), _MOST_SWINGS) if np.any(rows) else 0
-    orders = np.arange(_FREE, _FREE + max(count, swings))
-    falls = abs(start) * half * min(_SLOWS * half / 2, 1) ** orders / orders
-    drives = np.minimum(4 * half * _DRIVE_HZ / orders, 1) ** 5
+    orders = np.arange(_FREE, _FREE + swings)
     sways = _SWING * np.minimum(orders / (4 * half * _SWING_HZ[0]), 1) ** 4
-    columns = chebvander(late, orders[-1])
-    basis, swing = columns[:, :count], (sways * columns[:, _FREE:])[:, :swings]
-    widths = np.hypot(falls, _DRIVES[:, None] * drives)[:, : count - _FREE]
+    swing = sways * chebvander(late, _FREE + swings)[:, _FREE:-1]
     late_rows, sight = _LINE_TIME * start * (rows - rows.mean()), _NEARNESS_U * aside / (2 * np.pi)
     nuisance = np.column_stack([late_rows, sight, swing])
-    first = _fit(basis, turns, u, nuisance, widths)[0][:count]
-    nuisance = np.column_stack([nuisance, _waves(basis @ first)])
-    slope, bend = (chebval(0.0, chebder(np.eye(count), n)) / half**n for n in (1, 2))
-    chirp = float(bend @ first)
+    smooth = _Smooth.of(abs(start), half)
+    columns = smooth.columns(np.append(late, 0.0), smooth.time_of_kink(late, turns, u, nuisance))
+    basis, at_centre = columns[:, :-1], columns[:, -1]
+    first = _fit(basis[0], turns, u, nuisance, smooth)[0][: basis.shape[2]]
+    nuisance = np.column_stack([nuisance, _waves(basis[0] @ first)])
+    chirp = float(at_centre[2] @ first)
     slower = chirp * min(chirp / start, 0.0)  # of the slope, a second; that of an even drive stays
     drag = slower * (half * late) ** 3 / 6
     more = np.column_stack([nuisance, EXPONENT_U * drag])
-    value, covariance, rest, noise = _fit(basis, turns - EXPONENT * drag, u, more, widths)
-    smooth, error = value[:count], covariance[:count, :count]
+    value, covariance, rest, noise = _fit(basis[0], turns - EXPONENT * drag, u, more, smooth)
+    found, error = value[: basis.shape[2]], covariance[: basis.shape[2], : basis.shape[2]]
     power = EXPONENT + EXPONENT_U * float(value[-1])
-    speed = chebval(late, chebder(smooth)) / half + power * slower * (half * late) ** 2 / 2
-    speeds = np.concatenate([chebval(late, chebder(np.eye(count))).T / half, np.zeros(nuisance.shape)], axis=1)
-    terms = np.stack([np.concatenate([basis, nuisance], axis=1), speeds])
+    speed = basis[1] @ found + power * slower * (half * late) ** 2 / 2
+    terms = np.concatenate([basis[:2], np.stack([nuisance, np.zeros(nuisance.shape)])], axis=2)
     readings = np.array([
         _reading(times[part], rest[part], noise * u[part], terms[:, part], covariance[:-1, :-1])
         for part in windows_of(times)
@@ -186,11 +191,87 @@ def turning_of(times: Array, phase: Array, u: Array, rows: Array, aside: Array, 
         spin=readings[:, 1] + np.interp(readings[:, 0], times, speed),
         u=readings[:, 2],
         middle=centre,
-        frequency=float(slope @ smooth),
-        u_frequency=float(np.sqrt(slope @ error @ slope)),
-        chirp=float(bend @ smooth),
-        u_chirp=float(np.sqrt(bend @ error @ bend)),
+        frequency=float(at_centre[1] @ found),
+        u_frequency=float(np.sqrt(at_centre[1] @ error @ at_centre[1])),
+        chirp=float(at_centre[2] @ found),
+        u_chirp=float(np.sqrt(at_centre[2] @ error @ at_centre[2])),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Smooth:
+    """Smooth turns of a film, as a free top and a driven one have them, without a kink and with it.
+
+    Attributes:
+        spin: [Hz].
+        half: half the length of the film [s].
+        scales: standard deviations of the coefficients, shape (k, m); those of the `_FREE` first ones do not count, and
+            the last row is the widest.
+        chances: of each row, relative, shape (k,).
+    """
+
+    spin: float
+    half: float
+    scales: Array
+    chances: Array
+
+    @classmethod
+    def of(cls, spin: float, half: float) -> "_Smooth":
+        """Return them for a spin [Hz] and half the length of a film [s]."""
+        orders = np.arange(_FREE, _ORDER + 1)
+        falls = spin * half * min(_SLOWS * half / 2, 1) ** orders / orders
+        drives = np.minimum(4 * half * _DRIVE_HZ / orders, 1) ** 5
+        widths = np.hypot(falls, _DRIVES[:, None] * drives)
+        chances = np.append(1.0, np.full(len(widths) - 1, _DRIVEN / len(widths)))
+        both = [np.pad(widths, ((0, 0), (_FREE, _TERMS)), constant_values=((1, 1), (1, kink))) for kink in (0, 1)]
+        return cls(spin, half, np.concatenate(both), np.append(chances, _KINK * chances))
+
+    def beside(self, nuisance: Array) -> tuple[Array, Array]:
+        """Return standard deviations of all coefficients, and a matrix with a one for each that has a prior."""
+        scales = np.pad(self.scales, ((0, 0), (0, nuisance.shape[1])), constant_values=1)
+        return scales, np.diag(np.arange(scales.shape[1]) >= _FREE).astype(float)
+
+    def columns(self, late: Array, kink: float) -> Array:
+        """Return turns, spins and slopes of the polynomials and of a kink, shape (3, n, m); see `kinks`."""
+        powers = np.eye(_ORDER + 1)
+        smooth = [chebval(late, chebder(powers, n)).T / self.half**n for n in range(3)]
+        return np.concatenate([smooth, self.kinks(late, kink)], axis=2)
+
+    def kinks(self, late: Array, kink: float | Array) -> Array:
+        """Return turns, spins and slopes of a change of the slope at once, in standard deviations of its prior.
+
+        The columns are a shift of its time, the change, and its own changes.
+
+        Args:
+            late: times, from -1 at the start of the film to 1 at its end, shape (n,).
+            kink: its time, from -1 to 1, or several, shape (k, 1).
+
+        Returns:
+            Shape (3, n, _TERMS), or (3, k, n, _TERMS).
+        """
+        after, power = np.maximum(late - kink, 0) * self.half, np.arange(_TERMS)
+        sizes = self.spin * _SLOWS**power
+        sizes[0] = sizes[1] * 2 * self.half / math.sqrt(12)
+        powers = polyvander(after, _TERMS) * (late > kink)[..., None]
+        spins, turns = powers[..., :-1], powers[..., 1:] / (power + 1)
+        return np.asarray(sizes * [turns, spins, power * np.roll(spins, 1, -1)])
+
+    def time_of_kink(self, late: Array, turns: Array, u: Array, nuisance: Array) -> float:
+        """Return the time by which a kink describes turns best, from -1 to 1."""
+        (scales, has_prior), without = self.beside(nuisance), len(self.scales) // 2
+        columns, best, wide = np.column_stack([self.columns(late, 0.0)[0], nuisance, turns]) / u[:, None], 0.0, 1.0
+        for times, pictures in _TRIED:
+            some = slice(None, None, -(-late.size // pictures))
+            orthonormal, triangle = np.linalg.qr(columns[some, :-1])
+            tried = np.clip(best + wide * np.linspace(-1, 1, times), -1, 1)
+            kinks = self.kinks(late[some], tried[:, None])[0, ..., 1:] / u[some, None]
+            more = np.concatenate([kinks, np.tile(columns[some, -1:], (times, 1, 1))], axis=2)
+            seen = orthonormal.T @ more
+            unseen = more.mT @ more - seen.mT @ seen
+            logs = [_evidence_with(triangle * scale, has_prior, seen, unseen) for scale in scales[:without]]
+            of_each = np.logaddexp.reduce(logs + np.log(self.chances[:without, None]))
+            best, wide = float(tried[np.argmax(of_each)]), 2 / (times - 1)
+        return best
 
 
 def _waves(turns: Array) -> Array:
@@ -215,26 +296,23 @@ def _follow(times: Array, phase: Array, turns: Array, frequency: float, start: f
 
 
 def _fit(
-    basis: NDArray[np.floating], turns: Array, u: Array, nuisance: Array, widths: Array
+    basis: NDArray[np.floating], turns: Array, u: Array, nuisance: Array, smooth: _Smooth
 ) -> tuple[Array, Array, Array, float]:
     """Return coefficients of a basis, shape (n, m), and of the nuisance, their covariance, residuals, and their noise.
 
-    The last columns of the basis have the prior of a free top, of widths in the first row, or of a driven one, in the
-    others, each as probable, shape (k, p), the widest last; the nuisance has one of 1.  All count by their evidence.
-    The noise is that of the residuals from the widest prior, in units of u, and 1 at least: see `_slow_noise`.
+    The nuisance has a prior of 1.  All priors of the smooth turns count by their evidence.  The noise is that of the
+    residuals from the widest prior, in units of u, and 1 at least: see `_slow_noise`.
     """
     m = basis.shape[1]
     design = np.concatenate([basis, nuisance], axis=1)
     triangle = np.linalg.qr(np.column_stack([design, turns]) / u[:, None])[1]
-    scales, some = np.ones((len(widths), design.shape[1])), slice(m - widths.shape[1], m)
-    scales[:, some] = widths
-    prior = np.diag(np.arange(design.shape[1]) >= some.start).astype(float)
-    value, spread, _ = _solution(triangle, scales[-1], prior)
-    rest, fitted = (turns - design @ value) / u, m - float(np.sum(np.diag(spread)[some] / widths[-1] ** 2))
-    noise = max(_slow_noise(rest, float(np.ptp(turns)), fitted), 1.0)
-    values, covariances, logs = zip(*(_solution(triangle / noise, scale, prior) for scale in scales), strict=True)
-    weight = np.exp(np.array(logs) - max(logs))
-    weight[1:] *= _DRIVEN / len(widths)
+    scales, has_prior = smooth.beside(nuisance)
+    value, spread, _ = _solution(triangle, scales[-1], has_prior)
+    known = float(np.sum((np.diag(spread) / scales[-1] ** 2)[_FREE:m]))
+    rest = (turns - design @ value) / u
+    noise = max(_slow_noise(rest, float(np.ptp(turns)), m - known), 1.0)
+    values, covariances, logs = zip(*(_solution(triangle / noise, scale, has_prior) for scale in scales), strict=True)
+    weight = smooth.chances * np.exp(np.array(logs) - max(logs))
     weight /= weight.sum()
     found = weight @ np.array(values)
     off = np.array(values) - found
@@ -263,20 +341,38 @@ def _slow_noise(rest: Array, turns: float, fitted: float) -> float:
     return student(freedom) * math.sqrt(float(means @ means) / worth)
 
 
-def _solution(triangle: Array, scale: Array, prior: Array) -> tuple[Array, Array, float]:
+def _solution(triangle: Array, scale: Array, has_prior: Array) -> tuple[Array, Array, float]:
     """Return coefficients, their covariance, and the logarithm of the evidence of a prior.
 
     Args:
         triangle: of the weighted columns and the goal, shape (m + 1, m + 1).
         scale: standard deviations of the prior, shape (m,).
-        prior: one where a coefficient has a prior, shape (m, m).
+        has_prior: one where a coefficient has a prior, shape (m, m).
     """
-    matrix = np.concatenate([triangle[:, :-1] * scale, prior])
-    goal = np.append(triangle[:, -1], np.zeros(len(prior)))
+    matrix = np.concatenate([triangle[:, :-1] * scale, has_prior])
+    goal = np.append(triangle[:, -1], np.zeros(len(has_prior)))
     value = np.linalg.lstsq(matrix, goal, rcond=None)[0]
     information = matrix.T @ matrix
     log = -0.5 * (np.sum((goal - matrix @ value) ** 2) + np.linalg.slogdet(information)[1])
     return scale * value, scale[:, None] * np.linalg.inv(information) * scale, float(log)
+
+
+def _evidence_with(triangle: Array, has_prior: Array, seen: Array, unseen: Array) -> Array:
+    """Return logarithms of the evidence with a kink, for each of several times, shape (k,).
+
+    Args:
+        triangle: of the weighted columns, in standard deviations of the prior, shape (m, m).
+        has_prior: as of `_solution`.
+        seen: components along these columns of those of a kink, and of the goal, shape (k, m, p + 1).
+        unseen: scalar products of what is left of them, shape (k, p + 1, p + 1).
+    """
+    orthonormal, root = np.linalg.qr(np.concatenate([triangle, has_prior]))
+    along = orthonormal[: len(triangle)].T @ seen
+    left = unseen + seen.mT @ seen - along.mT @ along
+    information = left[:, :-1, :-1] + np.eye(left.shape[1] - 1)
+    gain = np.sum(left[:, :-1, -1] * np.linalg.solve(information, left[:, :-1, -1:])[:, :, 0], axis=1)
+    alone = left[:, -1, -1] + 2 * np.sum(np.log(np.abs(np.diag(root))))
+    return np.asarray(0.5 * (gain - np.linalg.slogdet(information)[1] - alone))
 
 
 def windows_of(times: Array) -> list[NDArray[np.intp]]:
