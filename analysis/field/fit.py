@@ -44,7 +44,8 @@ SAME_HEIGHT_M = 1e-5
 _MOST_TURNS = 8
 #: Readings of unknown u are rounded to this part of the largest.
 _ROUNDING = 1e-9
-#: Unknown scatters are searched over these logarithms, in units of the residuals, and one of two from a small one.
+#: Logarithms of unknown scatters over the rms residual: bounds (from 10⁻³, which adds 10⁻⁶ to a variance), and where
+#: the search for one of two begins small, since their likelihood may have two maxima.
 _LOGS, _SMALL = (-7.0, 3.0), -2.0
 #: A field below this multiple of the background's u counts as none.
 _NO_FIELD = 5.0
@@ -54,8 +55,8 @@ _BY_CHANCE = 2.0
 NO_FIT = 1e-3
 #: A χ² more improbably small than this: the stated uncertainties are mostly common to all readings.
 _TOO_GOOD = 1e-4
-#: A scan that leaves more than this share of the calliper's u has learned nothing; scan and calliper may differ by so
-#: many u.
+#: A scan that leaves more than this share of the calliper's u has learned nothing; scan and calliper may differ by this
+#: number of u, that of radii which are held included.
 LEARNS_NOTHING, APART = 0.9, 3.0
 #: Residuals whose rms is above this part of the largest reading, and that keep their sign over many heights, are those
 #: of another field; heights that are set to 2 mm leave 0.05 in the mean, in no order.
@@ -474,7 +475,8 @@ def _describe_scan(problem: _Problem, values: Array, sigma: Array, by_height: Ar
         raise NotFitted(what="flux density against height", advice="the readings do not tell the parameters apart")
     statistics = _statistics(problem, values, sigma)
     factor, misfit = _misfit(statistics)
-    covariance = _whole_covariance(jacobian, found.covariance * factor, moved, known)
+    shifts = _shifts(jacobian, found.covariance, moved, known)
+    covariance = factor * _whole_covariance(found.covariance, moved, shifts)
     covariance[0, 0] += (known.gain_u * values[0]) ** 2
     u = np.sqrt(np.diagonal(covariance))
     parameters = {
@@ -483,7 +485,7 @@ def _describe_scan(problem: _Problem, values: Array, sigma: Array, by_height: Ar
     }
     scan = FieldScan(parameters, covariance, free, known, statistics, problem.z, problem.b, sigma, by_height)
     leverage = found.leverage[: len(problem.z)]
-    return replace(scan, remarks=(*misfit, *_doubts(scan), *_outliers(scan, leverage)))
+    return replace(scan, remarks=(*misfit, *_doubts(scan, shifts), *_outliers(scan, leverage)))
 
 
 def _statistics(problem: _Problem, values: Array, sigma: Array) -> Statistics:
@@ -525,18 +527,26 @@ def _misfit(statistics: Statistics) -> tuple[float, list[Remark]]:
     return 1.0, []
 
 
-def _whole_covariance(jacobian: Array, free: Array, moved: list[int], known: Known) -> Array:
-    """Return the covariance of all parameters: an uncertain fixed one shifts those that are fitted."""
-    whole = np.zeros((6, 6))
-    whole[np.ix_(moved, moved)] = free
-    held = [k for k, name in enumerate(PARAMETERS) if k not in moved and (prior := known.prior(name)) and prior.u > 0]
-    for k in held:
-        prior = known.prior(PARAMETERS[k])
-        assert prior is not None
-        shift = np.zeros(6)  # of all parameters, per unit of the one that is held
-        shift[moved] = -free @ (jacobian[moved] @ jacobian[k])
-        shift[k] = 1.0
-        whole += prior.u**2 * np.outer(shift, shift)
+def _shifts(jacobian: Array, free: Array, moved: list[int], known: Known) -> dict[str, Array]:
+    """Return the shift of all parameters by the u of each uncertain one that is held, shape (6,) each.
+
+    free: covariance of those that are fitted.
+    """
+    shifts = {}
+    for k, name in enumerate(PARAMETERS):
+        prior = known.prior(name)
+        if k not in moved and prior and prior.u > 0:
+            shift = np.zeros(6)
+            shift[moved] = -free @ (jacobian[moved] @ jacobian[k])
+            shift[k] = 1.0
+            shifts[name] = prior.u * shift
+    return shifts
+
+
+def _whole_covariance(free: Array, moved: list[int], shifts: Mapping[str, Array]) -> Array:
+    """Return the covariance of all parameters, from that of the fitted ones and from those that are held."""
+    whole = sum((np.outer(shift, shift) for shift in shifts.values()), np.zeros((6, 6)))
+    whole[np.ix_(moved, moved)] += free
     return whole
 
 
@@ -577,16 +587,9 @@ def parts_of(scan: FieldScan) -> dict[str, tuple[UPart, ...]]:
     }
     for column, (index, _) in enumerate(problem.priors(), n):
         sizes[PARAMETERS[index]] = gain[:, column]
-    whole = np.zeros((6, 6))
-    whole[np.ix_(moved, moved)] = h
-    sizes["excess"] = np.sqrt(np.diagonal(whole) * (factor - 1))
-    for k, name in enumerate(PARAMETERS):
-        prior = scan.known.prior(name)
-        if k not in moved and prior and prior.u > 0:
-            shift = np.zeros(6)
-            shift[moved] = -(h * factor) @ (jacobian[moved] @ jacobian[k])
-            shift[k] = 1.0
-            sizes[name] = prior.u * shift
+    shifts = _shifts(jacobian, h, moved, scan.known)
+    sizes["excess"] = np.sqrt(np.diagonal(_whole_covariance(h, moved, shifts)) * (factor - 1))
+    sizes |= shifts
     sizes["gain"] = np.zeros(6)
     sizes["gain"][0] = scan.known.gain_u * values[0]
     return {
@@ -595,12 +598,13 @@ def parts_of(scan: FieldScan) -> dict[str, tuple[UPart, ...]]:
     }
 
 
-def _doubts(scan: FieldScan) -> list[Remark]:
+def _doubts(scan: FieldScan, shifts: Mapping[str, Array]) -> list[Remark]:
     """Return remarks: scan and calliper contradict each other, no ring has the field, or it is not significant."""
     said = []
     for name in scan.fitted:
         prior, found = scan.known.prior(name), scan.parameters[name].value
-        if prior is not None and found is not None and abs(found - prior.value) > APART * prior.u:
+        by_held = [shift[PARAMETERS.index(name)] for shift in shifts.values()]
+        if prior is not None and found is not None and abs(found - prior.value) > APART * math.hypot(prior.u, *by_held):
             said.append(Remark("contradicts", name=name, values=(found, prior.value, prior.u)))
     left, largest = scan.statistics.rms_residual, float(np.abs(scan.flux_density).max())
     if left > _MOST_LEFT * largest and scan.statistics.keeps_sign:
