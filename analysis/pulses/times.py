@@ -42,8 +42,9 @@ BESIDE = 12
 MORE_TURNS, LOG_ODDS = (-3, -2, -1, 1, 2, 3), 10.0
 #: Pulses nearer to their turns than this are used once a jump was found [turns]; the fit leaves out the others.
 NEAR = 0.05
-#: This number of turns, none of whose thirds has a pulse by chance alone, shows that they are thirds of a turn.
-LEAST_THIRDS = 24
+#: Where pulses that are missed at random would leave a third of the turns empty less often than this, the turns are
+#: thirds of one: 10 pulses show it of one pulse a turn, 26 of two.
+CHANCE_OF_THIRDS = 1e-4
 
 
 @dataclass(frozen=True)
@@ -148,10 +149,10 @@ def fit_train(times: Array, *, degree: int | None = None, step: float = 0.0) -> 
 def without_thirds(times: Array, train: Train, degree: int | None, pulses: int = 1) -> Train:
     """Return the train by whole turns where its turns are thirds of one, as with two marks a third of a turn apart.
 
-    pulses: in three thirds, at most; a list of times whose third pulse is always missing looks like two.
+    pulses: at most, in a turn; a list of times whose every third pulse is missing looks as if there were two.
     """
     counts = np.bincount(train.turns % 3, minlength=3)
-    if np.count_nonzero(counts) > pulses or np.ptp(train.turns) < LEAST_THIRDS:
+    if np.count_nonzero(counts) > pulses or 3 * (pulses / 3) ** train.used.size > CHANCE_OF_THIRDS:
         return train
     whole = np.rint(train.fit.phase(times)).astype(np.int64) - int(np.argmax(counts))
     belongs = np.isin(np.arange(times.size), train.used) & (whole % 3 == 0)

@@ -136,6 +136,12 @@ def test_two_marks_a_third_of_a_turn_apart_are_no_top_of_three_times_the_spin(ap
     assert found.missing == 0
 
 
+def test_a_dozen_pulses_that_miss_a_third_of_the_turns_by_chance_are_no_two_marks():
+    seen = np.isin(np.floor(30 * TIME), [1, 2, 5, 8, 10, 11, 14, 16, 20, 23, 26, 29])
+    samples = (seen * light(30 * TIME) + noise(0.02))[: round(RATE)]
+    assert spin_of_trace(samples, RATE, method="edges").frequency.value == pytest.approx(30, abs=0.05)
+
+
 @pytest.mark.parametrize("part", [0.5, 0.25])
 def test_half_the_frequency_of_a_weak_trace_is_seen_and_named(part):
     """A phase that starts at half or a quarter of the frequency, as a weak trace with missing pulses can have it."""
