@@ -215,7 +215,6 @@ def analyze(
     device: str | PathLike[str] | None = None,
     height_m: float | None = None,
     height_u_m: float | None = None,
-    free_radii: bool = False,
     clock_u: float | None = None,
     near: float | None = None,
     drive: float | None = None,
@@ -276,7 +275,6 @@ def analyze(
         device: file that describes base and top, as sample_data/device.toml (spindown, field, sway).
         height_m: where the top was seen to float [m]; its moment follows, if its mass is known (field).
         height_u_m: standard uncertainty of it [m]; by default that of the scan's heights (field).
-        free_radii: let the scan move the radii, within what the calliper says (field).
         clock_u: relative standard uncertainty of the clock that counts or samples, for the budgets (not field, sway).
         near: about where the spin of a magnetometer's record is at first, to 10 % [Hz] (spindown, spin, limit, video).
         drive: frequency of the drive meanwhile, for whether the top is locked to it [Hz] (spin).

@@ -56,7 +56,7 @@ NO_FIT = 1e-3
 #: A χ² more improbably small than this: the stated uncertainties are mostly common to all readings.
 _TOO_GOOD = 1e-4
 #: A scan that leaves more than this share of the calliper's u has learned nothing; scan and calliper may differ by this
-#: number of u, that of radii which are held included.
+#: number of u.
 LEARNS_NOTHING, APART = 0.9, 3.0
 #: Residuals whose rms is above this part of the largest reading, and that keep their sign over many heights, are those
 #: of another field; heights that are set to 2 mm leave 0.05 in the mean, in no order.
@@ -143,8 +143,7 @@ class FieldScan:
     Attributes:
         parameters: name → estimate, those of PARAMETERS.
         covariance: in the order of PARAMETERS, shape (6, 6).
-        fitted: the parameters that were free; the radii, if held, keep the calliper's uncertainty, which contributes to
-            that of the others.
+        fitted: the parameters that are not exact.
         known: the values from calliper and data sheet.
         statistics: how well the model fits.
         height: of the readings, rising [m], shape (n,).
@@ -218,8 +217,6 @@ def fit_scan(
     known: Known,
     u: ArrayLike | None = None,
     height_u: ArrayLike | float | None = 0.0,
-    *,
-    free_radii: bool = False,
 ) -> FieldScan:
     """Fit the field of a ring to a scan.
 
@@ -230,7 +227,6 @@ def fit_scan(
         u: standard uncertainty of each reading without what is common to all (`known` holds that) [T], shape (n,).
             None: unknown, so all count alike and their scatter about the model gives it.
         height_u: standard uncertainty of each height without what is common to all [m].  None: unknown, likewise.
-        free_radii: fit the radii, too, with the calliper's values as priors.
 
     Raises:
         ShapesDiffer, NotFinite, NotPositive: the arrays cannot be fitted.
@@ -246,7 +242,7 @@ def fit_scan(
         raise ImpossibleRing(inner=inner, outer=outer)
     z, b, u_b, u_z = _check_columns(height, flux_density, u, height_u)
     _refuse_bad_scans(z, b, known)
-    problem = _Problem(z, b, u_b, u_z, known, _free_parameters(known, free_radii=free_radii))
+    problem = _Problem(z, b, u_b, u_z, known)
     return _describe_scan(problem, *problem.solve())
 
 
@@ -308,13 +304,6 @@ def _refuse_plateau(z: Array, b: Array) -> None:
 # --- the fit ---
 
 
-def _free_parameters(known: Known, *, free_radii: bool) -> tuple[str, ...]:
-    """Return the parameters to fit: all that are not exact, and the radii only on request."""
-    wanted = PARAMETERS if free_radii else PARAMETERS[:-2]
-    priors = {name: known.prior(name) for name in wanted}
-    return tuple(name for name, prior in priors.items() if prior is None or prior.u > 0)
-
-
 @dataclass(frozen=True, eq=False)
 class _Problem:
     """The least-squares problem.
@@ -325,7 +314,6 @@ class _Problem:
         u_b: their u [T], None if not known.
         u_z: u of the heights [m], None if not known.
         known: the priors.
-        free: the parameters to fit.
     """
 
     z: Array
@@ -333,15 +321,16 @@ class _Problem:
     u_b: Array | None
     u_z: Array | None
     known: Known
-    free: tuple[str, ...]
 
     @property
     def indices(self) -> list[int]:
-        return [PARAMETERS.index(name) for name in self.free]
+        """Indices of the parameters to fit: all that are not exact."""
+        priors = enumerate(map(self.known.prior, PARAMETERS))
+        return [index for index, prior in priors if prior is None or prior.u > 0]
 
     def priors(self) -> list[tuple[int, Prior]]:
         """Return index and prior of each fitted parameter."""
-        found = ((PARAMETERS.index(name), self.known.prior(name)) for name in self.free)
+        found = ((index, self.known.prior(PARAMETERS[index])) for index in self.indices)
         return [(index, prior) for index, prior in found if prior]
 
     def model(self, values: Array) -> Array:
@@ -468,48 +457,41 @@ class _Problem:
 
 
 def _describe_scan(problem: _Problem, values: Array, sigma: Array, by_height: Array) -> FieldScan:
-    known, free, moved = problem.known, problem.free, problem.indices
+    known, moved = problem.known, problem.indices
     jacobian = problem.weighted_slopes(values, sigma)
     found = curvature(jacobian[moved])
     if found.covariance is None:
         raise NotFitted(what="flux density against height", advice="the readings do not tell the parameters apart")
     statistics = _statistics(problem, values, sigma)
     factor, misfit = _misfit(statistics)
-    shifts = _shifts(jacobian, found.covariance, moved, known)
-    covariance = factor * _whole_covariance(found.covariance, moved, shifts)
+    covariance = np.zeros((6, 6))
+    covariance[np.ix_(moved, moved)] = found.covariance * factor
     covariance[0, 0] += (known.gain_u * values[0]) ** 2
     u = np.sqrt(np.diagonal(covariance))
     parameters = {
         name: Estimate(float(value), float(size), unit)
         for (name, unit), value, size in zip(UNITS.items(), values, u, strict=True)
     }
-    scan = FieldScan(parameters, covariance, free, known, statistics, problem.z, problem.b, sigma, by_height)
+    fitted = tuple(PARAMETERS[index] for index in moved)
+    scan = FieldScan(parameters, covariance, fitted, known, statistics, problem.z, problem.b, sigma, by_height)
     leverage = found.leverage[: len(problem.z)]
-    return replace(scan, remarks=(*misfit, *_doubts(scan, shifts), *_outliers(scan, leverage)))
+    return replace(scan, remarks=(*misfit, *_doubts(scan), *_outliers(scan, leverage)))
 
 
 def _statistics(problem: _Problem, values: Array, sigma: Array) -> Statistics:
     left, priors = problem.b - problem.model(values), problem.priors()
-    n, n_free = len(left), len(problem.free)
+    n, n_free = len(left), len(problem.indices)
     all_known = problem.u_b is not None and problem.u_z is not None
+    misses = np.append(left / sigma, [(values[index] - prior.value) / prior.u for index, prior in priors])
     return Statistics(
         n=n,
         n_parameters=n_free,
         rms_residual=float(np.sqrt(np.mean(left**2))),
-        chi_square=_chi_square(problem, values, sigma) if all_known else None,
+        chi_square=float(misses @ misses) if all_known else None,
         degrees_of_freedom=n + len(priors) - n_free,
         durbin_watson=durbin_watson(left / sigma),
         runs_test_p=runs_test_p(left),
     )
-
-
-def _chi_square(problem: _Problem, values: Array, sigma: Array) -> float:
-    """Return χ² of readings and priors with the radii fitted, to first order: held, they are no misfit of a reading."""
-    whole = replace(problem, free=_free_parameters(problem.known, free_radii=True))
-    pulls = [(prior.value - values[k]) / prior.u for k, prior in whole.priors()]
-    left = np.append((problem.b - problem.model(values)) / sigma, pulls)
-    basis, _ = np.linalg.qr(whole.weighted_slopes(values, sigma)[whole.indices].T)
-    return float(np.sum((left - basis @ (basis.T @ left)) ** 2))
 
 
 def _misfit(statistics: Statistics) -> tuple[float, list[Remark]]:
@@ -525,29 +507,6 @@ def _misfit(statistics: Statistics) -> tuple[float, list[Remark]]:
     if float(chdtr(statistics.degrees_of_freedom, statistics.chi_square)) < _TOO_GOOD:
         return 1.0, [Remark("scan overstated", values=(reduced,))]
     return 1.0, []
-
-
-def _shifts(jacobian: Array, free: Array, moved: list[int], known: Known) -> dict[str, Array]:
-    """Return the shift of all parameters by the u of each uncertain one that is held, shape (6,) each.
-
-    free: covariance of those that are fitted.
-    """
-    shifts = {}
-    for k, name in enumerate(PARAMETERS):
-        prior = known.prior(name)
-        if k not in moved and prior and prior.u > 0:
-            shift = np.zeros(6)
-            shift[moved] = -free @ (jacobian[moved] @ jacobian[k])
-            shift[k] = 1.0
-            shifts[name] = prior.u * shift
-    return shifts
-
-
-def _whole_covariance(free: Array, moved: list[int], shifts: Mapping[str, Array]) -> Array:
-    """Return the covariance of all parameters, from that of the fitted ones and from those that are held."""
-    whole = sum((np.outer(shift, shift) for shift in shifts.values()), np.zeros((6, 6)))
-    whole[np.ix_(moved, moved)] += free
-    return whole
 
 
 @dataclass(frozen=True)
@@ -570,7 +529,7 @@ def parts_of(scan: FieldScan) -> dict[str, tuple[UPart, ...]]:
     The covariance of the fit is H = (Σ s sᵀ/σ² + Σ p pᵀ)⁻¹ = H (Σ s sᵀ u_b²/σ⁴ + Σ s sᵀ (B′u_z)²/σ⁴ + Σ p pᵀ) H: a sum
     of what readings, heights and each of the priors leave.
     """
-    problem = _Problem(scan.height, scan.flux_density, None, np.zeros_like(scan.height), scan.known, scan.fitted)
+    problem = _Problem(scan.height, scan.flux_density, None, np.zeros_like(scan.height), scan.known)
     moved, values = problem.indices, scan.values
     jacobian = problem.weighted_slopes(values, scan.u)
     h = curvature(jacobian[moved]).covariance
@@ -587,9 +546,9 @@ def parts_of(scan: FieldScan) -> dict[str, tuple[UPart, ...]]:
     }
     for column, (index, _) in enumerate(problem.priors(), n):
         sizes[PARAMETERS[index]] = gain[:, column]
-    shifts = _shifts(jacobian, h, moved, scan.known)
-    sizes["excess"] = np.sqrt(np.diagonal(_whole_covariance(h, moved, shifts)) * (factor - 1))
-    sizes |= shifts
+    whole = np.zeros((6, 6))
+    whole[np.ix_(moved, moved)] = h
+    sizes["excess"] = np.sqrt(np.diagonal(whole) * (factor - 1))
     sizes["gain"] = np.zeros(6)
     sizes["gain"][0] = scan.known.gain_u * values[0]
     return {
@@ -598,13 +557,12 @@ def parts_of(scan: FieldScan) -> dict[str, tuple[UPart, ...]]:
     }
 
 
-def _doubts(scan: FieldScan, shifts: Mapping[str, Array]) -> list[Remark]:
+def _doubts(scan: FieldScan) -> list[Remark]:
     """Return remarks: scan and calliper contradict each other, no ring has the field, or it is not significant."""
     said = []
     for name in scan.fitted:
         prior, found = scan.known.prior(name), scan.parameters[name].value
-        by_held = [shift[PARAMETERS.index(name)] for shift in shifts.values()]
-        if prior is not None and found is not None and abs(found - prior.value) > APART * math.hypot(prior.u, *by_held):
+        if prior is not None and found is not None and abs(found - prior.value) > APART * prior.u:
             said.append(Remark("contradicts", name=name, values=(found, prior.value, prior.u)))
     left, largest = scan.statistics.rms_residual, float(np.abs(scan.flux_density).max())
     if left > _MOST_LEFT * largest and scan.statistics.keeps_sign:

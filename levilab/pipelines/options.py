@@ -254,9 +254,6 @@ class FieldOptions(InputOptions):
         "Standard uncertainty of --height.", default_text="that of the scan's heights", needs="height_m",
         kind=float, metavar="MM", typed="height_u", unit="mm", factor=1e-3, low=0.0, high=2.0,
     ))  # fmt: skip
-    free_radii: bool = field(default=False, metadata=_about(
-        "Fit the radii, too, within the calliper's uncertainty.", kind=bool,
-    ))  # fmt: skip
 
 
 @dataclass(frozen=True)

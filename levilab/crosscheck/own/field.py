@@ -24,7 +24,7 @@ _COMPARED = ("strength", "origin", "thickness", "background")
 
 def trials_of(found: FieldAnalysis) -> Own:
     """Return the trials of the first scan."""
-    scan, source, options = found.runs[0].scan, found.sources[0], found.options
+    scan, source = found.runs[0].scan, found.sources[0]
     order = np.argsort(source.readings.height, kind="stable")
     u_z = source.readings.height_u
     u_z = np.zeros(len(order)) if u_z is None else u_z[order]
@@ -38,7 +38,7 @@ def trials_of(found: FieldAnalysis) -> Own:
         true_height = scan.height + u_z * random.standard_normal(len(u_z))
         b = gain * (scan.model(true_height) - scan.values[3]) + scan.values[3]
         b = b + noise * random.standard_normal(len(b))
-        again = fit_scan(scan.height, b, known, u_b, u_z, free_radii=options.free_radii)
+        again = fit_scan(scan.height, b, known, u_b, u_z)
         return Trial(
             [
                 pull_of(name, again.parameters[name], float(scan.values[PARAMETERS.index(name)]))

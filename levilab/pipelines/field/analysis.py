@@ -90,14 +90,7 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
     readings = source.readings
     known = known_of(source, options.device)
     top, taken = known_top(source, options, usual(readings.height_u))
-    scan = fit_scan(
-        readings.height,
-        readings.flux_density,
-        known,
-        readings.u,
-        readings.height_u,
-        free_radii=options.free_radii,
-    )
+    scan = fit_scan(readings.height, readings.flux_density, known, readings.u, readings.height_u)
     floating = follow(scan, top) if scan.is_of_a_ring else None
     warnings = list[str]()
     if floating is None and scan.is_of_a_ring:

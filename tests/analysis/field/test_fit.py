@@ -31,12 +31,11 @@ def drawn(seed):
     return ring, 5e-5 * by[5]
 
 
-@pytest.mark.parametrize("free_radii", [False, True])
-def test_uncertainties_predict_the_scatter(free_radii):
+def test_uncertainties_predict_the_scatter():
     pulls, reduced = [], []
     for seed in range(25):
         ring, background = drawn(seed)
-        found = fit_scan(Z, scan(seed, ring, background), KNOWN, U_B * np.ones(17), U_Z, free_radii=free_radii)
+        found = fit_scan(Z, scan(seed, ring, background), KNOWN, U_B * np.ones(17), U_Z)
         truth = [ring.strength, ring.origin, ring.thickness, background, ring.inner_radius, ring.outer_radius]
         pulls.append((found.values - truth) / np.sqrt(np.diagonal(found.covariance)))
         reduced.append(found.statistics.reduced_chi_square)
@@ -56,20 +55,19 @@ def test_of_heights_and_readings_without_u_the_fit_finds_which_scatter(u_b, u_z)
             (found.values - [ring.strength, ring.origin, ring.thickness, background, 0, 0])[:4]
             / np.sqrt(np.diagonal(found.covariance))[:4]
         )
-    assert np.std(pulls, axis=0) == pytest.approx(
-        np.ones(4), abs=0.43
-    )  # as above; 1.9 for the origin by heights that are exact
+    # as above, and 1.2 for the origin in 150 scans of uncertain heights; 1.9 by heights that are exact
+    assert np.std(pulls, axis=0) == pytest.approx(np.ones(4), abs=0.6)
 
 
-def test_radii_that_are_held_are_no_misfit_of_exact_readings():
+def test_uncertain_radii_are_no_misfit_of_exact_readings():
     pulls = []
     for seed in range(25):
         ring, background = drawn(seed)
         found = fit_scan(Z, scan(seed, ring, background, 1e-6, 0.0), KNOWN, 1e-6)
-        truth = [ring.strength, ring.origin, ring.thickness, background]
-        pulls.append((found.values[:4] - truth) / np.sqrt(np.diagonal(found.covariance))[:4])
+        truth = [ring.strength, ring.origin, ring.thickness, background, ring.inner_radius, ring.outer_radius]
+        pulls.append((found.values - truth) / np.sqrt(np.diagonal(found.covariance)))
         assert not {of.kind for of in found.remarks} & {"scan scatters", "no strength", "contradicts"}
-    assert np.std(pulls, axis=0) == pytest.approx(np.ones(4), abs=0.43)  # 0.01 to 0.6 with χ² of the held radii
+    assert np.std(pulls, axis=0) == pytest.approx(np.ones(6), abs=0.43)  # 0.01 to 0.6 with radii that are held
 
 
 def test_a_scan_without_noise_gives_the_ring_back():
@@ -103,17 +101,6 @@ def test_what_the_scan_cannot_tell_stays_the_callipers():
     assert abs(free.correlation("thickness", "strength")) > 0.5
 
 
-def test_the_radii_that_are_held_are_in_the_uncertainties():
-    exact = replace(KNOWN, inner_radius=Prior(0.03, 0.0), outer_radius=Prior(0.055, 0.0))
-    with_u, without = (fit_scan(Z, scan(), known, U_B, U_Z) for known in (KNOWN, exact))
-    assert with_u.values == pytest.approx(without.values, rel=1e-9)
-    # what a refit with another radius moves is what the covariance holds of it
-    moved = fit_scan(Z, scan(), replace(exact, inner_radius=Prior(0.0301, 0.0)), U_B, U_Z).values - without.values
-    outer = fit_scan(Z, scan(), replace(exact, outer_radius=Prior(0.0551, 0.0)), U_B, U_Z).values - without.values
-    more = np.diagonal(with_u.covariance - without.covariance)
-    assert np.sqrt(more[:3]) == pytest.approx(np.hypot(moved, outer)[:3], rel=0.02)  # first order
-
-
 def test_the_scale_of_the_instrument_goes_into_the_strength_alone():
     plain, scaled = (fit_scan(Z, scan(), replace(KNOWN, gain_u=gain), U_B, U_Z) for gain in (0.0, 0.01))
     u = [found.parameters["strength"].u or 0.0 for found in (plain, scaled)]
@@ -132,12 +119,10 @@ def test_without_uncertainties_the_scatter_stands_for_them():
 def test_a_base_that_is_no_such_ring_enlarges_the_uncertainties():
     bent = scan() * (1 + 3 * Z)
     found = fit_scan(Z, bent, KNOWN, U_B, U_Z)
-    free = fit_scan(Z, bent, KNOWN, U_B, U_Z, free_radii=True)
-    assert found.parameters["strength"].u == pytest.approx(free.parameters["strength"].u, rel=0.3)  # of held radii, too
     for name, parts in parts_of(found).items():
         assert np.linalg.norm([part.size for part in parts]) == pytest.approx(found.parameters[name].u)
     assert found.remarks[0].kind == "scan scatters"
-    assert ("contradicts", "origin") in [(of.kind, of.name) for of in found.remarks]
+    assert ("contradicts", "inner_radius") in [(of.kind, of.name) for of in found.remarks]
 
 
 def test_a_slip_of_the_probe_is_named():
