@@ -71,7 +71,7 @@ def _from_others(x: NDArray[np.float64], u: NDArray[np.float64], k: int) -> floa
 
     others, of_others = np.delete(x, k), np.delete(u, k)
     typical = 1 / math.sqrt(np.mean(of_others**-2.0))
-    steps = np.geomspace(1e-3, 1e3 * (1 + np.ptp(others) / typical), 100)  # outside them lies less than 10⁻³
+    steps = np.geomspace(1e-3, 1e3 * (1 + np.ptp(x) / typical), 100)  # outside them lies less than 10⁻³
     taus, log_prior = (typical * steps, np.log(steps / (1 + steps))) if len(others) > 1 else (np.zeros(1), np.zeros(1))
     weights = 1 / (of_others**2 + taus[:, None] ** 2)
     total = weights.sum(axis=1)

@@ -18,7 +18,7 @@ from analysis.uncertainty import Estimate, student
 MOST_PAIRED = 500
 #: A point farther off the line, in standard deviations, is examined.
 FAR = 5.0
-#: The median line goes through two points: of so many none shows a scatter.
+#: The median line goes through two of three points, whose median deviation is then 0: it shows no scatter.
 _NO_SCATTER = 3
 #: Counted over true frequency when a threshold sees each period twice, misses every other one, and the like.
 RATIOS = ((1, 2), (2, 1), (1, 3), (3, 1), (2, 3), (3, 2))
@@ -112,8 +112,9 @@ def find_miscounts(
 ) -> list[Miscount]:
     """Find the points far off the median line, and what the counter counted there.
 
-    Without u few points show their scatter: one that no miscount explains is as far off as chance makes it with the
-    probability of `FAR`, by Student's t.
+    Without u few points hardly show their scatter: one that no miscount explains is farther off than `FAR` standard
+    deviations by Student's t.  (Of lines of five points 2 % have such a point by chance, of more points fewer: the
+    median deviation is less certain than a standard deviation of n − 2 degrees of freedom.)
 
     Args:
         x: shape (n,) [Hz].
@@ -134,13 +135,13 @@ def find_miscounts(
         sigma, expected = float(deviation[i]), float(line[i])
         times = _times(float(y[i]), expected, sigma)
         if times is not None:
-            found.append(Miscount(i, times))
+            one = Miscount(i, times)
         elif gates is not None:
-            found.append(Miscount(i, counts=whole_counts(gates[i], expected) or None))
+            one = Miscount(i, counts=whole_counts(gates[i], expected) or None)
         else:
-            found.append(Miscount(i, counts=_counts(float(y[i]) - expected, sigma, gate_s)))
-        if not found[-1].named and abs(float(y[i]) - expected) <= far * sigma:
-            found.pop()
+            one = Miscount(i, counts=_counts(float(y[i]) - expected, sigma, gate_s))
+        if one.named or abs(float(y[i]) - expected) > far * sigma:
+            found.append(one)
     return found
 
 

@@ -39,8 +39,9 @@ def test_a_distance_is_that_of_a_normal_number_as_improbable_over_all_scatters()
     assert compare(x, u).distances[3] == pytest.approx(stats.norm.isf(p), abs=2e-3)
 
 
-def test_a_distance_of_values_without_an_error_of_their_own_is_students():
-    x = np.array([3.0, 1.0, 2.0, 1.5])
+@pytest.mark.parametrize("far", [3.0, 1e5])
+def test_a_distance_of_values_without_an_error_of_their_own_is_students(far):
+    x = np.array([far, 1.0, 2.0, 1.5])
     t = (x[0] - x[1:].mean()) / (x[1:].std(ddof=1) * math.sqrt(4 / 3))
     assert compare(x, np.full(4, 1e-6)).distances[0] == pytest.approx(stats.norm.isf(stats.t.sf(t, 2)), abs=1e-3)
 
