@@ -35,9 +35,11 @@ _POWER = re.compile(r"\s?[×*·x]\s?10\s?(?:\^\s?|(?=[+-]|[⁺⁻⁰¹²³⁴-�
 _HALF = r"(?:\s?([AaPp])\.?\s?[Mm]\.?)?"
 #: What a stopwatch or a clock shows: minutes and seconds, hours before them; of half a day hours and minutes, too.
 CLOCK = re.compile(rf"(?:(\d{{1,3}}):)?(\d{{1,3}}):(\d\d(?:[.,]\d+)?){_HALF}")
+#: Units of a time that was passed, in English and German.
+MINUTES, SECONDS = r"min(?:ute[ns]?)?", r"s(?:e[ck](?:onds?|unden?)?)?"
 #: A time that was passed with its units: 14h05m12s, 1 min 2,5 s, 1'02".
 _SPELT = re.compile(
-    r"(?:(\d+)\s?h(?:rs?)?\s?)?(?:(\d+)\s?(?:min|m|['′])\s?)?(?:(\d+(?:[.,]\d+)?)\s?(?:se[ck]|s|[\"″]|''))?"
+    rf"(?:(\d+)\s?h(?:rs?)?\s?)?(?:(\d+)\s?(?:{MINUTES}|m|['′])\s?)?(?:(\d+(?:[.,]\d+)?)\s?(?:{SECONDS}|[\"″]|''))?"
 )
 #: Date and time: ISO 8601, or day, month and year with points or slashes.
 _ISO = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d([.,]\d+)?)?(Z|[+-]\d\d:?\d\d)?")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf
 
-from levilab.formats.dialect import Dialect, clock_time, find_dialect
+from levilab.formats.dialect import MINUTES, SECONDS, Dialect, clock_time, find_dialect
 from levilab.formats.titles import read_title
 
 #: Lines that are looked at, and the part of them that has to be in a dress: a log may begin in the middle of a line.
@@ -123,7 +123,7 @@ def _monitor(lines: Sequence[str]) -> Dressed:
 #: A time and a spin with their units, words or a dash before them, and no other number.
 _NOTE = re.compile(
     r"\s*(?:[^\W\d]|[-*•]\s)\D*?"
-    r"((?:\d+\s?h\s?)?(?:\d+\s?min\s?)?\d+(?:[.,]\d+)?\s?(?:s|se[ck]|min)\b)\.?"
+    rf"((?:\d+\s?h\s?)?(?:\d+\s?{MINUTES}\s?)?\d+(?:[.,]\d+)?\s?(?:{SECONDS}|{MINUTES})\b)\.?"
     r"\D*?(\d+(?:[.,]\d+)?\s?(?:Hz|rpm|(?:U|1)/min))\W*$",
     re.IGNORECASE,
 )
@@ -132,7 +132,9 @@ _NOTE = re.compile(
 def _notes(lines: Sequence[str]) -> Dressed:
     """After 1 min 30 s: 34.2 Hz."""
     found = [_NOTE.match(line) for line in lines]
-    return Dressed(_content([f"{clock_time(one[1]):g}\t{one[2]}" if one else "" for one in found]), ("t [s]", "f"))
+    return Dressed(
+        _content([f"{clock_time(one[1].lower()):g}\t{one[2]}" if one else "" for one in found]), ("t [s]", "f")
+    )
 
 
 # --- CASSY --------------------------------------------------------------------------------------------

@@ -885,10 +885,12 @@ def _with_time(wanted: Mapping[str, str], filled: Sequence[str]) -> Mapping[str,
 
 
 def _is_numbered(layout: Layout, filled: Sequence[str]) -> bool:
-    """Return whether the first of three columns has the numbers of the rows beside times, which grow."""
-    first, second = ([*pairwise(_numbers(layout, int(number) - 1))] for number in [*filled, "1", "1"][:2])
-    counts, grows = {after - before for before, after in first} == {1}, all(a < b for a, b in second)
-    return len(filled) == len(TITLES_WITHOUT_HEADER) and counts and grows
+    """Return whether three columns have the numbers of the rows, times, which grow, and spins."""
+    if len(filled) != len(TITLES_WITHOUT_HEADER):
+        return False
+    rows, times, spins = (_numbers(layout, int(number) - 1) for number in filled)
+    counts, grows = {after - before for before, after in pairwise(rows)} == {1}, all(a < b for a, b in pairwise(times))
+    return counts and grows and is_possible_spin(median(spins or [0.0]))
 
 
 def _spin_comes_first(layout: Layout, filled: Sequence[str]) -> bool:

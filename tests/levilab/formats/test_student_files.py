@@ -682,6 +682,7 @@ def test_of_two_columns_without_titles_the_other_one_is_the_time(write):
 
 @pytest.mark.parametrize("line", [
     "nach {t} s: {de} Hz", "- {t} s: {f} Hz", "t={t}s;f={de}Hz", "after {m} min {s} s  {f} Hz",
+    "nach {m} Minuten {s} Sekunden: {de} Hz", "nach {t} Sek.: {de} Hz", "after {t} seconds: {f} Hz",
 ])  # fmt: skip
 def test_times_and_spins_in_the_notes_of_a_person_are_read(line, write):
     times = (0, 10, 20, 70, 80, 90, 100)
@@ -695,8 +696,9 @@ def test_times_and_spins_in_the_notes_of_a_person_are_read(line, write):
 def test_numbers_of_the_rows_are_no_times(number, write):
     rows = [f"{number.format(k)} {10 * k} {35 - k / 2:.1f}\n" for k in range(1, 9)]
     assert read_table(write("".join(rows))).column("time_s")[0] == 10
-    rows = [f"{number.format(k)} {35 - k / 2:.1f} 0.1\n" for k in range(1, 9)]
-    assert read_table(write("".join(rows))).column("time_s")[0] == 1
+    for slope in (-0.5, 0.5):  # of the spin, which may grow, too
+        rows = [f"{number.format(k)} {35 + slope * k:.1f} 0.1\n" for k in range(1, 9)]
+        assert read_table(write("".join(rows))).column("time_s")[0] == 1
 
 
 def test_counts_at_even_times_are_no_spins(write):
