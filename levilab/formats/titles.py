@@ -260,6 +260,9 @@ def unit_factor(text: str, kind: str) -> float | None:
         second = unit_factor(turns["unit"], "time")
         length = float(turns["number"].replace(",", ".") if turns["number"] else 1)
         return 1 / (length * second) if second and length else None
+    if factor is None and kind == "time" and (steps := _STEPS_OF.fullmatch(plain_unit(text))):
+        second, length = factor_of(steps["unit"], UNITS[kind]), float(steps["number"].replace(",", "."))
+        return length * second if second and length else None
     return factor
 
 
@@ -292,6 +295,8 @@ _TURNS_IN = re.compile(
     rf"(?:(?:{_A_TURN})?/|(?:{_A_TURN})(?:in|per|pro|en)(?=\d))(?P<number>\d+([.,]\d+)?)?(?P<unit>[a-zμ]+)",
     re.IGNORECASE,
 )
+#: Times that count steps of a length, as of readings each 2 s: "2 s".
+_STEPS_OF = re.compile(r"(?P<number>\d+(?:[.,]\d+)?)(?P<unit>[a-zμ]+)", re.IGNORECASE)
 _UNIT_FORMS = tuple(
     re.compile(form)
     for form in (

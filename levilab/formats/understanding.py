@@ -90,6 +90,10 @@ _NO_TIMES_OF_PERIODS = (
     "no column is known to be time_s, at which the turns were timed: say `columns` = t=NAME; where each row is the "
     "next turn, keep the times of the turns alone in a file, titled as dt [ms]"
 )
+_NUMBERS_OF_READINGS = (
+    "no column is known to be time_s; '{title:s}' has the numbers of the readings: say `columns` = "
+    '"t={number} [2 s]", where 2 s lie from one reading to the next'
+)
 #: Columns of a spin-down.
 SPIN = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 _SPIN = "spin_frequency_hz"
@@ -823,10 +827,14 @@ def _key(name: str) -> str:
 def _of_turns(path: Path, name: str, layout: Layout, chosen: Sequence[Column], request: Request) -> NoSuchColumn | None:
     """Return the error for a table of turns that were timed without their own times, or were counted without a spin.
 
-    Counted since the beginning, they only grow.
+    Counted since the beginning, they only grow.  A column of whole numbers, one after another, counts the readings.
     """
     if name == "time_s" and any(column.inverse for column in chosen):
         return NoSuchColumn(path, _NO_TIMES_OF_PERIODS, doubt=_which_columns(layout, [name]))
+    counts = (k for k in range(len(layout.header)) if set(np.diff(_numbers(layout, k))) == {1})
+    if name == "time_s" and (counted := next(counts, None)) is not None:
+        said = Said(_NUMBERS_OF_READINGS, shorten(layout.header[counted]), counted + 1)
+        return NoSuchColumn(path, said, doubt=_which_columns(layout, [name]))
     time = next((column for column in chosen if column.name == "time_s"), None)
     for k, title in enumerate(layout.header if name == _SPIN else ()):
         if nearly_a_frequency(title) == OVER_TIME and _spins_of_total(layout, _numbers(layout, k), time):

@@ -731,3 +731,10 @@ def test_times_of_turns_without_their_own_times_say_what_is_missing(write):
     path = write("n,T\n" + "".join(f"{k},{25 + k / 100}\n" for k in range(20)))
     with pytest.raises(NoSuchColumn, match=r"at which the turns were timed: .* keep the times of the turns alone"):
         read_table(path, columns={"f": "2 [ms]"}, quantities=SPIN, needed=SPIN[:2])
+
+
+def test_numbers_of_readings_are_no_times_and_get_the_length_of_a_step(write):
+    path = write("Messung;Frequenz / Hz\n" + "".join(f"{k + 1};{35 - k / 10}\n" for k in range(20)))
+    with pytest.raises(NoSuchColumn, match=r"'Messung' has the numbers of the readings: .* \"t=1 \[2 s\]\""):
+        read_table(path, quantities=SPIN, needed=SPIN[:2])
+    assert read_table(path, columns={"t": "1 [2 s]"}).column("time_s")[[0, -1]] == pytest.approx([2, 40])
