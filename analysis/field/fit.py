@@ -4,7 +4,7 @@ The readings are fitted with the closed form of `analysis.field.ring` and a back
 probe's zero, the earth's field).  The calliper's values and the instrument's data sheet add Gaussian residuals to
 those of the readings, so that the covariance holds all that is known.  An uncertainty of height counts by the slope of
 the field at that height (effective variance: Orear, Am. J. Phys. 50, 912 (1982)).  An unknown uncertainty of
-readings or of heights is found by restricted maximum likelihood (Patterson & Thompson, Biometrika 58, 545 (1971)).
+readings or of heights is found by the restricted likelihood (Patterson & Thompson, Biometrika 58, 545 (1971)).
 """
 
 import math
@@ -24,7 +24,7 @@ from analysis.field.ring import Ring, on_axis, reversal, slopes
 from analysis.least_squares import solve
 from analysis.remarks import Remark
 from analysis.residuals import durbin_watson, gross_errors, runs_test_p, studentise
-from analysis.uncertainty import Estimate, curvature, student
+from analysis.uncertainty import Estimate, curvature
 
 #: The parameters in the order of the covariance, and their units.
 UNITS: Mapping[str, str] = {
@@ -44,9 +44,9 @@ SAME_HEIGHT_M = 1e-5
 _MOST_TURNS = 8
 #: Readings of unknown u are rounded to this part of the largest.
 _ROUNDING = 1e-9
-#: Logarithms of unknown scatters over the rms residual: bounds (from 10⁻³, which adds 10⁻⁶ to a variance), and where
-#: the search for one of two begins small, since their likelihood may have two maxima.
-_LOGS, _SMALL = (-7.0, 3.0), -2.0
+#: Logarithms of unknown scatters over the rms residual, from 0.7 %, which adds 5×10⁻⁵ to a variance, to 20; the steps
+#: of their grid, and how far the logarithm of the likelihood falls on it: what lies beyond is less than 10⁻⁵.
+_LOGS, _STEPS, _FAR = (-5.0, 3.0), 20, 12.0
 #: A field below this multiple of the background's u counts as none.
 _NO_FIELD = 5.0
 #: The Durbin–Watson statistic of residuals in no order; it is smaller where neighbours are alike.
@@ -358,38 +358,40 @@ class _Problem:
         return np.hypot(u_b, by_height), by_height
 
     def _scatters(self, values: Array, known: Array, shapes: Array) -> Array:
-        """Return the standard deviations of unknown size that residuals most likely have [T], shape (k, n).
+        """Return the standard deviations of unknown size that residuals show [T], shape (k, n).
 
-        The residuals are those of a fit that is linear about `values`.  Student's factor widens what few of them tell.
+        Each is the root of its mean square over the likelihood, which few residuals leave wide; its prior is flat in
+        the logarithm.  The residuals are those of a fit that is linear about `values`.
 
         Args:
             values: of the parameters.
             known: standard uncertainty of each reading [T], shape (n,).
             shapes: of the standard deviations, shape (k, n).
         """
-        from scipy.optimize import minimize
-
-        n = len(known)
+        n, k = len(known), len(shapes)
         left = np.append(self.b - self.model(values), [(p.value - values[k]) / p.u for k, p in self.priors()])
         slopes = self.weighted_slopes(values, np.ones(n))[self.indices]
         slopes = slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
         size = math.hypot(float(np.sqrt(np.mean(left[:n] ** 2))), float(known.min()))
         shapes = size * shapes / np.sqrt(np.mean(shapes**2, axis=1, keepdims=True))
 
-        def weigh(logs: Array) -> tuple[Array, Array, Array]:
-            sigma = np.append(np.sqrt(known**2 + np.exp(2 * logs) @ shapes**2), np.ones(left.size - n))
-            return sigma, *np.linalg.qr((slopes / sigma).T)
+        def log_likelihood(logs: Array) -> Array:
+            scatter = np.sqrt(known**2 + np.exp(2 * logs) @ shapes**2)
+            sigma = np.hstack([scatter, np.ones((len(logs), left.size - n))])
+            basis, triangle = np.linalg.qr((slopes / sigma[:, None]).transpose(0, 2, 1))
+            pulls = (left / sigma)[:, :, None]
+            rest = pulls - basis @ (basis.transpose(0, 2, 1) @ pulls)
+            diagonals = np.abs(np.diagonal(triangle, axis1=1, axis2=2))
+            return np.asarray(-np.log(sigma).sum(1) - np.log(diagonals).sum(1) - (rest**2).sum((1, 2)) / 2)
 
-        def misfit(logs: Array) -> float:
-            sigma, basis, triangle = weigh(logs)
-            rest = left / sigma - basis @ (basis.T @ (left / sigma))
-            return float(np.log(sigma).sum() + np.log(np.abs(np.diagonal(triangle))).sum() + rest @ rest / 2)
-
-        starts = np.where(np.eye(len(shapes)) > 0, 0.0, _SMALL)
-        found = [minimize(misfit, start, method="L-BFGS-B", bounds=[_LOGS] * len(shapes)) for start in starts]
-        logs = min(found, key=lambda one: float(one.fun)).x
-        freedom = n - float(np.sum(weigh(logs)[1][:n] ** 2))
-        return np.asarray(student(freedom) * np.exp(logs)[:, None] * shapes)
+        low, high = np.full(k, _LOGS[0]), np.full(k, _LOGS[1])
+        for _ in range(2):  # over all, then where the likelihood is
+            logs = np.stack(np.meshgrid(*np.linspace(low, high, _STEPS + 1).T, indexing="ij"), -1).reshape(-1, k)
+            log_p = log_likelihood(logs)
+            near, step = logs[log_p > log_p.max() - _FAR], (high - low) / _STEPS
+            low, high = np.maximum(near.min(0) - step, _LOGS[0]), np.minimum(near.max(0) + step, _LOGS[1])
+        p = np.exp(log_p - log_p.max())
+        return np.asarray(np.sqrt(p @ np.exp(2 * logs) / p.sum())[:, None] * shapes)
 
     def start(self) -> Array:
         """Return starting values: the calliper's, or else the origin with the best fit of the strength alone."""

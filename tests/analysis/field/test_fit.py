@@ -45,18 +45,16 @@ def test_uncertainties_predict_the_scatter():
     assert np.mean(reduced) == pytest.approx(1.0, abs=3 * np.sqrt(2 / 16 / 25))
 
 
-@pytest.mark.parametrize(("u_b", "u_z"), [(1e-6, U_Z), (1e-4, 0.0)])
-def test_of_heights_and_readings_without_u_the_fit_finds_which_scatter(u_b, u_z):
+@pytest.mark.parametrize(("u_b", "u_z", "every"), [(1e-6, U_Z, 1), (1e-4, 0.0, 1), (1e-4, U_Z, 3)])
+def test_of_heights_and_readings_without_u_the_fit_finds_which_scatter(u_b, u_z, every):
     pulls = []
     for seed in range(25):
         ring, background = drawn(seed)
-        found = fit_scan(Z, scan(seed, ring, background, u_b, u_z), KNOWN, None, None)
-        pulls.append(
-            (found.values - [ring.strength, ring.origin, ring.thickness, background, 0, 0])[:4]
-            / np.sqrt(np.diagonal(found.covariance))[:4]
-        )
-    # as above, and 1.2 for the origin in 150 scans of uncertain heights; 1.9 by heights that are exact
-    assert np.std(pulls, axis=0) == pytest.approx(np.ones(4), abs=0.6)
+        found = fit_scan(Z[::every], scan(seed, ring, background, u_b, u_z)[::every], KNOWN, None, None)
+        truth = [ring.strength, ring.origin, ring.thickness, background]
+        pulls.append((found.values[:4] - truth) / np.sqrt(np.diagonal(found.covariance))[:4])
+    # as above; of the origin 1.9 by heights that are exact, and by the likeliest scatters of six heights
+    assert np.std(pulls, axis=0) == pytest.approx(np.ones(4), abs=0.43)
 
 
 def test_uncertain_radii_are_no_misfit_of_exact_readings():
