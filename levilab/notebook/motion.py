@@ -175,7 +175,7 @@ class SimulatedMotion(Exportable, Trajectory):
             ax: axes into which it is drawn, and which are returned.
             title: of the panel.
             logy: whether the ordinate is logarithmic.
-            figsize: width and height [inch].
+            figsize: width and height of one panel, the height where none is named [inch].
 
         Raises:
             UsageError: there is no such quantity.

@@ -98,6 +98,9 @@ def bare(function: F) -> F:
                 expected = f"at most {code.co_argcount - own} without a name are expected: name the others"
                 array = ", or put arrays into one, analyze((t, f, u))" * (function.__name__ == "analyze")
                 raise UsageError(function.__name__, expected + array, value=f"{len(args) - own} values")
+            required = names[len(args) : code.co_argcount - len(function.__defaults__ or ())]
+            if missing := [name for name in required if name not in named]:
+                raise UsageError(missing[0], f"{function.__name__} needs it", value="nothing")
             if not code.co_flags & _TAKES_ANY:
                 _refuse_unknown(function.__name__, named, names)
             return function(*args, **named)

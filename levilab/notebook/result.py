@@ -533,7 +533,7 @@ class AnalysisResult(Exportable):
             title: of the panel.
             model: whose curve and residuals; None: the best one.
             logy: whether the ordinate is logarithmic.
-            figsize: width and height [inch].
+            figsize: width and height of one panel, the fit where none is named [inch].
 
         Raises:
             UsageError: there is no such figure.

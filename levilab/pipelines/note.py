@@ -8,6 +8,9 @@ from analysis.remarks import Remark
 from levilab.present.numbers import filled
 from levilab.texts.note import Note, Weight
 
+#: Of few readings about a law or a line.
+FEW_LEFT = "{n:.0f} readings hardly show their scatter: a 68 % interval is {width:.2g} u to each side (Student's t)"
+
 
 @dataclass(frozen=True)
 class Weighed:

@@ -213,7 +213,7 @@ _RAISED = re.compile(r"\^(?:\(([^()]+)\)|(−?(?:½|\d+/\d+)))")
 
 
 def in_mathtext(text: str) -> str:
-    """Return plain notation as matplotlib's labels have it: what follows ^ is raised, the index of a letter lowered.
+    """Return plain notation as matplotlib has it: what follows ^ is raised, the index of a Greek letter is lowered.
 
     >>> in_mathtext("ω̇ = −C₃/₂ω^(3/2)"), in_mathtext("(rad/s)^−½/s"), in_mathtext("Ω_g/2π")
     ('ω̇ = −C$_{3/2}$ω$^{3/2}$', '(rad/s)$^{−1/2}$/s', 'Ω$_g$/2π')

@@ -9,7 +9,7 @@ from analysis.precession.miscounts import Miscount
 from analysis.precession.power import Power
 from analysis.precession.sweep import EXCLUDED_P, Point, SweepFit
 from analysis.uncertainty import Estimate
-from levilab.pipelines.note import Weighed, note_of
+from levilab.pipelines.note import FEW_LEFT, Weighed, note_of
 from levilab.pipelines.row import Quantity, columns_of, entry, statistic
 from levilab.present.numbers import plain, pulses_too_many, with_uncertainty
 from levilab.texts.text import Sentences, Text
@@ -130,9 +130,7 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Weighed] = MappingProxyType(
             "advice",
         ),
         "sweep exact": "the points lie on the line to the last digit: without their u nothing can be tested; give it",
-        "few left": (
-            "{n:.0f} readings hardly show their scatter: a 68 % interval is {width:.2g} u to each side (Student's t)"
-        ),
+        "few left": FEW_LEFT,
         "moves the slope": lambda points, k, change, share: Text(
             "{point}, alone moves the slope by {change:n}, {share:.1f} of its u",
             point=_point(points, k),

@@ -21,7 +21,7 @@ from analysis.spindown.lawfit import LawFit
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
 from analysis.spindown.verdict import Verdict, is_simple
 from analysis.uncertainty import Estimate
-from levilab.pipelines.note import Weighed, note_of
+from levilab.pipelines.note import FEW_LEFT, Weighed, note_of
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, estimate, statistic
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.units import name_with_unit
@@ -395,9 +395,7 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Weighed] = MappingProxyTy
             "that does not fit shows only beside a better one",
             "advice",
         ),
-        "few left": (
-            "{n:.0f} readings hardly show their scatter: a 68 % interval is {width:.2g} u to each side (Student's t)"
-        ),
+        "few left": FEW_LEFT,
         "understated": lambda of: Text(
             "even the best law, {law}, misses the readings by {times:n} times their stated uncertainties, more than "
             "chance explains: all uncertainties are enlarged; check the readings' uncertainties",

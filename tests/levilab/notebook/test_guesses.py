@@ -322,6 +322,7 @@ REFUSED = {
     "result.c1": "take result.models['stokes']['c1']",
     "result.redchisq": "did you mean redchi",
     "result.export('x.json')": "to_json(path) of a result writes it",
+    "result.to_csv()": "output = nothing: export needs it",
     "result.chi2_red": "did you mean redchi?",
     "levilab.analyze(t, f, 0.03)": "put arrays into one, analyze((t, f, u))",
     "result.ci_report(with_offset=False)": "is no option of ci_report",
