@@ -66,7 +66,7 @@ class Compared:
         symbol: for people.
         unit: of results.
         estimates: of each group, as its analysis has them; None where it has no value with u.
-        widths: how much farther a value may be off by chance: above 1 where u is of few repetitions alone.
+        freedoms: degrees of freedom of each u that is of repetitions alone; else None.
         truths: of each group; None where it is not known.
         mean: of those that are used, by the rule of several runs in a report; None where there are none.
         together: whether those agree; None where there are none.
@@ -79,7 +79,7 @@ class Compared:
     symbol: str
     unit: str
     estimates: tuple[Estimate | None, ...]
-    widths: tuple[float, ...]
+    freedoms: tuple[float | None, ...]
     truths: tuple[float | None, ...]
     mean: Estimate | None
     together: Comparison | None
@@ -105,8 +105,8 @@ class Compared:
     @property
     def widened(self) -> list[Estimate | None]:
         """The estimates with the u by which groups are compared."""
-        pairs = zip(self.estimates, self.widths, strict=True)
-        return [replace(one, u=one.u * width) if one and one.u else None for one, width in pairs]
+        pairs = zip(self.estimates, self.freedoms, strict=True)
+        return [replace(one, u=one.u * _width(freedom)) if one and one.u else None for one, freedom in pairs]
 
     @property
     def truth(self) -> tuple[float, float, float] | None:
@@ -141,10 +141,14 @@ class Compared:
             for one, truth in zip(self.estimates, self.truths, strict=True)
         )
 
+    def limits(self, most: float) -> list[float]:
+        """Return for each group the distance from its truth that is as improbable as `most` of a normal number [u]."""
+        return [most if freedom is None else student(freedom, most) for freedom in self.freedoms]
+
     def off(self, most: float) -> tuple[bool, ...]:
-        """Return whether each group is farther from its truth than a normal number `most` from zero [u]."""
-        pairs = zip(self.from_truth, self.widths, strict=True)
-        return tuple(distance is not None and abs(distance) > most * width for distance, width in pairs)
+        """Return whether each group is farther from its truth than its limit."""
+        pairs = zip(self.from_truth, self.limits(most), strict=True)
+        return tuple(distance is not None and abs(distance) > limit for distance, limit in pairs)
 
 
 @dataclass(frozen=True)
@@ -284,7 +288,7 @@ def _quantity(
         analysis.symbols.get(name, name.replace("_", " ")),
         next((one["unit"] for one in good if one), "1"),
         tuple(Estimate(one["value"], one["u"], one["unit"]) if one else None for one in good),
-        tuple(_width((part.get("result", {}).get("statistics") or {}).get("freedom")) for part in parts),
+        tuple((part.get("result", {}).get("statistics") or {}).get("freedom") for part in parts),
         tuple(truth.values.get(name) if truth.model in {"", model} else None for truth in truths),
         None,
         None,

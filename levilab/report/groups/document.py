@@ -345,12 +345,13 @@ def _values(of: Class, quantity: Compared) -> Tabular:
     several = len(of.groups) > 1
     rows = rows[: len(of.groups) + (several and mean is not None) + (several and difference is not None)]
     note = "value(u): the digits in parentheses are u of the last digits."
-    if max(quantity.widths) > 1:
+    limits = quantity.limits(FAR)
+    if max(limits) > FAR:
         said = (
-            "u is of few repetitions: only a value more than {far:.1f} u from its truth is far off (Student's t); "
+            "u comes from few repetitions: only a value more than {far:.1f} u from its truth is far off (Student's t); "
             "distances from the others allow for that."
         )
-        note = Sentences(note, Text(said, far=FAR * max(quantity.widths)))
+        note = Sentences(note, Text(said, far=max(limits)))
     if difference and several:
         note = Sentences(note, "mean − truth: each top has its own truth, so their differences are not in this u.")
     if mean and any(one and not use for one, use in zip(quantity.estimates, quantity.used, strict=True)):

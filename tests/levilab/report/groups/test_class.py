@@ -9,6 +9,7 @@ from html import escape
 import numpy as np
 import pytest
 from python_calamine import CalamineWorkbook
+from scipy import stats
 
 from analysis.comparison import compare
 from levilab.crosscheck.truth import Truth
@@ -19,6 +20,7 @@ from levilab.report.beside import (
     DIFFER,
     GOOD,
     REPEAT,
+    Compared,
     _quantity,
     _width,
     agreement,
@@ -517,6 +519,13 @@ def test_groups_of_few_tops_differ_by_chance_as_often_as_p_says():
         tops = random.normal(0, 0.25, (8, 5))
         seldom += compare(tops.mean(axis=1), width * tops.std(axis=1, ddof=1) / math.sqrt(5)).p < DIFFER
     assert seldom <= 11  # 300 × 2 %, and two standard deviations
+
+
+def test_a_value_of_few_repetitions_is_far_off_as_seldom_as_a_normal_one():
+    of = Compared("mean", "f", "Hz", (None,) * 3, (None, 2, 9), (None,) * 3, None, None, (False,) * 3)
+    exact, *few = of.limits(3)
+    assert exact == 3
+    assert stats.t.sf(few, [2, 9]) == pytest.approx(stats.norm.sf(3))
 
 
 def test_the_spreadsheet_has_numbers_texts_and_each_reading(of_three, tmp_path):
