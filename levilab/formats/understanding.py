@@ -932,8 +932,8 @@ def _titles(
         raise NoSuchColumn(path, what, layout.width, line=layout.header_line)
     taken = _by_units(layout, numbers)
     if len(layout.sample) <= len(filled) // _IN_LINE:
-        what = "{width} numbers stand in one line: write a reading a line, its time and its spin"
-        raise NoSuchColumn(path, what, layout.width, line=layout.first_line)
+        what = "all readings stand in one line: write a line for each, its time and its spin"
+        raise NoSuchColumn(path, what, line=layout.first_line)
     if (len(filled) > len(TITLES_WITHOUT_HEADER) and not taken) or not guess:
         what = '{width} columns and no header; add one, or say `columns` = "t=1,f=2"'
         raise NoSuchColumn(path, what, layout.width, line=layout.first_line)

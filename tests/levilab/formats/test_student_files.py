@@ -723,7 +723,7 @@ def test_other_names_of_the_spin_and_its_period_are_known(title, factor, write):
 
 @pytest.mark.parametrize("form", ["{t}, {f}; ", "{t} {f} "])
 def test_readings_in_one_line_are_asked_for_a_line_each(form, write):
-    with pytest.raises(NoSuchColumn, match="numbers stand in one line: write a reading a line"):
+    with pytest.raises(NoSuchColumn, match="all readings stand in one line: write a line for each"):
         read_table(write("".join(form.format(t=2 * k, f=35 - k / 10) for k in range(30)) + "\n"))
 
 
