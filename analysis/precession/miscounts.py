@@ -113,8 +113,8 @@ def find_miscounts(
     """Find the points far off the median line, and what the counter counted there.
 
     Without u few points hardly show their scatter: one that no miscount explains is farther off than `FAR` standard
-    deviations by Student's t.  (Of lines of five points 2 % have such a point by chance, of more points fewer: the
-    median deviation is less certain than a standard deviation of n − 2 degrees of freedom.)
+    deviations by Student's t.  Of lines through five points 2 % have such a point by chance, through eight 0.3 %: the
+    median deviation is less certain than a standard deviation of n − 2 degrees of freedom.
 
     Args:
         x: shape (n,) [Hz].

@@ -89,8 +89,8 @@ def test_a_group_far_off_does_not_hide_itself():
 
 @pytest.mark.parametrize("n", [3, 4, 6, 12])
 @pytest.mark.parametrize("between", [0.5, 2.0, 10.0])
-def test_at_most_as_many_groups_are_far_off_as_by_chance(n, between):
-    """Few groups may be alike by chance, and the next one is no farther off for it: of normal numbers 0.27 %."""
+def test_groups_are_seldom_far_off_by_chance(n, between):
+    """Few groups may agree by chance, and the next one is not far off for that: 0.27 % of normal numbers are."""
     random = np.random.default_rng(26)
     tops, u = between * random.standard_normal((2400 // n, n)), random.uniform(0.5, 2, (2400 // n, n))
     found = [compare(x + of * random.standard_normal(n), of).distances for x, of in zip(tops, u, strict=True)]
