@@ -246,9 +246,9 @@ class MotionWorld:
         return field_beside(place, ring, position, moment, up)
 
     def place_probe(self, height_m: float | None) -> None:
-        """Put the probe at a height, with a seed to 0.2 mm; see World."""
+        """Put the probe at a height, to 0.2 mm; see World."""
         self._probe_m = height_m
-        stand = Stand(scatter_m=2e-4 if self.seed else 0.0, seed=self.seed).at(height_m)
+        stand = Stand(scatter_m=2e-4, seed=self.seed).at(height_m)
         place = np.array([[0.0, 0.0, stand.height_m or 0.0]])
         self._probe_t = 0.0 if height_m is None else float(flux_density(base_field(self._scene), place)[0, 2])
 

@@ -23,7 +23,7 @@ from levilab.simulator.model import base_field
 from levilab.simulator.parts import Top
 from levilab.simulator.scene import presets
 from levilab.simulator.start import start_of
-from levilab.world.base import Base
+from levilab.world.base import Base, Stand
 from levilab.world.bursts import TriggerWire, mean_pull
 from levilab.world.flight import RATE, Flight, _cubic
 from levilab.world.light import Tape
@@ -342,12 +342,15 @@ def test_the_seed_chooses_where_on_the_rim_the_tape_is():
     assert len(places) == 3
 
 
-def test_the_probe_sees_the_field_of_the_scenes_base():
-    assert world().flux_density(0.0) == pytest.approx(0.0190937938, rel=1e-8)
+def test_the_probe_sees_the_field_of_the_scenes_base_where_it_is_put_to_a_fifth_of_a_millimetre():
+    missed = {height: Stand(scatter_m=2e-4).at(height).height_m for height in (0.072, 0.05)}
+    assert Base().flux_density(0.072) == pytest.approx(0.0190937938, rel=1e-8)
+    assert all(0 < abs(place - height) < 1e-3 for height, place in missed.items())
+    assert world().flux_density(0.0) == pytest.approx(Base().flux_density(missed[0.072]), rel=1e-8)
     twice = world(TILTED.changed({"base.strength_t_m": 2 * TILTED.base.strength_t_m}))
-    assert twice.flux_density(5.0) == pytest.approx(2 * 0.0190937938, rel=1e-8)
+    assert twice.flux_density(5.0) == pytest.approx(2 * Base().flux_density(missed[0.072]), rel=1e-8)
     twice.place_probe(0.05)
-    assert twice.flux_density(5.0) == pytest.approx(2 * Base().flux_density(0.05), rel=1e-12)
+    assert twice.flux_density(5.0) == pytest.approx(2 * Base().flux_density(missed[0.05]), rel=1e-12)
     twice.place_probe(None)
     assert twice.flux_density(5.0) == 0.0
 
