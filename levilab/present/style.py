@@ -14,6 +14,7 @@ import matplotlib as mpl
 import matplotlib.text
 import matplotlib.ticker
 
+from levilab.errors import UsageError
 from levilab.files import replace_atomically
 from levilab.present.looks import MARKERS
 from levilab.present.numbers import short_name
@@ -137,7 +138,10 @@ def _for_a_page(svg: str, prefix: str, title: str) -> str:
 def for_notebooks(figure: Figure, figsize: tuple[float, float] | None = None) -> Figure:
     """Let a notebook show the figure as a picture, in the size wanted [inch]; returns the figure."""
     if figsize is not None:
-        figure.set_size_inches(figsize)
+        try:
+            figure.set_size_inches(figsize)
+        except (TypeError, ValueError):
+            raise UsageError("figsize", "width and height in inches are expected: (9, 4)", value=figsize) from None
     vars(figure)["_repr_png_"] = partial(as_png, figure)
     return figure
 

@@ -367,6 +367,8 @@ REFUSED = {
     "result.plot('residual')": "did you mean residuals?",
     "result.plot('fit', model='disk')": "known are stokes, newton, disc",
     "result.plot('all', ax=ax)": "go with one panel",
+    "result.plot(figsize=9)": "width and height in inches are expected: (9, 4)",
+    "run.plot(figsize=(9, 'a'))": "width and height in inches are expected: (9, 4)",
     "motion.plot('hight')": "did you mean height",
     "run.plot('spin')": "did you mean spin_frequency_hz",
     "levilab.analyze(run, foo=3)": "is no option of analyze; known are data, kind",
