@@ -70,6 +70,12 @@ class Layout:
             given.append(f"{title} [{unit}]" if not is_unit(own or "") and (is_unit(unit) or unit == "%") else title)
         return tuple(given)
 
+    @property
+    def may_be_one_column(self) -> bool:
+        """Whether times and spins without titles, as 20,1320, may be one column of numbers with a decimal comma."""
+        two = not self.header and self.width == 2 and self.dialect == Dialect(",", ".")
+        return two and not any("." in field for row in self.sample for field in row)
+
     def must_have_one_unit(self, path: Path, index: int) -> None:
         """Raise TableError for a column with another unit in its title than below it."""
         title, unit = "".join(self.header[index : index + 1]), "".join(self.units[index : index + 1])

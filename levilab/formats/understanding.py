@@ -437,10 +437,21 @@ def _must_be_sure(plan: "Plan") -> "Plan":
         plan.layout.must_have_one_unit(plan.path, column.index)
         doubts += filter(None, [None if column.written else _unit_doubt(plan, column)])
     if doubts:
-        raise _unanswered(plan.path, reduce(_both, doubts))
+        raise _unanswered(plan.path, _or_one_column(plan.layout, reduce(_both, doubts)))
     if UNVALUED.encode() in (plan.text.content or b""):
         read_rows(replace(plan.text, path=plan.path), plan.layout, plan.columns)
     return plan
+
+
+def _or_one_column(layout: Layout, doubt: Doubt) -> Doubt:
+    """Return a question about the unit of a spin that begins with the other reading of a row without a point."""
+    if not layout.may_be_one_column:
+        return doubt
+    asked = (
+        "is {row:s} a time and a spin, or one number with decimal comma? For one number write the title f [Hz] into a "
+        "line above; for two:"
+    )
+    return replace(doubt, text=Said("{which} {unit}", Said(asked, ",".join(layout.sample[0])), doubt.text))
 
 
 def _both(one: Doubt, other: Doubt) -> Doubt:

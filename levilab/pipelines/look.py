@@ -224,7 +224,8 @@ def _look_at_limits(path: Path) -> Look | None:
     values = tuple(digits(spin, 6) for spin in spins[:_SHOWN])
     column = UnderstoodColumn(0, "".join(table.header), "spin_frequency_hz", "Hz", 1.0, inverse=False, values=values)
     plot = Plot((*range(1, len(spins) + 1),), tuple(spins.tolist()), ("reading", ""), ("spin frequency", "Hz"))
-    return Look(path, Text("{n} limits", n=len(spins)), (UnderstoodRun(path, "", 0, (column,)),), plots={0: (plot,)})
+    run = UnderstoodRun(path, "", 0, (column,), warnings=table.warnings)
+    return Look(path, Text("{n} limits", n=len(spins)), (run,), plots={0: (plot,)})
 
 
 def _look_at_record(path: Path, record: Waveform | PulseTimes, channel: str | None) -> Look:

@@ -134,7 +134,7 @@ def limits_in_field(path: Path, record: FieldRecord, near: float | None) -> Limi
 def single_column(path: Path, *, guess: bool) -> Table | None:
     """Return the table of a file with one number a line, which are limits by its title or, if guess, for want of one.
 
-    None of a file that holds anything else.
+    None of a file that holds anything else, or that may hold times before commas that never fall.
     """
     file, inside = locate(path)
     one = next((text for text in texts_of(file) if not inside or text.path == path), None)
@@ -150,15 +150,21 @@ def single_column(path: Path, *, guess: bool) -> Table | None:
         return None
     title = read_title(titles[0]) if titles else None
     named = title is not None and title.column == NEEDED[0]
-    if title is not None and title.column not in {None, NEEDED[0]}:
-        return None
+    other = title is not None and title.column not in {None, NEEDED[0]}
     factor = 1.0 if title is None or title.unit is None else unit_factor(title.unit, "frequency")
-    if factor is None or not (guess or named):
+    if other or factor is None or not (guess or named):
         return None
+    notes: tuple[str, ...] = ()
+    times = [int(line.partition(",")[0]) for _, line in numbers if re.fullmatch(r"\d+,\d+", line)]
+    if len(times) == len(numbers) >= _FEWEST and not named:
+        if not titles and times[0] < times[-1] and times == sorted(times):
+            return None
+        said = "{path:s}: its rows, as {row:s}, are taken for one number each, with a decimal comma"
+        notes = (of_file("decimal comma", Text(said, path.name, numbers[0][1])),)
     values = factor * np.array([float(line.replace(",", ".")) for _, line in numbers])
     if not (named or is_possible_spin(float(np.median(values)))):
         return None
-    return Table(path, {NEEDED[0]: values}, (), tuple(titles), np.array([k for k, _ in numbers], dtype=np.int64))
+    return Table(path, {NEEDED[0]: values}, notes, tuple(titles), np.array([k for k, _ in numbers], dtype=np.int64))
 
 
 def read_limit_run(run: Run, _: InputOptions) -> LimitReadings:

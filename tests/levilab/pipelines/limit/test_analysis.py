@@ -24,6 +24,7 @@ from levilab.pipelines.limit.analysis import (
 )
 from levilab.pipelines.limit.document import LIMIT
 from levilab.pipelines.limit.report import limit_part, limit_tables
+from levilab.pipelines.look import look_at
 from levilab.pipelines.suits import analyze_suiting, save
 from levilab.present.document.blocks import Listing
 from levilab.report.page import write_report
@@ -64,6 +65,21 @@ def test_spins_at_which_no_top_falls_are_doubted(spin, asks, tmp_path):
     (file := tmp_path / "limits.csv").write_text(f"f [Hz]\n{spin}\n{spin + 0.02}\n{spin - 0.02}\n", encoding="utf-8")
     doubts = LIMIT.analyze([file]).doubts
     assert [text.partition(": ")[2] for text in doubts] == ([asks] if asks else [])
+
+
+def test_whole_numbers_that_may_be_times_and_rpm_are_no_limits_without_an_answer(tmp_path):
+    (file := tmp_path / "a.csv").write_text("20,1320\n21,1291\n22,1262\n23,1235\n24,1207\n", encoding="utf-8")
+    asked = "is 20,1320 a time and a spin, or one number with decimal comma? For one number write the title f [Hz]"
+    with pytest.raises(DataError, match=re.escape(asked)):
+        analyze_suiting([file], {})
+    assert asked in look_at(file, {}).problem
+    ((two, _),) = analyze_suiting([file], {"columns": {"t": "1", "f": "2 [rpm]"}})
+    file.write_text("f [Hz]\n" + file.read_text(encoding="utf-8"), encoding="utf-8")
+    ((one, _),) = analyze_suiting([file], {})
+    assert (two.name, one.name, look_at(file, {}).holds) == ("spindown", "limit", "5 limits")
+    file.write_text("22,8634\n21,9291\n22,1262\n", encoding="utf-8")  # times do not fall
+    notes = LIMIT.analyze([file]).all_warnings
+    assert any("its rows, as 22,8634, are taken for one number each, with a decimal comma" in note for note in notes)
 
 
 def test_both_kinds_together_have_values_of_both(sample_data, tmp_path):
