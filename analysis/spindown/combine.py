@@ -103,7 +103,6 @@ def combine(runs: Sequence[SpinDown]) -> Combined:
     mixed = 0 < sum(run.u is None for run in runs) < len(runs)
     said = [
         *comparison_remarks(weighed, decision.best, correlation, mixed=mixed),
-        *(Remark("changed", values=(k + 1, len(runs), changes[k])) for k in decision.changed if len(runs) > 1),
         *_about_number(runs),
     ]
     return Combined(fits, decision.best, decision, len(runs), tuple(said), correlation, _tilt(runs, decision.best))

@@ -12,7 +12,7 @@ from analysis.spindown.drag import LAWS
 from analysis.spindown.selection import Criterion, Statistics
 
 EXCLUDED, TIED = 10.0, 4.0  # differences of AICc, Burnham & Anderson (2002) §2.6
-#: Probability of a change in noise below which no law describes the readings; of several runs, in any of them.
+#: Probability of a change in noise below which no law describes the readings.
 CHANGED = 0.001
 
 
@@ -66,7 +66,7 @@ def verdict(
     listed = {k: tuple(n for n in fits if kinds[n] == k) for k in ("tied", "needless", "weak", "excluded")}
     listed["tied"] = tuple(sorted(listed["tied"], key=lambda name: fits[name].n_parameters))
     probabilities = changes or ((change.p,) if change else ())
-    changed = tuple(k for k, p in enumerate(probabilities) if p * len(probabilities) < CHANGED)  # Bonferroni
+    changed = tuple(k for k, p in enumerate(probabilities) if p < CHANGED)
     describes = 2 * len(changed) <= len(probabilities) - (len(probabilities) == 1)
     simple = [name for name in (*listed["tied"], *listed["weak"]) if is_simple(name)]
     best = listed["tied"][0]

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import compress
 
 from analysis.spindown.combine import Combined, CombinedLaw, combine
 from analysis.spindown.drag import LAWS
@@ -17,8 +18,9 @@ from levilab.pipelines.field.device import THESIS, inertias
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.readings import SpinReadings
-from levilab.pipelines.spindown.words import TILT_ALLOWED, UNIT_FIRST, is_seen, remark, verdict_of_all
+from levilab.pipelines.spindown.words import TILT_ALLOWED, UNIT_FIRST, doubts_about_law, is_seen, remark, verdict_of_all
 from levilab.present.numbers import enumeration
+from levilab.texts.text import Text
 
 #: The experiment whose runs it takes, and whose settings say how the readings were counted.
 EXPERIMENT = "spin"
@@ -30,7 +32,7 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
     @property
     def text(self) -> str:
         """What the data say, in a few sentences."""
-        return UNIT_FIRST if self.is_doubtful else verdict_of_all(self.combined, self.runs)
+        return UNIT_FIRST if self.is_doubtful else verdict_of_all(self.combined, self.taken)
 
     @property
     def is_doubtful(self) -> bool:
@@ -49,15 +51,24 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
         if any(run.has_tilt for run in self.runs) and not is_seen(self.combined.tilt):
             yield TILT_ALLOWED
 
+    @property
+    def is_taken(self) -> list[bool]:
+        """Whether verdict and means are of each run."""
+        return take(self.sources, self.runs)
+
+    @property
+    def taken(self) -> list[SpinDown]:
+        """The runs that verdict and means are of."""
+        return [*compress(self.runs, self.is_taken)]
+
     def _left_out(self) -> Iterable[str]:
-        """Yield which runs the means leave out, since their unit is in doubt."""
-        names = [source.name for source in self.sources if source.readings.doubtful]
-        if 0 < len(names) < len(self.sources):
-            yield f"the means leave out {', '.join(names)}, whose unit is in doubt: say it, or remove the file"
+        """Yield which runs the verdict and the means leave out."""
+        if names := [source.name for source, one in zip(self.sources, self.is_taken, strict=True) if not one]:
+            yield Text("verdict and means leave out {names}: correct the file, or remove it", enumeration(names))
 
     def about_run(self, run: SpinDown) -> Iterable[str]:
         """Return remarks on one run."""
-        return (*map(remark, run.remarks), *self._of_laws(run.fits))
+        return (*doubts_about_law(run), *map(remark, run.remarks), *self._of_laws(run.fits))
 
     def _of_laws(self, fits: Iterable[LawFit | CombinedLaw]) -> Iterable[str]:
         excluded = self.combined.verdict.excluded  # what they lack is of no interest any more
@@ -107,6 +118,12 @@ def top_of_device(device: Device | None) -> Top:
 
 
 def combine_sound(sources: Sequence[Source[SpinReadings]], runs: Sequence[SpinDown], _: SpinDownOptions) -> Combined:
-    """Return all runs together, without those whose unit is in doubt unless every unit is."""
-    sound = [run for source, run in zip(sources, runs, strict=True) if not source.readings.doubtful]
-    return combine(sound or runs)
+    """Return all runs together that are taken."""
+    return combine([*compress(runs, take(sources, runs))])
+
+
+def take(sources: Sequence[Source[SpinReadings]], runs: Sequence[SpinDown]) -> list[bool]:
+    """Return whether each run is taken: not one of a doubtful unit or that no law describes, unless every one is."""
+    pairs = zip(sources, runs, strict=True)
+    sound = [run.verdict.describes and not source.readings.doubtful for source, run in pairs]
+    return sound if any(sound) else [True] * len(runs)

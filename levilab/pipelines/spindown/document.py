@@ -206,7 +206,7 @@ def budget_of_all(analysis: SpinDownAnalysis) -> tuple[Budget, ...]:
 
 def _budget_of_mean(analysis: SpinDownAnalysis, law: str, name: str, mean: Mean) -> Budget | None:
     """Return u of a mean: the scatter between runs, or what their own u imply if that is more; and what they share."""
-    fits = [run.fit(law) for run in analysis.runs]
+    fits = [run.fit(law) for run in analysis.taken]
     n = mean.degrees_of_freedom + 1
     if mean.value is None or not mean.u or mean.scatter is None or n != len(fits):
         return None

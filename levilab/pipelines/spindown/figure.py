@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import Any
 
 import matplotlib as mpl
@@ -100,7 +101,7 @@ def _finding(analysis: SpinDownAnalysis) -> str:
     """Return the verdict in one sentence."""
     if analysis.is_doubtful:
         return Text("Spin-down as it was read: the unit comes first, see the note")
-    n, said = len(analysis.runs), finding(analysis.combined)
+    n, said = len(analysis.taken), finding(analysis.combined)
     return Text("Spin-down of {n} runs: {said}", n=n, said=said) if n > 1 else Text("Spin-down: {said}", said=said)
 
 
@@ -109,11 +110,11 @@ def _unit(analysis: SpinDownAnalysis) -> _Unit:
     if len(known) == len(analysis.runs):
         usual = float(np.median(np.concatenate(known)))
         return _Unit(known, usual, "u", Text("u of a reading ({hz:n} Hz)", hz=digits(usual)))
-    residuals = [run.fit(analysis.combined.best).residuals for run in analysis.runs]
+    residuals = [run.fit(analysis.combined.best).residuals for run in analysis.taken]
     floor = 1e-12 * float(analysis.runs[0].frequency[0])  # readings that a law describes exactly
     scatter = max(float(np.sqrt(np.mean(np.concatenate(residuals) ** 2))), floor)
     words = Text("the scatter about the {law} law ({hz:n} Hz)", law_name(analysis.combined.best), digits(scatter))
-    return _Unit([np.full(len(one), scatter) for one in residuals], scatter, "scatter", words)
+    return _Unit([np.full(len(run.time), scatter) for run in analysis.runs], scatter, "scatter", words)
 
 
 # --- readings and laws ---------------------------------------------------------------------------------
@@ -122,13 +123,13 @@ def _unit(analysis: SpinDownAnalysis) -> _Unit:
 def _draw_spin(axes: Axes, analysis: SpinDownAnalysis) -> None:
     """Draw the readings of all runs, and the best law through each."""
     span = _set_range(axes, analysis)
-    best, several = analysis.combined.best, len(analysis.runs)
+    best, several, first = analysis.combined.best, len(analysis.runs), analysis.taken[0]
     for k, run in enumerate(analysis.runs):
         t = np.linspace(run.time[0], run.time[-1], 200)
         width = 1.4 if several == 1 else 0.9 if several <= len(MARKERS) else 0.4
         said = "best law: {law}, {equation}" if is_best(analysis, best) else "{law}, {equation}"
-        label = Text(said, law=short_law(best), equation=in_mathtext(LAWS[best].equation)) if k == 0 else None
-        if not analysis.is_doubtful:
+        label = Text(said, law=short_law(best), equation=in_mathtext(LAWS[best].equation)) if run is first else None
+        if not analysis.is_doubtful and analysis.is_taken[k]:
             nu = run.fit(best).spin_frequency(t)
             axes.plot(t, nu, linewidth=width, zorder=2.5, label=label, **LOOKS[best].as_line)
         name = _run_label(analysis, k)
@@ -262,10 +263,11 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
     excluded = analysis.combined.verdict.excluded
     found: list[float] = []
     for k, run in enumerate(analysis.runs):
-        found += [*(run.fit(best).residuals + 1.5 * unit.usual), *(run.fit(best).residuals - 1.5 * unit.usual)]
+        if analysis.is_taken[k]:
+            found += [*(run.fit(best).residuals + 1.5 * unit.usual), *(run.fit(best).residuals - 1.5 * unit.usual)]
         _draw_readings(axes, analysis, k, run.fit(best).residuals, span=6 * unit.usual, gid=f"residuals-best-{k}")
         _draw_means(axes, analysis, run.fit(best).residuals)
-    run = max(analysis.runs, key=lambda one: float(one.time[-1] - one.time[0]))
+    run = max(analysis.taken, key=lambda one: float(one.time[-1] - one.time[0]))
     t = np.linspace(run.time[0], run.time[-1], 200)
     curves = {name: run.fit(name).spin_frequency(t) - run.fit(best).spin_frequency(t) for name in laws_of(analysis)}
     for name, difference in curves.items():
@@ -322,7 +324,9 @@ def _draw_residuals(figure: Figure, top: float, analysis: SpinDownAnalysis, unit
     values = {
         name: [run.fit(name).residuals / of for run, of in zip(analysis.runs, unit.of, strict=True)] for name in laws
     }
-    reach = {name: max(float(np.abs(one).max()) for one in of) for name, of in values.items()}
+    reach = {
+        name: max(float(np.abs(one).max()) for one in compress(of, analysis.is_taken)) for name, of in values.items()
+    }
     excluded = analysis.combined.verdict.excluded
     good = [reach[name] for name in laws if name not in excluded] or [reach[analysis.combined.best]]
     common = max(_LEAST_SCALE, _ROOM * max(good))

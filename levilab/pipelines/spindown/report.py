@@ -100,7 +100,7 @@ def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
     combined = analysis.combined
     if not combined.verdict.describes:
         return
-    run = analysis.runs[0]
+    run = analysis.taken[0]
     fit = run.fit(combined.best)
     if fit.has_tilt:
         return
@@ -111,8 +111,8 @@ def _loss(analysis: SpinDownAnalysis) -> Iterator[str]:
         Text("{loss:n} Hz a second at {spin:.3g} Hz", loss=digits(float(each)), spin=float(spin))
         for each, spin in zip(loss, spins, strict=True)
     )
-    several = len(analysis.runs) > 1
-    loses = "In the first run the top loses {first}, and {last}." if several else "The top loses {first}, and {last}."
+    several = len(analysis.taken) > 1
+    loses = "In one of the runs the top loses {first}, and {last}." if several else "The top loses {first}, and {last}."
     yield Text(loses, first=first, last=last)
 
 
@@ -182,7 +182,7 @@ def _tilt(analysis: SpinDownAnalysis) -> Iterator[str]:
 
 def _runs(analysis: SpinDownAnalysis) -> Iterator[str]:
     """Yield the meaning of the scatter between runs."""
-    if len(analysis.runs) == 1:
+    if len(analysis.taken) == 1:
         return
     # the constants of a general law trade against each other: their large u would hide that the runs differ
     verdict = analysis.combined.verdict
@@ -191,7 +191,7 @@ def _runs(analysis: SpinDownAnalysis) -> Iterator[str]:
         if name == "exponent" or mean.value is None or mean.scatter is None:
             continue
         scatter: float = mean.scatter
-        own = [run.fit(law).parameters[name].u for run in analysis.runs]
+        own = [run.fit(law).parameters[name].u for run in analysis.taken]
         known = [u for u in own if u]
         if len(known) != len(own):
             continue

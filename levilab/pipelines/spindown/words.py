@@ -25,7 +25,7 @@ from levilab.pipelines.note import FEW_LEFT, Weighed, note_of
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, estimate, statistic
 from levilab.present.numbers import enumeration, with_uncertainty
 from levilab.present.units import name_with_unit
-from levilab.texts.note import reword
+from levilab.texts.note import Note, reword
 from levilab.texts.text import Sentences, Text, verbatim
 
 
@@ -216,7 +216,11 @@ def _verdict(
     compared = [name for name in said.needless if stats[name].difference is not None]
     how, others, advice = _how(said.best, constants[said.best]), said.indistinguishable[1:], ""
     if not said.describes:
-        first = _no_law(found, runs, digits(best.rms_residual))
+        first = Text(
+            "No law describes these readings; the best one, {law}, leaves {rms:n} Hz rms. Its constants and their "
+            "uncertainties are those of a curve through the readings, not of a drag.",
+            law=law, rms=digits(best.rms_residual),
+        )  # fmt: skip
     elif said.decided:
         start = "The {law} law fits best: {how}." if how else "The {law} law fits best."
         first = Text(start, law=law, how=how)
@@ -285,24 +289,6 @@ def _wobble(tilt: Estimate | None) -> str:
     )
 
 
-def _no_law(found: SpinDown | Combined, runs: Sequence[SpinDown], rms: str) -> str:
-    change = found.verdict.change
-    if change is None:
-        numbers = [str(k + 1) for k in found.verdict.changed]
-        what = Text("none describes the runs {numbers} of {n}", numbers=enumeration(numbers), n=len(runs))
-    else:
-        what = Text(
-            "they {way} by {hz:n} Hz beyond each fitted law between {first:.4g} s and {last:.4g} s, or bend there",
-            way="rise" if change.size > 0 else "fall", hz=digits(abs(change.size)),
-            first=float(runs[0].time[change.first]), last=float(runs[0].time[change.last]),
-        )  # fmt: skip
-    return Text(
-        "No law describes these readings: {what}; the best one, {law}, leaves {rms:n} Hz rms. Its constants and their "
-        "uncertainties are those of a curve through the readings, not of a drag.",
-        what=what, law=law_name(found.best), rms=rms,
-    )  # fmt: skip
-
-
 def _exponent(exponent: Estimate | None) -> str:
     """Return an exponent as n = 1.507 ± 0.006."""
     if exponent is None or exponent.value is None or not exponent.u:
@@ -328,6 +314,20 @@ TILT_ALLOWED = (
     "u allows for a tilt of the moment, which these readings leave open; for a top that is known to have none: `tilt` "
     "= none"
 )
+
+
+def doubts_about_law(run: SpinDown) -> Iterator[Note]:
+    """Yield that no law describes a run, and where it leaves them."""
+    change = run.verdict.change
+    if change and not run.verdict.describes:
+        said = Text(
+            "no law describes the readings: they {way} by {hz:n} Hz beyond each law between {first:.4g} s and "
+            "{last:.4g} s, or bend there, as of a top that was spun again or touched. Cut the file there, or leave it "
+            "out",
+            way="rise" if change.size > 0 else "fall", hz=digits(abs(change.size)),
+            first=float(run.time[change.first]), last=float(run.time[change.last]),
+        )  # fmt: skip
+        yield Note("no law", said, weight="doubt")
 
 
 def remark(of: Remark) -> str:
@@ -424,16 +424,6 @@ _REMARKS: Mapping[str, str | Callable[[Remark], str] | Weighed] = MappingProxyTy
                 worth=digits(independent(round(of.values[2]), of.values[0])),
             ),
             "advice",
-        ),
-        "changed": Weighed(
-            lambda of: Text(
-                "no law describes run {run:.0f} of {n:.0f}: that noise makes a change as large in any of the "
-                "runs has p = {p:n}; look at it",
-                run=of.values[0],
-                n=of.values[1],
-                p=digits(min(of.values[1] * of.values[2], 1.0)),
-            ),
-            "doubt",
         ),
         "mixed u": Weighed(
             "{some:.0f} of {all:.0f} runs give no uncertainties of their readings: theirs come from the "

@@ -349,7 +349,6 @@ def test_one_odd_run_is_named_and_condemns_no_others():
     together = combine([*sound[:25], odd_run, *sound[25:]])
     assert together.verdict.changed == (25,)
     assert together.verdict.describes
-    assert [remark.values[:2] for remark in together.remarks if remark.kind == "changed"] == [(26, 41)]
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.7])

@@ -431,6 +431,8 @@ def test_a_doubt_is_a_warning_at_the_line_that_asked_so_that_a_loop_notices_it(n
     with pytest.warns(DoubtWarning, match=r"the spin is about .* Hz, a Levitron spins at 20 to 60 Hz") as seen:
         levilab.analyze((T, 60 * names["f"]))
     assert [Path(one.filename).name for one in seen] == [Path(__file__).name]
+    with pytest.warns(DoubtWarning, match="no law describes the readings: they rise by"):
+        levilab.analyze((T, names["f"] + 3 * (np.arange(T.size) > T.size / 2)))
 
 
 def test_a_setting_without_effect_is_a_warning_at_the_line_that_gave_it():

@@ -20,7 +20,7 @@ from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.figure import _finding as finding_of
 from levilab.pipelines.spindown.figure import spindown_figure
 from levilab.pipelines.spindown.readings import read_spin_file
-from levilab.pipelines.spindown.report import spindown_part, spindown_tables
+from levilab.pipelines.spindown.report import meaning, spindown_part, spindown_tables
 from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Tabular
 from levilab.runs.run import Run
@@ -229,6 +229,26 @@ def test_a_run_whose_unit_is_in_doubt_stays_out_of_the_means(four, sample_data, 
     assert both.combined.fit("disc").constants == four.combined.fit("disc").constants
     assert len(both.runs) == len(four.runs) + 1
     assert any("my" in warning for warning in both.about_all())
+
+
+def test_a_run_that_no_law_describes_is_named_and_in_no_verdict_and_no_mean(tmp_path):
+    good = [spin_down_csv(tmp_path / f"{k}.csv", seed=k) for k in (1, 2)]
+    alone = SPINDOWN.analyze(good)
+    for many in (1, 3):  # most of the runs, too
+        odd = [spin_down_csv(tmp_path / f"odd{k}.csv", seed=k, jump=3.0) for k in range(many)]
+        found = SPINDOWN.analyze([*odd, *good])
+        assert found.combined == alone.combined
+        assert (found.text, meaning(found)) == (alone.text, meaning(alone))
+        assert found.budget == alone.budget != ()
+        assert all(
+            re.match(r"odd\d.csv: no law describes the readings: they rise by 3.* Hz", one) for one in found.doubts
+        )
+        assert len(found.doubts) == many
+        assert "verdict and means leave out odd0.csv" in " ".join(found.about_all())
+        assert finding_of(found).startswith("Spin-down of 2 runs: ")
+        assert spindown_figure(found).axes[2].get_ylim()[1] < 1  # of readings less the law
+    (doubt,) = SPINDOWN.analyze(odd[:1]).doubts
+    assert in_language(doubt, "de").startswith("kein Gesetz beschreibt die Messwerte: Sie steigen zwischen ")
 
 
 def test_a_speed_without_unit_may_be_in_hertz_or_turns_per_minute(tmp_path):

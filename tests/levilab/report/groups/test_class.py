@@ -452,6 +452,20 @@ def test_tables_without_u_and_with_fewer_readings_in_the_same_time_are_good(tmp_
     ]
 
 
+def test_a_group_whose_readings_no_law_describes_repeats_and_is_in_no_mean(tmp_path):
+    for seed in (1, 2, 3):
+        spin_down_csv(tmp_path / f"Ben {seed}.csv", seed=seed)
+    good = compared(tmp_path)
+    spin_down_csv(tmp_path / "Anna.csv", jump=3.0)
+    of = compared(tmp_path)
+    assert [one.word for one in of.marks] == [REPEAT, GOOD, GOOD, GOOD]
+    assert of.marks[0].why[0].startswith("no law describes the readings: they rise by ")
+    assert [one.mean for one in of.quantities] == [one.mean for one in good.quantities]
+    page = Page(write_class([tmp_path], tmp_path / "class.html").read_text(encoding="utf-8")).text
+    assert "3 of 4 results are good. To repeat: Anna.csv." in page
+    assert "Anna.csv repeat no law describes the readings" in page
+
+
 def test_a_table_that_was_analyzed_without_doubtful_rows_is_not_called_unusable(tmp_path):
     table = tmp_path / "a.csv"
     table.write_text("t in s,f in Hz\n" + "".join(f"{10 * k},{40 - k}\n" for k in range(12)) + "130,2l\n", "utf-8")
