@@ -293,8 +293,8 @@ def analyze(
         camera_m: its distance from the base, with base_m or rim_m, and height_m, here of the rim [m] (video).
         beside: the camera is beside the top, at its height (video).
         stem_m: height of a light dot on the stem above the rim [m] (video).
-        start_s: time in the film from which the top floats [s] (video).
-        stop_s: time until which [s] (video).
+        start_s: time from which readings count, or the top of a film floats [s] (spindown, video).
+        stop_s: time until which [s] (spindown, video).
         line_time_s: from a row of the sensor to the next one [s] (video).
 
     Returns:

@@ -144,6 +144,14 @@ _HEIGHT = _about(
     "Height at which the top floats; with a scan its moment follows, if its mass is known.  Of the rim, with --camera.",
     kind=float, metavar="MM", typed="height", unit="mm", factor=1e-3, above=0.0,
 )  # fmt: skip
+_START = _about(
+    "Time from which readings count, or from which the top of a film floats.",
+    kind=float, metavar="S", typed="start", unit="s", low=0.0,
+)  # fmt: skip
+_STOP = _about(
+    "Time until which readings count, or until which the top of a film floats.",
+    kind=float, metavar="S", typed="stop", unit="s", above=0.0,
+)  # fmt: skip
 _CLOCK_U = _about(
     "Relative standard uncertainty of the clock that counts or samples, as 2e-6, from its manual; the budgets show "
     "what it does, it is in no u.",
@@ -205,6 +213,8 @@ class SpinDownOptions(RecordOptions):
     between: tuple[float, float] | None = field(default=None, metadata=_about(
         "Fit only the readings between two spins, as 30:24.", metavar="HZ:HZ", unit="Hz", read=_read_between,
     ))  # fmt: skip
+    start_s: float | None = field(default=None, metadata=_START)
+    stop_s: float | None = field(default=None, metadata=_STOP)
     laws: tuple[str, ...] | None = field(default=None, metadata=_about(
         'Fit only these drag laws, as "disc,stokes".', metavar="LAW,…", default_text="all", read=_read_laws,
     ))  # fmt: skip
@@ -330,12 +340,8 @@ class VideoOptions(InputOptions):
     ))  # fmt: skip
     stem_m: float | None = _length("Height above the rim of a light dot on the stem, which shows the tilt.", "stem")
     height_m: float | None = field(default=None, metadata=_HEIGHT)
-    start_s: float | None = field(default=None, metadata=_about(
-        "Time in the film from which the top floats.", kind=float, metavar="S", typed="start", unit="s", low=0.0,
-    ))  # fmt: skip
-    stop_s: float | None = field(default=None, metadata=_about(
-        "Time in the film until which it floats.", kind=float, metavar="S", typed="stop", unit="s", above=0.0,
-    ))  # fmt: skip
+    start_s: float | None = field(default=None, metadata=_START)
+    stop_s: float | None = field(default=None, metadata=_STOP)
     line_time_s: float | None = field(default=None, metadata=_about(
         "Rolling shutter: µs from a row of the picture to the next.",
         kind=float, metavar="US", typed="line_time", unit="us", factor=1e-6, low=0.0, high=1e-3,

@@ -77,7 +77,7 @@ def read_run_readings(run: "Run", options: "InputOptions") -> SpinReadings:
     readings = replace(
         spin_readings(run.readings()), release=release_of(run.events()), upright=run.record.world == "spin"
     )
-    return _between(readings, options, run.folder)
+    return _part(readings, options, run.folder)
 
 
 def release_of(events: "Iterable[Mapping[str, Any]]") -> Release | None:
@@ -104,30 +104,51 @@ def read_spin_file(path: "Path", options: "InputOptions") -> SpinReadings:
     readings = field_readings(path, field, options) if field else _read_pulses_or_table(path, options)
     if options.near is not None and not field:
         readings = replace(readings, warnings=(*readings.warnings, Note("near", NEAR_UNUSED, weight="advice")))
-    return _between(readings, options, path)
+    return _part(readings, options, path)
 
 
-def _between(readings: SpinReadings, options: "InputOptions", path: "Path") -> SpinReadings:
-    """Return the readings between the two spins of the option, with a note on the rest.  Raises DataError: too few."""
-    ends = getattr(options, "between", None)
-    if ends is None:
-        return readings
-    low, high = ends
-    inside = np.flatnonzero((readings.frequency >= low) & (readings.frequency <= high))
+def _part(readings: SpinReadings, options: "InputOptions", path: "Path") -> SpinReadings:
+    """Return the readings between the times and the spins of the options, with notes on the rest.
+
+    Raises DataError: too few.
+    """
+    spins, start, stop = (getattr(options, name, None) for name in ("between", "start_s", "stop_s"))
+    if start is not None or stop is not None:
+        low, high = readings.time[[0, -1]]
+        ends = (low if start is None else start, high if stop is None else stop)
+        readings = _between(readings, readings.time, ends, ("s", "`start`, `stop`"), path)
+    return readings if spins is None else _between(readings, readings.frequency, spins, ("Hz", "`between`"), path)
+
+
+def _between(
+    readings: SpinReadings,
+    values: "NDArray[np.float64]",
+    ends: tuple[float, float],
+    unit_and_options: tuple[str, str],
+    path: "Path",
+) -> SpinReadings:
+    """Return the readings whose values lie between two ends, in the unit of options, with a note on the rest."""
+    (low, high), (unit, options) = ends, unit_and_options
+    inside = np.flatnonzero((values >= low) & (values <= high))
     if inside.size < FEWEST:
         said = (
-            "{path:s}: {n} of {readings} between {low:g} Hz and {high:g} Hz are too few, at least {fewest} are needed: "
-            "the spin goes from {first:.4g} Hz to {last:.4g} Hz, choose `between` in it"
+            "{path:s}: {n} of {readings} between {low:g} {unit:s} and {high:g} {unit:s} are too few, at least {fewest} "
+            "are needed: they go from {first:.4g} {unit:s} to {last:.4g} {unit:s}, choose {options:s} in it"
         )
-        first, last = readings.frequency[[0, -1]]
+        first, last = values[[0, -1]]
         all_of_them = how_many(len(readings), "reading")
-        raise DataError(said, path, inside.size, all_of_them, low, high, FEWEST, first, last)
+        raise DataError(
+            said, path, inside.size, all_of_them, low, high, FEWEST, first, last, unit=unit, options=options
+        )
     part = slice(inside[0], inside[-1] + 1)
     u = None if readings.u is None else readings.u[part]
     kept = replace(readings, time=readings.time[part], frequency=readings.frequency[part], u=u)
-    said = "only the {n} of {all} readings between {low:g} Hz and {high:g} Hz are fitted, as asked; the others are not"
-    note = Note("between", Text(said, len(kept), len(readings), low, high), weight="advice")
-    return replace(kept, warnings=(*readings.warnings, note))
+    said = (
+        "only the {n} of {all} readings between {low:g} {unit:s} and {high:g} {unit:s} are fitted, as asked; the "
+        "others are not"
+    )
+    text = Text(said, len(kept), len(readings), low, high, unit=unit)
+    return replace(kept, warnings=(*readings.warnings, Note("between", text, weight="advice")))
 
 
 def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings:

@@ -121,6 +121,17 @@ def test_readings_between_two_spins_are_fitted_and_the_result_says_so(tmp_path):
             read_options({"between": wrong})
 
 
+def test_readings_between_two_times_are_fitted_as_of_a_top_that_was_spun_again(tmp_path):
+    path = spin_down_csv(tmp_path / "a.csv")
+    (whole,) = SPINDOWN.analyze([path], SpinDownOptions(tilt="none")).runs
+    start, stop = whole.time[3], whole.time[-2]
+    part = SPINDOWN.analyze([path], SpinDownOptions(tilt="none", **read_options({"start_s": start, "stop_s": stop})))
+    np.testing.assert_array_equal(part.runs[0].time, whole.time[3:-1])
+    assert any(f"between {start:g} s and {stop:g} s are fitted" in text for text in part.all_warnings)
+    with pytest.raises(DataError, match="choose `start`, `stop` in it"):
+        SPINDOWN.analyze([path], SpinDownOptions(start_s=1e4))
+
+
 def test_the_laws_that_are_asked_for_are_fitted_and_the_others_have_no_numbers(tmp_path):
     path = spin_down_csv(tmp_path / "a.csv")
     found = SPINDOWN.analyze(
