@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from levilab.formats.columns import Column, DoubtfulRows, TableError, shorten
+from levilab.formats.columns import SHORTHANDS, Column, DoubtfulRows, TableError, shorten
 from levilab.formats.dialect import (
     CLOCK,
     MISSING,
@@ -32,7 +32,7 @@ from levilab.formats.dialect import (
 )
 from levilab.formats.layout import CONTROL, Layout
 from levilab.formats.texts import Text
-from levilab.formats.titles import dimension, is_unit, read_title, unit_factor
+from levilab.formats.titles import are_hours, dimension, is_unit, read_title, unit_factor
 from levilab.formats.transposed import LIES
 from levilab.texts.note import Note
 from levilab.texts.text import Text as Said
@@ -223,7 +223,7 @@ def _read_lines(
     refused = refused if lines else [*remarks[:1], *refused]
     notes += _notes_on_refused(refused, len(lines), skip=skip_doubtful, may_skip=not drop_unended)
     notes += _notes_on_remarks(remarks, len(lines) + len(refused))
-    return Rows(numbers, np.array(lines, np.int64), (*notes, *_doubts_about(time)))
+    return Rows(numbers, np.array(lines, np.int64), (*notes, *_doubts_about(time, layout, chosen, numbers)))
 
 
 def _notes_on_refused(
@@ -350,12 +350,38 @@ def _clocks(
     return times
 
 
-def _doubts_about(time: str) -> Iterator[str]:
-    """Yield the doubt about a first time: a stopwatch begins at 0:00 or so, hours and minutes of a clock do not."""
-    minutes = re.fullmatch(r"(\d{1,2}):\d\d", time)
-    if minutes and int(minutes[1]):
-        text = "the times, as {t:s}, are taken for minutes and seconds; of a clock write the seconds, too: {t:s}:00"
-        yield Note("clock", Said(text, time))
+#: A time that may be hours and minutes, or minutes and seconds.
+_TWO_PARTS = re.compile(r"(\d{1,2}):\d\d")
+
+
+def _doubts_about(
+    first: str, layout: Layout, chosen: Sequence[Column], numbers: "Sequence[NDArray[np.float64]]"
+) -> Iterator[str]:
+    """Yield the doubt about times of two parts: a stopwatch begins at 0:00 or so, hours and minutes of a clock do not.
+
+    Args:
+        first: text of the first time.
+        layout: of the table.
+        chosen: its columns.
+        numbers: of each column, shape (n,) [its unit].
+    """
+    found = _TWO_PARTS.fullmatch(first)
+    k = next((k for k, column in enumerate(chosen) if column.name == "time_s"), 0)
+    if not found or chosen[k].unit not in {"", "s"}:
+        return
+    hours, begins_at_0 = bool(are_hours(chosen[k].label, "")), not int(found[1])
+    if hours != begins_at_0 or (not hours and float(np.nanmax(numbers[k])) >= _DAY_S / 60):
+        return
+    keys = {name: key for key, name in SHORTHANDS.items()}
+    others = [one for one in chosen if not (layout.header or one.behind or one is chosen[k])]
+    also = "".join(f",{keys.get(one.name, one.name)}={one.index + 1} [{one.unit}]" for one in others)
+    says = [f"t={chosen[k].index + 1} [{unit}]{also}" for unit in ("hh:mm", "mm:ss")]
+    kinds = Said("hours and minutes"), Said("minutes and seconds")
+    said = (
+        'the times, as {t:s}, are taken for {taken} and may be {other}: say which, `columns` = "{hours:s}" or '
+        '"{minutes:s}"'
+    )
+    yield Note("clock", Said(said, first, *(kinds if hours else kinds[::-1]), *says), weight="doubt")
 
 
 def _row(path: Path, layout: Layout, chosen: Sequence[Column], line: int, text: str) -> list[float]:
@@ -405,7 +431,8 @@ def _number(path: Path, layout: Layout, column: Column, line: int, cell: str) ->
         return _number_with_unit(path, layout, column, line, cell)
     if column.name == "time_s":
         with contextlib.suppress(ValueError):
-            return clock_time(text, month_first=layout.dialect.month_first) / column.factor
+            minutes = _TWO_PARTS.fullmatch(text) and are_hours(column.label, column.unit)
+            return clock_time(f"{text}:00" if minutes else text, month_first=layout.dialect.month_first) / column.factor
     if text == UNVALUED:
         what = "column '{label:s}' holds a formula without its value: open the file in Excel or LibreOffice, save it"
         raise TableError(path, what, shorten(column.label), line=line)

@@ -22,6 +22,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
         "ms": 1e-3, "msec": 1e-3, "milliseconds": 1e-3, "millisekunden": 1e-3, "μs": 1e-6, "us": 1e-6, "ns": 1e-9,
         **dict.fromkeys(("min", "minute", "minutes", "minuten", "minuto", "minutos", "minut", "minuter"), 60),
         "h": 3600, **dict.fromkeys(("mm:ss", "m:ss", "min:s", "min:sec", "hh:mm:ss", "h:mm:ss", "h:min:s"), 1),
+        **dict.fromkeys(("hh:mm", "h:mm", "h:min"), 1),  # of a clock, whose times are read to seconds
     },
     "frequency": {
         "Hz": 1, "hertz": 1, "kHz": 1e3, "MHz": 1e6, "mHz": 1e-3, "μHz": 1e-6, "1/s": 1, "rps": 1, "U/s": 1,
@@ -65,7 +66,8 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
         "time", "t", "zeit", "elapsed", "elapsed_time", "timestamp", "seconds", "sekunden", "milliseconds", "minutes",
         "ms", "millis", "micros", "x_value", "clock", "uhrzeit", "temps", "tiempo", "tempo", "tid", "laufzeit",
         "messzeit", "gesamtzeit", "zeitpunkt", "zeitstempel", "ts", "datetime", "epoch", "heure",
-        "datum/uhrzeit", "date/time", "hora", "tidpunkt", "secondes", "segundos", "sekunder")),
+        "datum/uhrzeit", "date/time", "hora", "time_of_day", "tageszeit", "tidpunkt", "secondes", "segundos",
+        "sekunder")),
     "spin_frequency_hz": ("frequency", (
         "spin_frequency", "f", "freq", "frequency", "frequenz", "nu", "ν", "nu3", "ν3", "f3", "ν_3", "nu_3", "f_3",
         "spin", "spin_freq", "f_spin", "rotation_frequency", "rotation", "drehfrequenz", "hz", "hertz", "rpm", "rad/s",
@@ -138,6 +140,21 @@ COMPANION_FORMS = (
     "δ_{}",
     *(form for word in UNCERTAINTIES for form in (f"{word}_{{}}", f"{{}}_{word}")),
 )
+
+
+#: A title that means the time of day.
+_OF_DAY = re.compile(r"(?i)(?<!stopp)uhr|(?<!stop)clock|time.of.day|tageszeit|heure|hora\b|date|datum|fecha|klocka")
+
+
+def are_hours(title: str, unit: str) -> bool | None:
+    """Return whether times as 14:05 are hours and minutes by the unit or the title; None where neither says.
+
+    >>> are_hours("Uhrzeit", ""), are_hours("t", "min"), are_hours("Zeit", "hh:mm"), are_hours("Zeit", "s")
+    (True, False, True, None)
+    """
+    if unit in {"", "s"}:
+        return True if _OF_DAY.search(title) else None
+    return plain_unit(unit) in {"hh:mm", "h:mm", "h:min", "h"}
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from levilab.texts.text import Text, text_of
 
 #: Quantities that a column may hold, as text, and the units to choose from.
 QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = MappingProxyType({
-    "time_s": ("time", ("s", "ms", "min", "h")),
+    "time_s": ("time", ("s", "ms", "min", "h", "hh:mm", "mm:ss")),
     "spin_frequency_hz": ("spin frequency", ("Hz", "rpm", "rad/s", "°/s", "kHz", "mHz")),
     "spin_frequency_u_hz": ("u of the spin frequency", ("Hz", "rpm", "rad/s", "°/s", "kHz", "mHz")),
     "drive_frequency_hz": ("drive frequency", ("Hz", "rpm", "rad/s")),

@@ -40,7 +40,7 @@ from levilab.pipelines.spin.readings import track_of_record
 from levilab.pipelines.spin.words import NEAR_UNUSED, finding_text, finding_weight
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run
-from levilab.texts.note import Note, of_file
+from levilab.texts.note import Note, is_doubt, of_file
 from levilab.texts.text import Text, how_many, text_of
 
 #: Columns of a table that are looked at.
@@ -286,7 +286,9 @@ def spin_readings(table: Table) -> SpinReadings:
     except AnalysisError as error:
         raise _in_the_file(table, error) from error
     doubts = _doubts(table, time, frequency)
-    return SpinReadings(time, frequency, u, (*doubts, *table.warnings), doubtful=bool(doubts))
+    return SpinReadings(
+        time, frequency, u, (*doubts, *table.warnings), doubtful=any(map(is_doubt, [*doubts, *table.warnings]))
+    )
 
 
 def _without_rest(table: Table) -> Table:

@@ -22,6 +22,7 @@ from levilab.formats.rows import FEW, _read_at_once, _read_lines
 from levilab.formats.table import ColumnsError, parse_columns, read_run_readings, read_table
 from levilab.formats.texts import Text
 from levilab.formats.titles import read_title, unit_factor
+from levilab.texts.note import is_doubt
 from levilab.texts.text import in_language
 
 T, F, U = "time_s", "spin_frequency_hz", "spin_frequency_u_hz"
@@ -165,10 +166,31 @@ def test_a_table_reads_the_same_in_every_dialect(name, write):
 
 def test_times_of_hours_and_minutes_are_doubted(write):
     """A stopwatch begins at 0 minutes, as in the tables above; 14:05 and 14:06 may be a minute apart."""
-    table = read_table(write("time,f\n14:05,61.5\n14:06,61.25\n14:07,61\n"))
+    path = write("time,f\n14:05,61.5\n14:06,61.25\n14:07,61\n")
+    table = read_table(path)
     np.testing.assert_allclose(table.column(T), [845, 846, 847])
     (warning,) = table.warnings
-    assert "the times, as 14:05, are taken for minutes and seconds" in warning
+    said = "the times, as 14:05, are taken for minutes and seconds and may be hours and minutes: say which, `columns` ="
+    assert f'{said} "t=1 [hh:mm]" or "t=1 [mm:ss]"' in warning
+    assert is_doubt(warning)
+    for unit, step in (("hh:mm", 60), ("mm:ss", 1)):
+        table = read_table(path, columns={"t": f"1 [{unit}]"})
+        assert (np.diff(table.column(T)).tolist(), table.warnings) == ([step, step], ())
+
+
+@pytest.mark.parametrize(
+    ("title", "first", "step", "doubts"),
+    [("Uhrzeit", 14, 60, 0), ("Datum/Uhrzeit", 14, 60, 0), ("time of day", 9, 60, 0), ("Heure", 14, 60, 0),
+     ("Zeit [hh:mm]", 0, 60, 0), ("t [min]", 14, 1, 0), ("Uhrzeit", 0, 60, 1), ("t", 0, 1, 0), ("t", 24, 1, 0)],
+)  # fmt: skip
+def test_a_title_that_means_the_time_of_day_makes_hours_and_minutes(write, title, first, step, doubts):
+    table = read_table(write(f"{title},f [Hz]\n{first}:05,61.5\n{first}:06,61.25\n{first}:07,61\n"))
+    assert (np.diff(table.column(T)).round(9).tolist(), sum(map(is_doubt, table.warnings))) == ([step, step], doubts)
+
+
+def test_hours_and_minutes_go_on_beyond_midnight(write):
+    table = read_table(write("Uhrzeit,f [Hz]\n23:59,61.5\n0:00,61.25\n0:01,61\n"))
+    assert np.diff(table.column(T)).tolist() == [60, 60]
 
 
 @pytest.mark.parametrize(("text", "says"), [

@@ -14,6 +14,7 @@ from levilab.pipelines.options import SpinDownOptions, read_options
 from levilab.pipelines.spindown.document import SPINDOWN
 from levilab.pipelines.spindown.readings import read_spin_file, spin_readings
 from levilab.pipelines.spindown.words import TILT_ALLOWED, is_seen
+from levilab.texts.note import is_doubt
 from support.spin_downs import spin_down_csv
 
 HEADER = "time_s,spin_frequency_hz,spin_frequency_u_hz\n"
@@ -96,6 +97,12 @@ def test_a_count_that_ends_at_twice_the_lower_limit_is_doubted(first, last, asks
     assert (readings.doubtful, "f=NAME [1/2s]" in " ".join(readings.warnings)) == (asks, asks)
     halved = read_table(tmp_path / "data.csv", columns={"f": "f [1/2s]"})
     assert halved.column("spin_frequency_hz")[-1] == last / 2
+
+
+@pytest.mark.parametrize(("title", "doubtful"), [("t", True), ("Uhrzeit", False), ("t [mm:ss]", False)])
+def test_times_that_may_be_of_a_clock_keep_a_run_out_of_means(title, doubtful, tmp_path):
+    readings = spin_readings(table_of(tmp_path, f"{title},f\n14:05,38\n14:06,35.5\n14:07,33.2\n"))
+    assert (readings.doubtful, any(map(is_doubt, readings.warnings))) == (doubtful, doubtful)
 
 
 def test_spins_with_which_no_top_floats_are_doubted(tmp_path):
