@@ -464,7 +464,10 @@ def _stated_unit(path: Path, name: str, unit: str) -> str:
     if turns and is_total(unit):
         return TOTAL
     if not (_is_unit_of(unit, name) or (turns and unit_factor(unit, "time"))):
-        of_turns = ", s and ms of a turn, turns in 10 s, turns since the start as turns" if turns else ""
+        said = (
+            ", s and ms of a turn, turns in 10 s, with two marks a turn 1/2s and 1/2min, turns since the start as turns"
+        )
+        of_turns = said if turns else ""
         what = "`columns`: '{unit:s}' is no unit of {kind}; known are {known:s}{of_turns}"
         raise TableError(path, what, shorten(unit), kind, ", ".join(_units_once(kind)), of_turns)
     return unit

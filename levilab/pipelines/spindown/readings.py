@@ -22,6 +22,7 @@ from analysis.spindown.tilt import Release
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import SHORTHANDS, NoTable, TableError
 from levilab.formats.table import FEWEST, Table, read_table, refuse
+from levilab.formats.titles import PER_MINUTE
 from levilab.formats.understanding import (
     LEAST_FALL,
     is_possible_loss,
@@ -338,11 +339,19 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
     if first > FASTEST_BY_HAND_HZ and _LOWEST_FALL_HZ < last / 2 < FALLS_BETWEEN_HZ[0]:
         doubt = Text(
             "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz: is each turn counted twice? No hand starts a "
-            "top so fast, and it falls at {half:.3g} Hz; f=NAME [1/2s] halves the numbers",
-            name=table.path.name, first=first, last=last, half=last / 2,
+            'top so fast, and it falls at {half:.3g} Hz{say}',
+            name=table.path.name, first=first, last=last, half=last / 2, say=_say_half(table),
         )  # fmt: skip
         return [_doubt(doubt)]
     return []
+
+
+def _say_half(table: Table) -> str:
+    """Return the advice to take half of the unit of the spin; nothing for periods."""
+    factor, n = table.factors.get("spin_frequency_hz"), table.numbers.get("spin_frequency_hz")
+    per, unit = (PER_MINUTE, "min") if factor == PER_MINUTE else (1, "s")
+    said = '; `columns` = "f={n} [1/{length:g}{unit:s}]" halves the numbers'
+    return Text(said, n, 2 * per / factor, unit) if factor and n else ""
 
 
 def _say_unit(table: Table, key: Literal["t", "f"], units: Mapping[str, str]) -> str:

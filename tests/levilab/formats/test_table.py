@@ -450,7 +450,10 @@ def test_what_is_nearly_a_reading_is_reported_with_what_to_do(text, columns, say
     [
         ({}, "no unit: turns in 10 s (40 to 38 Hz), rad/s (63.7 to 60.5 Hz), rpm or Hz?"),
         ({}, '`columns` = "t=1,f=2 [UNIT]"'),
-        ({"t": "1", "f": "2 [foo]"}, "krpm, s and ms of a turn, turns in 10 s"),
+        (
+            {"t": "1", "f": "2 [foo]"},
+            "krpm, s and ms of a turn, turns in 10 s, with two marks a turn 1/2s and 1/2min, turns",
+        ),
     ],
 )
 def test_counts_between_readings_are_turns_in_that_time_if_so_told(columns, says, write):

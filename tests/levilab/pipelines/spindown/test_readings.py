@@ -1,5 +1,7 @@
 """What a spin-down's table must fulfil, and the error if it does not."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -94,9 +96,21 @@ def test_points_behind_thousands_are_named_where_they_pass_for_decimals(tmp_path
 )
 def test_a_count_that_ends_at_twice_the_lower_limit_is_doubted(first, last, asks, tmp_path):
     readings = spin_readings(table_of(tmp_path, f"t,f\n0,{first}\n90,{(first + last) / 2}\n180,{last}\n"))
-    assert (readings.doubtful, "f=NAME [1/2s]" in " ".join(readings.warnings)) == (asks, asks)
+    assert (readings.doubtful, '"f=2 [1/2s]"' in " ".join(readings.warnings)) == (asks, asks)
     halved = read_table(tmp_path / "data.csv", columns={"f": "f [1/2s]"})
     assert halved.column("spin_frequency_hz")[-1] == last / 2
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("Hz", 1), ("rpm", 60), ("1/min", 60), ("rad/s", 2 * np.pi), ("kHz", 1e-3)]
+)
+def test_half_of_a_unit_is_named_as_the_column_has_it(unit, factor, tmp_path):
+    rows = f"t [s],f [{unit}]\n0,{76 * factor}\n90,{60 * factor}\n180,{44 * factor}\n"
+    (doubt,) = spin_readings(table_of(tmp_path, rows)).warnings
+    said = re.search(r'`columns` = "f=2 (\[1/.+\])" halves the numbers', doubt)
+    assert said
+    halved = read_table(tmp_path / "data.csv", columns={"f": f"f {said[1]}"})
+    assert halved.column("spin_frequency_hz").round(3).tolist() == [38, 30, 22]
 
 
 @pytest.mark.parametrize(("title", "doubtful"), [("t", True), ("Uhrzeit", False), ("t [mm:ss]", False)])
