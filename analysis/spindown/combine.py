@@ -17,7 +17,7 @@ from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown, comparison_remarks
 from analysis.spindown.joint import JointExponent, joint_exponent
 from analysis.spindown.lawfit import LawFit
-from analysis.spindown.selection import NO_FIT, Statistics, statistics, weigh
+from analysis.spindown.selection import NO_FIT, Statistics, find_failed, statistics, weigh
 from analysis.spindown.verdict import Verdict, verdict
 from analysis.uncertainty import Estimate, Mean, mean, student
 
@@ -95,11 +95,14 @@ def combine(runs: Sequence[SpinDown]) -> Combined:
     if not names:
         raise NothingToCombine(runs=len(runs))
     joint = joint_exponent(runs)
-    weighed, criterion = weigh({name: _statistics(runs, name, joint) for name in names})
+    of_runs = ({name: run.fit(name).statistics for name in names} for run in runs)
+    failed = set[str]().union(*map(find_failed, of_runs, (run.frequency for run in runs)))
+    failed = failed if len(failed) < len(names) else set()
+    weighed, criterion = weigh({name: _statistics(runs, name, joint) for name in names}, failed)
     correlation = _correlation(runs)
     fits = tuple(_combine_law(name, [run.fit(name) for run in runs], weighed[name]) for name in names)
     changes = tuple(1.0 if run.verdict.change is None else run.verdict.change.p for run in runs)
-    decision = runs[0].verdict if len(runs) == 1 else verdict(weighed, criterion, changes=changes)
+    decision = runs[0].verdict if len(runs) == 1 else verdict(weighed, criterion, changes=changes, failed=failed)
     mixed = 0 < sum(run.u is None for run in runs) < len(runs)
     said = [
         *comparison_remarks(weighed, decision.best, correlation, mixed=mixed),

@@ -15,7 +15,7 @@ from analysis.spindown.drag import LAWS, DragLaw, power_law
 from analysis.spindown.lawfit import LawFit, Solution, fit_law, solution
 from analysis.spindown.posterior import INDEPENDENT, RHO
 from analysis.spindown.readings import Readings, check_readings
-from analysis.spindown.selection import NO_FIT, Statistics, weigh
+from analysis.spindown.selection import NO_FIT, Statistics, find_failed, weigh
 from analysis.spindown.tilt import THESIS_TOP, Release, Top
 from analysis.spindown.verdict import Verdict, verdict
 from analysis.uncertainty import FEW_LEFT, ROUNDING, Estimate, student
@@ -163,7 +163,9 @@ def fit_spin_down(
     while True:
         readings = given if keep_outliers or not len(outliers) else given.without(outliers)
         found = {name: model.fit(LAWS[name], readings) for name in chosen}
-        stats, criterion = weigh({name: each.statistics for name, each in found.items()})
+        of_fits = {name: each.statistics for name, each in found.items()}
+        failed = find_failed(of_fits, readings.frequency)
+        stats, criterion = weigh(of_fits, failed)
         fits = {name: fit_law(each, gate) for name, each in found.items()}
         best = next(iter(stats))
         agree = _agree(given, outliers, fits[best], stats[best])
@@ -171,7 +173,7 @@ def fit_spin_down(
             break
         outliers = outliers[~agree]
     change = _change(found[best], found.get("power"))
-    decision = verdict(stats, criterion, change=change)
+    decision = verdict(stats, criterion, change=change, failed=failed)
     best = decision.best
     return SpinDown(
         fits=tuple(replace(fits[name], statistics=stats[name]) for name in chosen),

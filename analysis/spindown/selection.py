@@ -4,12 +4,13 @@ Source: Burnham & Anderson, Model Selection and Multimodel Inference (2002): AIC
 difference means §2.6.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
+from analysis.arrays import Array
 from analysis.spindown.posterior import STATED_FREEDOM
 
 NO_FIT = 1e-3  # a χ² less probable than this: the law, or the stated uncertainty, is wrong
@@ -103,14 +104,27 @@ def statistics(
     )
 
 
-def weigh(fits: Mapping[str, Statistics]) -> tuple[dict[str, Statistics], Criterion]:
+def find_failed(fits: Mapping[str, Statistics], frequency: Array) -> frozenset[str]:
+    """Return the laws whose fit is worse than a constant, and twice as bad as that of another law.
+
+    Args:
+        fits: statistics by the law's name.
+        frequency: readings that were fitted, shape (n,) [Hz].
+    """
+    most = max(float(np.std(frequency)), 2 * min(fit.rms_residual for fit in fits.values()))
+    return frozenset(name for name, fit in fits.items() if fit.rms_residual > most)
+
+
+def weigh(fits: Mapping[str, Statistics], failed: Collection[str] = ()) -> tuple[dict[str, Statistics], Criterion]:
     """Return the statistics with differences and Akaike weights, best law first, and the criterion that decided.
 
+    Laws whose fit failed have neither.
     AICc where any law has one, else BIC, else the rms residual; with the latter two there are no weights.
     """
     criteria: tuple[Criterion, ...] = ("aicc", "bic", "rms_residual")
-    chosen = next(c for c in criteria if any(getattr(fit, c) is not None for fit in fits.values()))
-    values = {name: value for name, fit in fits.items() if (value := getattr(fit, chosen)) is not None}
+    fitted = {name: fit for name, fit in fits.items() if name not in failed}
+    chosen = next(c for c in criteria if any(getattr(fit, c) is not None for fit in fitted.values()))
+    values = {name: value for name, fit in fitted.items() if (value := getattr(fit, chosen)) is not None}
     least = min(values.values())
     total = sum(float(np.exp((least - value) / 2)) for value in values.values())
     weighed = {}

@@ -4,7 +4,7 @@ A law is excluded by a fit that is worse, never by the number of its constants: 
 them is only more than is needed.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from analysis.residuals import Change
@@ -51,6 +51,7 @@ def verdict(
     *,
     change: Change | None = None,
     changes: tuple[float, ...] = (),
+    failed: Collection[str] = (),
 ) -> Verdict:
     """Return what the readings say about the laws.
 
@@ -59,10 +60,11 @@ def verdict(
         criterion: by which.
         change: the most improbable one about the law with the smallest criterion, of one run.
         changes: probabilities of the most improbable change in each of several runs.
+        failed: names of laws whose fit failed: they are excluded.
     """
     first = next(iter(fits))
     telling = criterion == "aicc" or (criterion == "bic" and fits[first].sigma_known)
-    kinds = {name: _kind(fits, name, first) if telling else "tied" for name in fits}
+    kinds = {name: _kind(fits, name, first) if telling else "tied" for name in fits} | dict.fromkeys(failed, "excluded")
     listed = {k: tuple(n for n in fits if kinds[n] == k) for k in ("tied", "needless", "weak", "excluded")}
     listed["tied"] = tuple(sorted(listed["tied"], key=lambda name: fits[name].n_parameters))
     probabilities = changes or ((change.p,) if change else ())

@@ -285,7 +285,7 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
         axes.plot(t, difference, linewidth=1.3, zorder=2.6, **LOOKS[name].as_line)
         where = "" if np.abs(difference).max() <= most else Text(", to {hz:n} Hz", hz=_with_sign(difference))
         shaded = ", 2 u shaded" if name == best and u is not None else ""
-        said = _note(analysis, name) or "not excluded"
+        said = _note(analysis, name) or ("not excluded" if analysis.combined.verdict.describes else "no fit")
         text = Text("{law}: {said}{shaded}{where}", law=short_law(name), said=said, shaded=shaded, where=where)
         ends.append((float(difference[-1]), name, text))
     _name_laws(axes, [end for end in ends if math.isfinite(end[0])])

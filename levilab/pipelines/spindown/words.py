@@ -237,6 +237,7 @@ def _verdict(
         )  # fmt: skip
         advice = "Let the top fall further, or read it more often."
     misses = [Text("{rms:n} Hz", rms=digits(stats[name].rms_residual)) for name in said.excluded]
+    misses = misses[:1] if len(set(misses)) == 1 else misses
     excluded = Text(
         "The readings exclude {laws}, off by {rms} (rms); {law} is off by {least:n} Hz.",
         laws=law_names(said.excluded), rms=enumeration(misses or [""]), law=law, least=digits(best.rms_residual),
@@ -271,7 +272,7 @@ def _constants(of: Mapping[str, Estimate]) -> str:
     if len(known) != 1 or len(of) != 1:
         return enumeration(texts) if texts else ""
     (one,) = known.values()
-    percent = digits(100 * (one.u or 0.0) / abs(one.value or 1.0), 2)
+    percent = digits(100 * float(f"{one.u or 0.0:.2g}") / abs(one.value or 1.0), 2)  # as u is shown
     return Text("{constant}, known to {percent:n} %", constant=texts[0], percent=percent)
 
 

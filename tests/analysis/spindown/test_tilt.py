@@ -372,6 +372,17 @@ def test_a_wave_about_a_law_is_no_noise():
     assert not fit_spin_down(t, usual + 0.5 * np.sin(t / 12), 0.01, tilt=False).verdict.describes
 
 
+def test_a_fit_that_is_worse_than_a_constant_is_excluded_and_not_the_best():
+    t, c = np.linspace(0, 179, 30), 2.5e-4
+    again = spin("disc", t, 38.0, c), spin("disc", t - 100, spin("disc", np.array([100.0]), 38.0, c)[0] + 6, c)
+    y = np.where(t > 100, *again[::-1]) + np.random.default_rng(9).normal(0, 5e-3, 30)
+    run = fit_spin_down(np.round(t, 3), np.round(y, 4))
+    assert run.fit("mixed").statistics.rms_residual > np.std(y)
+    for verdict in (run.verdict, combine([run, run]).verdict):
+        assert (verdict.best, verdict.describes) == ("newton", False)
+        assert "mixed" in verdict.excluded
+
+
 BADLY = [("newton", "disc", 200, 1e-3), ("disc", "mixed", 200, 1e-4), ("disc", "newton", 60, 1e-5)]
 
 

@@ -82,6 +82,18 @@ def test_the_report_begins_with_the_constant_and_its_u(tmp_path):
     assert SYMBOLS["c32"] not in none
 
 
+def test_numbers_that_are_shown_fit_each_other_and_one_that_laws_share_is_shown_once(tmp_path):
+    analysis = undecided(tmp_path)
+    found = analysis.combined
+    means = {"c32": replace(found.fit("disc").constants["c32"], value=2.3e-4, u=2.249e-6)}
+    fits = [replace(fit, statistics=replace(fit.statistics, rms_residual=0.27)) for fit in found.fits]
+    fits = tuple(replace(fit, constants=means) if fit.name == "disc" else fit for fit in fits)
+    decided = replace(found.verdict, decided=True, excluded=("stokes", "newton"))
+    text = replace(analysis, combined=replace(found, fits=fits, verdict=decided)).text
+    assert "2.300(22)×10⁻⁴ (rad/s)^−½/s, known to 0.96 %." in text
+    assert "The readings exclude Stokes and Newton, off by 0.27 Hz (rms);" in text
+
+
 def result_of(analysis):
     section = blocks_of_part(ANALYSES["spindown"], analysis, spindown_part(analysis), Asked(crosscheck=False))[0]
     return section.blocks
