@@ -1,6 +1,6 @@
 """Clean a trace: remove hum of the mains and a wandering baseline, and find times without a signal."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +31,8 @@ SINGLE = 2.5
 OWN = 1.5
 #: Least height of hum in a third of the record over that in all of it.
 STAYS = 0.6
+#: Places of a turn at which the mean over turns is taken.
+PROFILE = 128
 #: Length of the pieces that hum is fitted to [s]; they overlap by half.
 PIECE = 1.0
 #: The baseline is the median of blocks of this length [s]; it wanders if it leaves this many standard errors.
@@ -108,6 +110,58 @@ def name_lines(notes: Iterable[Finding], lines: Lines, fit: Fit, duration: float
     rest = tuple(line for line in lines if line not in near)
     named = [*([_hum(rest)] if rest else []), *([_hum(near, "harmonic")] if near else [])]
     return tuple(one for note in notes for one in (named if note.name == "hum" else [note]))
+
+
+def hum_beside_pulses(bins: Array, times: Array, fit: Fit, lines: Lines) -> Callable[[Array], Array] | None:
+    """Return hum against time [s] that moves the phase of the pulses, by least squares; None: no line can.
+
+    Those beside a multiple of half the spin: at an odd one hum moves every second pulse. Hum that stays in step with
+    a harmonic is a part of the pulse; what turns against it is not. The profile of the pulse, the motion and the change
+    of the height are fitted with it. Hum is no greater than the trace moves, and strays from its frequency.
+
+    bins: of the trace, and their times [s], shape (n,); fit: their phase; lines: which `clean` removed, nearly.
+    """
+    half, duration = fit.times(0.5), float(times[-1])
+    multiples = [(mains, k) for mains in MAINS for k in range(1, int(HIGHEST / mains) + 1)]
+    places = [
+        (next((place for place, _ in lines if abs(place - k * mains) < k * STRAYS), k * mains), k)
+        for mains, k in multiples
+    ]
+    near = np.array(sorted({place: k for place, k in places if _harmonic(place, half, duration)}.items()))
+    if not near.size:
+        return None
+    frequencies, strays = near.T
+    phase = fit.phase(times)
+    cell = ((phase - np.floor(phase)) * PROFILE).astype(np.intp)
+    counts = np.maximum(np.bincount(cell, minlength=PROFILE), 1)
+
+    def profile(values: Array) -> Array:
+        return np.asarray(np.bincount(cell, values, PROFILE) / counts)
+
+    shape = profile(bins)
+    slope = (np.roll(shape, -1) - np.roll(shape, 1))[cell]
+    u = (times - fit.centre) / fit.half
+
+    angle = 2 * np.pi * np.outer(frequencies, times)
+    plain = np.concatenate([np.cos(angle), np.sin(angle)])
+    waves = np.concatenate([plain, plain * u])
+    rows = np.array([*waves, slope * u, slope * u**2, slope * u**3, (shape[cell] - shape.mean()) * u])
+    rows = rows - np.array([profile(row)[cell] for row in rows])
+    turned = (2 * np.pi * STRAYS * fit.half * strays) ** 2 / 3  # hum strays evenly up to there, and its phase by this
+    widths = float(bins.var()) * np.repeat([turned**0, turned], 2, axis=0).ravel()
+    prior = np.concatenate([noise_of(bins) ** 2 / widths, np.zeros(4)])
+    along = rows @ (bins - shape[cell])
+    found = np.linalg.lstsq(rows @ rows.T + np.diag(prior), along)[0][: widths.size]
+    cosines, sines = found.reshape(2, 2, -1).transpose(1, 0, 2)
+
+    def hum(clock: Array) -> Array:
+        away, total = (clock - fit.centre) / fit.half, np.zeros(clock.size)
+        for frequency, amplitudes in zip(frequencies, (cosines - 1j * sines).T, strict=True):
+            amplitude = amplitudes[0] + away * amplitudes[1]
+            total += (amplitude * np.exp(2j * np.pi * frequency * clock)).real
+        return total
+
+    return hum
 
 
 def _without_pulse_lines(lines: Lines, bins: Array, rate: float) -> Lines:

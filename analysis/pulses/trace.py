@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.arrays import Array
 from analysis.errors import NotPositive, ShapesDiffer
 from analysis.pulses import traps
-from analysis.pulses.clean import Clean, clean, name_lines
+from analysis.pulses.clean import Clean, clean, hum_beside_pulses, name_lines
 from analysis.pulses.edges import Edges, place_edges
 from analysis.pulses.errors import OnlyHum, TooFewPulses
 from analysis.pulses.likelihood import search
-from analysis.pulses.matched import Match, match, window_of
+from analysis.pulses.matched import Match, Window, match, window_of
 from analysis.pulses.regression import Fit, Grid, fit_turns, median
 from analysis.pulses.result import Finding, Method, SpinFrequency
 from analysis.pulses.search import Events, find_events, shorten
@@ -50,6 +50,8 @@ MOST_DOUBLINGS = 2
 SAME = 0.1
 #: With fewer samples a turn, a line at 1/k of the frequency or beyond half the rate leaves samples that look the same.
 COARSE = 12.0
+#: Hum and the phase that it moves are fitted in turn until a frequency moves by less than this part of its u.
+HUM_ROUNDS, SETTLED = 8, 0.1
 #: Standard deviations between every second pulse and the others from which on they are two marks.
 APART = 4.0
 
@@ -115,7 +117,7 @@ class Trace:
     def __init__(self, cleaned: Clean, rate: float, degree: int | None = None, times: Array | None = None) -> None:
         self.times = times
         self.samples, self.bins, self.bad = cleaned.samples, cleaned.bins, cleaned.bad
-        self.notes, self.degree = cleaned.notes, degree
+        self.notes, self.lines, self.degree = cleaned.notes, cleaned.lines, degree
         self.rate, self.bin_rate = rate, rate / (self.samples.size // self.bins.size)
 
     @cached_property
@@ -156,6 +158,13 @@ class Trace:
             return shorten(self.times, self.samples.size // self.bins.size)
         return (np.arange(self.bins.size, dtype=np.float64) + 0.5) / self.bin_rate - 0.5 / self.rate
 
+    @property
+    def whole(self) -> NDArray[np.bool_]:
+        """Which bins have all their samples, shape (n,)."""
+        if self.bad is None:
+            return np.ones(self.bins.size, dtype=bool)
+        return np.asarray(shorten(self.bad.astype(np.float64), self.samples.size // self.bins.size) == 0)
+
     def too_few(self, seen: int) -> TooFewPulses:
         """Return the error of a trace without enough pulses."""
         return TooFewPulses(seen=seen, needed=FEWEST, duration=self.duration)
@@ -165,7 +174,25 @@ class Trace:
         window = window_of(self.bins, fit.phase(self.middles))
         if window is None:
             return None
-        return match(self.samples, self.rate, fit, window, bad=self.bad, degree=self.degree, clock=self.times)
+        found = self._match_in_window(self.samples, fit, window)
+        if found is None:
+            return None
+        for _ in range(HUM_ROUNDS):
+            hum = hum_beside_pulses(self.bins[self.whole], self.middles[self.whole], found.fit, self.lines)
+            if hum is None:
+                break
+            clock = np.arange(self.samples.size) / self.rate if self.times is None else self.times
+            better = self._match_in_window(self.samples - hum(clock), found.fit, window)
+            if better is None:
+                return None
+            moved = abs(better.fit.middle_frequency - found.fit.middle_frequency) * found.fit.half
+            found = replace(better, flat=found.flat)
+            if moved < SETTLED * float(np.sqrt(found.fit.covariance[1, 1])):
+                break
+        return found
+
+    def _match_in_window(self, samples: Array, fit: Fit, window: Window) -> Match | None:
+        return match(samples, self.rate, fit, window, bad=self.bad, degree=self.degree, clock=self.times)
 
 
 @dataclass(frozen=True)

@@ -173,6 +173,31 @@ def test_a_line_beside_a_multiple_of_the_mains_is_no_hum(spin):
     assert "hum" not in names(spin_of_trace(samples, RATE))
 
 
+def coil(spin, rate, seed, duration=2.0):
+    """Sound of a coil with hum; frequency in the middle."""
+    random = np.random.default_rng(seed)
+    away = np.arange(round(duration * rate)) / rate - duration / 2
+    turns = 2 * np.pi * (spin * away - 0.05 * away**2 + random.uniform())
+    hum = 0.05 * np.sin(2 * np.pi * 50.01 * away + random.uniform(0, 6))
+    return 0.3 * np.sin(turns) + 0.05 * np.sin(2 * turns + 1) + hum + 0.02 * random.standard_normal(away.size)
+
+
+@pytest.mark.parametrize("spin", [16.6, 24.8, 24.9, 25.2])
+@pytest.mark.parametrize("duration", [1.0, 2.0])
+def test_hum_beside_a_harmonic_of_the_spin_does_not_move_it(spin, duration):
+    pulls = []
+    for seed in range(12):
+        found = spin_of_trace(coil(spin, RATE, seed, duration), RATE).at(duration / 2)
+        pulls.append((found.value - spin) / found.u)
+    assert np.sqrt(np.mean(np.square(pulls))) < 1.61  # 3 standard errors of it from 12
+
+
+def test_hum_at_three_halves_of_the_spin_makes_no_second_mark():
+    for spin in (33.1, 33.3, 33.5):
+        for seed in range(4):
+            assert spin_of_trace(coil(spin, 8000, seed), 8000).frequency.value == pytest.approx(spin, abs=0.01)
+
+
 def test_a_line_at_a_harmonic_of_the_spin_may_be_that_harmonic():
     samples = light(50.02 * TIME) + np.sin(2 * np.pi * 50.02 * TIME)
     assert "harmonic" in {note.of for note in spin_of_trace(samples + noise(), RATE).notes if note.name == "hum"}
