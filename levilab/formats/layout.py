@@ -267,19 +267,30 @@ def _above_rows(lines: Iterator[Line], width: int, numeric: Sequence[int]) -> tu
 def _header(above: list[Line], width: int) -> int | None:
     """Find the header among the lines above the rows: known titles count, then the width, then nearness.
 
-    A row of units is not it, unless there is nothing else.
+    A row of units is not it, unless there is nothing else; sentences are not.
     """
-    texts = [i for i, line in enumerate(above) if line.is_text]
+    texts = [i for i, line in enumerate(above) if line.is_text and not _is_sentence(line.fields, width)]
     titles = [i for i in texts if not all(is_unit(field) for field in above[i].fields if field)] or texts
     known = {i: known_titles(above[i].fields) for i in titles}
     likely = [i for i in titles if known[i] or above[i].filled_count >= width]
     return max(likely, key=lambda i: (known[i] > 1, above[i].filled_count >= width, known[i], i), default=None)
 
 
+#: A word before a comma, as blanks separate it, or before the end of a sentence.
+_SENTENCE = re.compile(r"\w{2,}(?:,\s|[.!?](?:\s+[^\W\d_a-z]|\s*$))")
+
+
+def _is_sentence(fields: Sequence[str], width: int) -> bool:
+    """Return whether fields are a sentence: more than two words a column, of which titles are fewer than half."""
+    text, bare = " ".join(fields), [field.strip(",.;:") for field in fields]
+    few = 2 * known_titles(bare) < filled_count(fields)
+    return bool(_SENTENCE.search(text)) and len(text.split()) > 2 * width and few
+
+
 def _without_results(line: Line, width: int) -> Line:
     """Return a line of titles without the numbers that stand beside the table, as a mean does in a spreadsheet."""
     own = Line(line.number, line.fields[:width], line.kinds[:width])
-    return own if own.is_text and not line.is_text else line
+    return own if own.is_text and not line.is_text and not _is_sentence(line.fields, width) else line
 
 
 def _with_all_titles(

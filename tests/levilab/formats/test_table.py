@@ -188,6 +188,25 @@ def test_a_title_that_means_the_time_of_day_makes_hours_and_minutes(write, title
     assert (np.diff(table.column(T)).round(9).tolist(), sum(map(is_doubt, table.warnings))) == ([step, step], doubts)
 
 
+@pytest.mark.parametrize("text", [
+    "Levitron, Tuesday. Top 25 g, room 22 C\n0  61.5 Hz\n0.5  61.25 Hz\n1  61 Hz\n",
+    "Levitron Tuesday. Top 25 g\n0:00  61.5 Hz\n0:00.5  61.25 Hz\n0:01  61 Hz\n",
+    "We spun it by hand, then let go.\n0 61.5\n0.5 61.25\n1 61\n",
+    "Levitron, Tuesday. Top 25 g\n0,61.5\n0.5,61.25\n1,61\n",
+])  # fmt: skip
+def test_a_sentence_above_a_table_is_no_header(write, text):
+    table = read_table(write(text))
+    assert {name: values.tolist() for name, values in table.columns.items()} == SECONDS | {T: [0, 0.5, 1]}
+    assert any("no header; the columns are taken as time_s, spin_frequency_hz" in note for note in table.warnings)
+
+
+def test_titles_with_a_comma_or_a_point_are_no_sentence(write):
+    table = read_table(write("Zeit, Drehzahl [Hz]\n0 61.5\n0.5 61.25\n1 61\n"))
+    assert table.column(F).tolist() == [61.5, 61.25, 61]
+    with pytest.raises(NoSuchColumn, match="no title is known"):
+        read_table(write("Umg. Temp.;Luftf. Mittel\n20;61.5\n21;61.25\n22;61\n"))
+
+
 def test_hours_and_minutes_go_on_beyond_midnight(write):
     table = read_table(write("Uhrzeit,f [Hz]\n23:59,61.5\n0:00,61.25\n0:01,61\n"))
     assert np.diff(table.column(T)).tolist() == [60, 60]
