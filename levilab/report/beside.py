@@ -401,8 +401,13 @@ def count_marks(of: Class) -> str:
     good = len(named[GOOD])
     said = "{n} of {all} results is good." if good == 1 else "{n} of {all} results are good."
     texts: list[str] = [Text(said, n=good, all=len(of.groups) + len(of.unread))]
-    texts += [Text("To repeat: {names}.", names=enumeration(named[REPEAT]))] if named[REPEAT] else []
-    return Sentences(*texts, *([Text("To look at: {names}.", names=enumeration(named[LOOK]))] if named[LOOK] else []))
+    texts += [Text("To repeat: {names}.", names=_list_names(named[REPEAT]))] if named[REPEAT] else []
+    return Sentences(*texts, *([Text("To look at: {names}.", names=_list_names(named[LOOK]))] if named[LOOK] else []))
+
+
+def _list_names(names: Sequence[str]) -> str:
+    """Return names as a list in a sentence, with semicolons where a name has a comma, as that of a group's file."""
+    return "; ".join(names) if any(", " in name for name in names) else enumeration(names)
 
 
 #: Below it chance does not make groups differ so much.

@@ -123,12 +123,13 @@ def _left_out(results: Results) -> tuple[dict[Path, str], str]:
     """Return why inputs that can hold readings were not used, and a sentence about all other files."""
     said = (
         "{file}: a table whose columns are not certain, which no search reads: `levilab open {typed}` asks for them, "
-        "and with --keep keeps the answer"
+        "and keeps an answer with --columns and --keep"
     )
     used = {source.path for _, found in results for source in found.sources}
+    workbooks = {locate(path)[0] for path in used}  # of which sheets are read
     skipped = dict.fromkeys(one for _, found in results for one in found.skipped)  # not all analyses search all folders
     unread = {one.path: one.reason for one in skipped if isinstance(one, Skipped) and one.path}
-    left_out = [one for one in skipped if isinstance(one, LeftOut) and one.path not in used]
+    left_out = [one for one in skipped if isinstance(one, LeftOut) and one.path not in used | workbooks]
     for folder in [path for path in unread if path.is_dir() and not (path / RECORD).exists()]:
         if files := data_files(folder):  # each has its own reason
             left_out += [LeftOut(file, kind_of_unused(file)) for file in files]

@@ -8,6 +8,7 @@ from html import escape
 
 import numpy as np
 import pytest
+import xlsxwriter
 from python_calamine import CalamineWorkbook
 from scipy import stats
 
@@ -464,6 +465,25 @@ def test_a_group_whose_readings_no_law_describes_repeats_and_is_in_no_mean(tmp_p
     page = Page(write_class([tmp_path], tmp_path / "class.html").read_text(encoding="utf-8")).text
     assert "3 of 4 results are good. To repeat: Anna.csv." in page
     assert "Anna.csv repeat no law describes the readings" in page
+
+
+def test_sheets_that_are_read_leave_no_workbook_unread_and_names_with_commas_stay_apart(tmp_path):
+    for group in ("Eva", "Fay"):
+        (tmp_path / group).mkdir()
+    spin_down_csv(tmp_path / "Eva" / "a.csv", u=False)
+    (tmp_path / "Eva" / "b.csv").write_bytes(b"")
+    (tmp_path / "Fay" / "c.csv").write_bytes(b"")
+    with xlsxwriter.Workbook(tmp_path / "Fay" / "1.xlsx") as book:
+        for name, seed in (("Run A", 2), ("Run B", 3)):
+            path = spin_down_csv(tmp_path / "made.csv", u=False, seed=seed)
+            for k, row in enumerate(path.read_text("utf-8").splitlines()):
+                sheet = book.get_worksheet_by_name(name) or book.add_worksheet(name)
+                sheet.write_row(k, 0, [float(cell) if k else cell for cell in row.split(",")])
+    path.unlink()
+    shutil.copy(SAMPLE_DATA / "scope-files" / "recording.wav", tmp_path)
+    page = Page(write_class([tmp_path], tmp_path / "class.html").read_text("utf-8")).text
+    assert "1.xlsx repeat" not in page
+    assert "To repeat: Eva, b.csv; Fay, c.csv." in page
 
 
 def test_a_table_that_was_analyzed_without_doubtful_rows_is_not_called_unusable(tmp_path):
