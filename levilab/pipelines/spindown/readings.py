@@ -50,6 +50,8 @@ QUANTITIES = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 WINDOW_S = 2.0
 #: No top falls below this: the published limits are 21.86 Hz, less five times their scatter [Hz].
 _LOWEST_FALL_HZ = 20.6
+#: A first time above this, three years, counts from 1970; as dates, such times count from the first reading [s].
+_SINCE_1970_S = 1e8
 _NAMED = "{name:s}: {text}"
 
 
@@ -286,6 +288,7 @@ def spin_readings(table: Table) -> SpinReadings:
         check_readings(time, frequency, u)
     except AnalysisError as error:
         raise _in_the_file(table, error) from error
+    time = time - time[0] if time[0] > _SINCE_1970_S else time
     doubts = _doubts(table, time, frequency)
     return SpinReadings(
         time, frequency, u, (*doubts, *table.warnings), doubtful=any(map(is_doubt, [*doubts, *table.warnings]))

@@ -119,6 +119,11 @@ def test_times_that_may_be_of_a_clock_keep_a_run_out_of_means(title, doubtful, t
     assert (readings.doubtful, any(map(is_doubt, readings.warnings))) == (doubtful, doubtful)
 
 
+def test_times_since_1970_count_from_the_first_reading(tmp_path):
+    rows = "".join(f"{1764000000 + k:.1f},{38 - k / 10}\n" for k in range(0, 60, 20))
+    assert spin_readings(table_of(tmp_path, f"t,f\n{rows}")).time.tolist() == [0, 20, 40]
+
+
 def test_spins_with_which_no_top_floats_are_doubted(tmp_path):
     readings = spin_readings(table_of(tmp_path, "t,f\n0,19\n90,13.5\n180,10.5\n"))  # each second turn was counted
     assert readings.doubtful
