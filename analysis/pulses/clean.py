@@ -112,6 +112,37 @@ def name_lines(notes: Iterable[Finding], lines: Lines, fit: Fit, duration: float
     return tuple(one for note in notes for one in (named if note.name == "hum" else [note]))
 
 
+def without_rest_of_hum(
+    samples: Array,
+    rate: float,
+    bins: Array,
+    fit: Fit,
+    lines: Lines,
+    *,
+    times: Array,
+    counted: Mask,
+    clock: Array | None,
+) -> tuple[Array, Array]:
+    """Return samples and bins less the hum that `clean` left in them, as pulses leak into the pieces it is fitted to.
+
+    fit: the phase of the pulses; times: of the bins [s]; counted: which of them have all their samples; clock: times of
+    the samples, where they are uneven; the others as of `clean`.
+    """
+    cell = _cells(fit, times)
+    turn = _mean_turn(bins, cell)[cell]
+    samples, rest = _without_hum(samples, rate, bins - turn, counted, [place for place, _ in lines], times=clock)
+    return samples, rest + turn
+
+
+def _cells(fit: Fit, times: Array) -> NDArray[np.intp]:
+    phase = fit.phase(times)
+    return ((phase - np.floor(phase)) * PROFILE).astype(np.intp)
+
+
+def _mean_turn(values: Array, cell: NDArray[np.intp]) -> Array:
+    return np.asarray(np.bincount(cell, values, PROFILE) / np.maximum(np.bincount(cell, minlength=PROFILE), 1))
+
+
 def hum_beside_pulses(bins: Array, times: Array, fit: Fit, lines: Lines) -> Callable[[Array], Array] | None:
     """Return hum against time [s] that moves the phase of the pulses, by least squares; None: no line can.
 
@@ -131,14 +162,8 @@ def hum_beside_pulses(bins: Array, times: Array, fit: Fit, lines: Lines) -> Call
     if not near.size:
         return None
     frequencies, strays = near.T
-    phase = fit.phase(times)
-    cell = ((phase - np.floor(phase)) * PROFILE).astype(np.intp)
-    counts = np.maximum(np.bincount(cell, minlength=PROFILE), 1)
-
-    def profile(values: Array) -> Array:
-        return np.asarray(np.bincount(cell, values, PROFILE) / counts)
-
-    shape = profile(bins)
+    cell = _cells(fit, times)
+    shape = _mean_turn(bins, cell)
     slope = (np.roll(shape, -1) - np.roll(shape, 1))[cell]
     u = (times - fit.centre) / fit.half
 
@@ -146,7 +171,7 @@ def hum_beside_pulses(bins: Array, times: Array, fit: Fit, lines: Lines) -> Call
     plain = np.concatenate([np.cos(angle), np.sin(angle)])
     waves = np.concatenate([plain, plain * u])
     rows = np.array([*waves, slope * u, slope * u**2, slope * u**3, (shape[cell] - shape.mean()) * u])
-    rows = rows - np.array([profile(row)[cell] for row in rows])
+    rows = rows - np.array([_mean_turn(row, cell)[cell] for row in rows])
     turned = (2 * np.pi * STRAYS * fit.half * strays) ** 2 / 3  # hum strays evenly up to there, and its phase by this
     widths = float(bins.var()) * np.repeat([turned**0, turned], 2, axis=0).ravel()
     prior = np.concatenate([noise_of(bins) ** 2 / widths, np.zeros(4)])

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.arrays import Array
 from analysis.errors import NotPositive, ShapesDiffer
 from analysis.pulses import traps
-from analysis.pulses.clean import Clean, clean, hum_beside_pulses, name_lines
+from analysis.pulses.clean import Clean, clean, hum_beside_pulses, name_lines, without_rest_of_hum
 from analysis.pulses.edges import Edges, place_edges
 from analysis.pulses.errors import OnlyHum, TooFewPulses
 from analysis.pulses.likelihood import search
@@ -177,12 +177,24 @@ class Trace:
         found = self._match_in_window(self.samples, fit, window)
         if found is None:
             return None
+        samples, bins = self.samples, self.bins
+        if self.lines:
+            samples, bins = without_rest_of_hum(
+                samples,
+                self.rate,
+                bins,
+                found.fit,
+                self.lines,
+                times=self.middles,
+                counted=self.whole,
+                clock=self.times,
+            )
         for _ in range(HUM_ROUNDS):
-            hum = hum_beside_pulses(self.bins[self.whole], self.middles[self.whole], found.fit, self.lines)
+            hum = hum_beside_pulses(bins[self.whole], self.middles[self.whole], found.fit, self.lines)
             if hum is None:
                 break
             clock = np.arange(self.samples.size) / self.rate if self.times is None else self.times
-            better = self._match_in_window(self.samples - hum(clock), found.fit, window)
+            better = self._match_in_window(samples - hum(clock), found.fit, window)
             if better is None:
                 return None
             moved = abs(better.fit.middle_frequency - found.fit.middle_frequency) * found.fit.half
