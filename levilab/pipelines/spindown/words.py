@@ -323,8 +323,8 @@ def doubts_about_law(run: SpinDown) -> Iterator[Note]:
     if change and not run.verdict.describes:
         said = Text(
             "no law describes the readings: they {way} by {hz:n} Hz beyond each law between {first:.4g} s and "
-            "{last:.4g} s, or bend there, as of a top that was spun again or touched. Fit a part, by `start` and `stop`, or leave it "
-            "out",
+            "{last:.4g} s, or bend there, as of a top that was spun again or touched. Fit a part, by `start` and "
+            "`stop`, or leave it out",
             way="rise" if change.size > 0 else "fall", hz=digits(abs(change.size)),
             first=float(run.time[change.first]), last=float(run.time[change.last]),
         )  # fmt: skip
