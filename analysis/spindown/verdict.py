@@ -12,7 +12,7 @@ from analysis.spindown.drag import LAWS
 from analysis.spindown.selection import Criterion, Statistics
 
 EXCLUDED, TIED = 10.0, 4.0  # differences of AICc, Burnham & Anderson (2002) §2.6
-#: Probability of a change in noise below which no law describes the readings.
+#: Probability of a change in noise below which no law describes the readings; of several runs, in any of them.
 CHANGED = 0.001
 
 
@@ -45,6 +45,11 @@ class Verdict:
     describes: bool = True
 
 
+def is_change(p: float, runs: int) -> bool:
+    """Return whether a change of probability p is more than noise makes in any of some runs (Bonferroni)."""
+    return p * runs < CHANGED
+
+
 def verdict(
     fits: Mapping[str, Statistics],
     criterion: Criterion,
@@ -68,7 +73,7 @@ def verdict(
     listed = {k: tuple(n for n in fits if kinds[n] == k) for k in ("tied", "needless", "weak", "excluded")}
     listed["tied"] = tuple(sorted(listed["tied"], key=lambda name: fits[name].n_parameters))
     probabilities = changes or ((change.p,) if change else ())
-    changed = tuple(k for k, p in enumerate(probabilities) if p < CHANGED)
+    changed = tuple(k for k, p in enumerate(probabilities) if is_change(p, len(probabilities)))
     describes = 2 * len(changed) <= len(probabilities) - (len(probabilities) == 1)
     simple = [name for name in (*listed["tied"], *listed["weak"]) if is_simple(name)]
     best = listed["tied"][0]

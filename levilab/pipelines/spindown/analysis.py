@@ -68,7 +68,7 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
 
     def about_run(self, run: SpinDown) -> Iterable[str]:
         """Return remarks on one run."""
-        return (*doubts_about_law(run), *map(remark, run.remarks), *self._of_laws(run.fits))
+        return (*doubts_about_law(run, len(self.runs)), *map(remark, run.remarks), *self._of_laws(run.fits))
 
     def _of_laws(self, fits: Iterable[LawFit | CombinedLaw]) -> Iterable[str]:
         excluded = self.combined.verdict.excluded  # what they lack is of no interest any more
@@ -125,5 +125,6 @@ def combine_sound(sources: Sequence[Source[SpinReadings]], runs: Sequence[SpinDo
 def take(sources: Sequence[Source[SpinReadings]], runs: Sequence[SpinDown]) -> list[bool]:
     """Return whether each run is taken: not one of a doubtful unit or that no law describes, unless every one is."""
     pairs = zip(sources, runs, strict=True)
-    sound = [run.verdict.describes and not source.readings.doubtful for source, run in pairs]
+    doubtful = (source.readings.doubtful or any(doubts_about_law(run, len(runs))) for source, run in pairs)
+    sound = [not one for one in doubtful]
     return sound if any(sound) else [True] * len(runs)

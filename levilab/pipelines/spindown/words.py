@@ -19,7 +19,7 @@ from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.fit import SpinDown
 from analysis.spindown.lawfit import LawFit
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
-from analysis.spindown.verdict import Verdict, is_simple
+from analysis.spindown.verdict import Verdict, is_change, is_simple
 from analysis.uncertainty import Estimate
 from levilab.pipelines.note import FEW_LEFT, Weighed, note_of
 from levilab.pipelines.row import Column, Quantity, columns_of, entry, estimate, statistic
@@ -317,10 +317,10 @@ TILT_ALLOWED = (
 )
 
 
-def doubts_about_law(run: SpinDown) -> Iterator[Note]:
-    """Yield that no law describes a run, and where it leaves them."""
+def doubts_about_law(run: SpinDown, runs: int) -> Iterator[Note]:
+    """Yield that no law describes a run, one of some, and where it leaves them."""
     change = run.verdict.change
-    if change and not run.verdict.describes:
+    if change and is_change(change.p, runs):
         said = Text(
             "no law describes the readings: they {way} by {hz:n} Hz beyond each law between {first:.4g} s and "
             "{last:.4g} s, or bend there, as of a top that was spun again or touched. Fit a part, by `start` and "

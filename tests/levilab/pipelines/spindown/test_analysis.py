@@ -5,6 +5,7 @@ import os
 import re
 import runpy
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,7 @@ from levilab.pipelines.spindown.figure import _finding as finding_of
 from levilab.pipelines.spindown.figure import spindown_figure
 from levilab.pipelines.spindown.readings import read_spin_file
 from levilab.pipelines.spindown.report import meaning, spindown_part, spindown_tables
+from levilab.pipelines.spindown.words import doubts_about_law
 from levilab.pipelines.suits import save
 from levilab.present.document.blocks import Tabular
 from levilab.runs.run import Run
@@ -249,6 +251,13 @@ def test_a_run_that_no_law_describes_is_named_and_in_no_verdict_and_no_mean(tmp_
         assert spindown_figure(found).axes[2].get_ylim()[1] < 1  # of readings less the law
     (doubt,) = SPINDOWN.analyze(odd[:1]).doubts
     assert in_language(doubt, "de").startswith("kein Gesetz beschreibt die Messwerte: Sie steigen zwischen ")
+
+
+def test_a_change_counts_once_for_each_run_beside_it(tmp_path):
+    runs = list(SPINDOWN.analyze([spin_down_csv(tmp_path / f"{k}.csv", seed=k) for k in range(3)]).runs)
+    change = replace(runs[0].verdict.change, p=5e-4)  # alone below 0.001, among three by chance
+    runs[0] = replace(runs[0], verdict=replace(runs[0].verdict, change=change))
+    assert [len([*doubts_about_law(runs[0], many)]) for many in (1, 3)] == [1, 0]
 
 
 def test_a_speed_without_unit_may_be_in_hertz_or_turns_per_minute(tmp_path):
