@@ -1,5 +1,6 @@
 """Clean a trace: remove hum of the mains and a wandering baseline, and find times without a signal."""
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
@@ -101,14 +102,21 @@ def _hum(lines: Lines, of: str = "") -> Finding:
     return Finding("hum", of, tuple(value for line in lines for value in line))
 
 
-def name_lines(notes: Iterable[Finding], lines: Lines, fit: Fit, duration: float) -> tuple[Finding, ...]:
+def name_lines(notes: Iterable[Finding], lines: Lines, fit: Fit, samples: Array, rate: float) -> tuple[Finding, ...]:
     """Return notes in which the lines of hum that may be harmonics of the pulses stand by themselves.
 
-    fit: the phase of the pulses, which is not known before hum is removed; duration: of the record [s].
+    A line beside the spin that is larger than all that is left may be that of the pulses.
+
+    fit: the phase of the pulses, which is not known before hum is removed; samples: what is left; rate: of them [1/s].
     """
-    near = tuple(line for line in lines if _harmonic(line[0], fit, duration))
-    rest = tuple(line for line in lines if line not in near)
-    named = [*([_hum(rest)] if rest else []), *([_hum(near, "harmonic")] if near else [])]
+    duration, left = samples.size / rate, math.sqrt(2) * float(np.nanstd(samples))
+    harmonics = {line: _harmonic(line[0], fit, duration) for line in lines}
+    kinds = {line: "spin" if k == 1 and line[1] > left else "harmonic" * bool(k) for line, k in harmonics.items()}
+    named = [
+        _hum(some, kind)
+        for kind in ("", "harmonic", "spin")
+        if (some := tuple(line for line in lines if kinds[line] == kind))
+    ]
     return tuple(one for note in notes for one in (named if note.name == "hum" else [note]))
 
 

@@ -104,7 +104,7 @@ def spin_of_trace(
         if cleaned.lines:
             raise OnlyHum(seen=error.seen, needed=error.needed, duration=error.duration) from None
         raise
-    named = name_lines(found.notes, cleaned.lines, found.match.fit, x.size / rate)
+    named = name_lines(found.notes, cleaned.lines, found.match.fit, cleaned.samples, rate)
     return _result(replace(found, notes=named), start, rate, degree)
 
 

@@ -11,7 +11,7 @@ from levilab.texts.note import Weight
 from levilab.texts.text import Text, how_many
 
 #: Findings that leave open which of several spins is the right one.
-_DOUBTS = frozenset({"fast", "fold-doubt"})
+_DOUBTS = frozenset({("fast", ""), ("fold-doubt", ""), ("hum", "spin")})
 #: About the option `near` where it has no effect.
 NEAR_UNUSED = "`near` is not used: only a magnetometer's samples and a film's pictures leave a choice of spins"
 
@@ -19,7 +19,7 @@ NEAR_UNUSED = "`near` is not used: only a magnetometer's samples and a film's pi
 def finding_weight(found: Finding) -> Weight:
     """Return the weight of a finding: a top that a drive left above 60 Hz is too fast in its first windows alone."""
     in_part = found.name == "fast" and bool(found.where) and found.where[1] < found.where[2]
-    return "doubt" if found.name in _DOUBTS and not in_part else "warning"
+    return "doubt" if (found.name, found.of) in _DOUBTS and not in_part else "warning"
 
 
 def finding_text(found: Finding, part: str = "window") -> str:
@@ -143,6 +143,10 @@ _SENTENCES: Mapping[tuple[str, str], str | Callable[..., str]] = MappingProxyTyp
     ("double", "place"): _double("is not half-way between its neighbours"),
     ("mains", ""): "the frequency is {hertz:g} Hz and stays: is it the mains (a lamp, hum), or a drive locked to them?",
     ("hum", ""): _hum,
+    ("hum", "spin"): partial(
+        _hum, said="{each} was taken off as hum of the mains, and less is left: is it the spin? Shield the coil, or "
+        "measure at another spin"
+    ),
     ("hum", "harmonic"): partial(_hum, said="{each} was taken off: hum of the mains, or a harmonic of the spin"),
     ("clipped", ""): "the tops of the pulses are flat: the detector or the converter is saturated",
     ("gap", ""): lambda seconds: Text("the signal is constant for {s:n} s in all", s=digits(seconds, 3)),

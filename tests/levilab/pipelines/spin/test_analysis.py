@@ -143,6 +143,14 @@ def test_a_spin_too_fast_for_a_hand_is_doubted(analysis, marks, doubts, tmp_path
     assert (len(found.doubts), len(said)) == (doubts, 1)
 
 
+def test_a_coil_whose_spin_is_taken_off_as_hum_is_doubted(tmp_path):
+    time = np.arange(16000) / 8000
+    volts = 0.3 * np.sin(2 * np.pi * 49.8 * time) + 0.05 * np.sin(4 * np.pi * 49.8 * time + 1)
+    np.savetxt(tmp_path / "coil.csv", np.column_stack([time, volts]), delimiter=",", header="time_s,voltage_v")
+    (doubt,) = SPIN.analyze([tmp_path / "coil.csv"]).doubts
+    assert "Hz was taken off as hum of the mains, and less is left: is it the spin?" in doubt
+
+
 def test_a_record_that_is_too_short_is_no_spin_down(sample_data):
     with pytest.raises(DoesNotSuit, match=r"lasts 0\.5 s, a spin-down needs 3 windows of 2 s"):
         SPINDOWN.analyze([sample_data / "scope-files" / "recording.wav"])
