@@ -24,19 +24,19 @@ UNLIKE = 0.18
 
 
 def collect_findings(of_each: Mapping[int, Iterable[Finding]], number: int) -> tuple[Finding, ...]:
-    """Return the findings of windows or records, each name once, with the first one that has it.
+    """Return the findings of windows or records, each kind once, with the first one that has it.
 
     of_each: number of the window or record, from 1 on → its findings; number: of them in all.
     """
-    first: dict[str, Finding] = {}
-    having: dict[str, list[int]] = {}
+    first: dict[tuple[str, str], Finding] = {}
+    having: dict[tuple[str, str], set[int]] = {}
     for k, findings in of_each.items():
         for one in findings:
-            first.setdefault(one.name, one)
-            having.setdefault(one.name, []).append(k)
+            first.setdefault((one.name, one.of), one)
+            having.setdefault((one.name, one.of), set()).add(k)
     if number == 1:
         return tuple(first.values())
-    return tuple(replace(one, where=(having[name][0], len(having[name]), number)) for name, one in first.items())
+    return tuple(replace(one, where=(min(having[kind]), len(having[kind]), number)) for kind, one in first.items())
 
 
 @dataclass(frozen=True, eq=False)

@@ -151,7 +151,7 @@ def _between(
         "others are not"
     )
     text = Text(said, len(kept), len(readings), low, high, unit=unit)
-    return replace(kept, warnings=(*readings.warnings, Note("between", text, weight="advice")))
+    return replace(kept, warnings=(*readings.warnings, Note("between", text)))
 
 
 def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings:

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from analysis.errors import NotPositive
-from analysis.pulses import phases, track_of_blocks, track_of_samples, track_of_times
+from analysis.pulses import Finding, phases, track_of_blocks, track_of_samples, track_of_times
 from analysis.pulses.errors import TooFewPulses
+from analysis.pulses.track import collect_findings
 
 RATE = 5000.0
 TIME = np.arange(round(70 * RATE)) / RATE
@@ -116,3 +117,14 @@ def test_records_without_pulses_and_wrong_windows_are_refused():
         track_of_blocks([np.zeros(20000)], RATE)
     with pytest.raises(NotPositive, match="window"):
         track_of_times(np.arange(100) / 30, window=0.0)
+
+
+def test_findings_of_windows_are_counted_by_window_and_kind():
+    hum, harmonic, missing = Finding("hum"), Finding("hum", "harmonic"), Finding("missing")
+    found = collect_findings({1: [hum, harmonic, hum], 2: [missing], 3: [hum]}, 3)
+    assert {(one.name, one.of): one.where for one in found} == {
+        ("hum", ""): (1, 2, 3),
+        ("hum", "harmonic"): (1, 1, 3),
+        ("missing", ""): (2, 1, 3),
+    }
+    assert [one.of for one in collect_findings({1: [hum, harmonic]}, 1)] == ["", "harmonic"]

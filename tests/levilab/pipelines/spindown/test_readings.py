@@ -153,7 +153,8 @@ def test_readings_between_two_times_are_fitted_as_of_a_top_that_was_spun_again(t
     start, stop = whole.time[3], whole.time[-2]
     part = SPINDOWN.analyze([path], SpinDownOptions(tilt="none", **read_options({"start_s": start, "stop_s": stop})))
     np.testing.assert_array_equal(part.runs[0].time, whole.time[3:-1])
-    assert any(f"between {start:g} s and {stop:g} s are fitted" in text for text in part.all_warnings)
+    (note,) = (text for text in part.all_warnings if f"between {start:g} s and {stop:g} s are fitted" in text)
+    assert note.weight == "warning"  # a class names it
     with pytest.raises(DataError, match="choose `start`, `stop` in it"):
         SPINDOWN.analyze([path], SpinDownOptions(start_s=1e4))
 
