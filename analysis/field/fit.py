@@ -369,7 +369,8 @@ class _Problem:
             shapes: of the standard deviations, shape (k, n).
         """
         n, k = len(known), len(shapes)
-        left = np.append(self.b - self.model(values), [(p.value - values[k]) / p.u for k, p in self.priors()])
+        pulls_of_priors = [(prior.value - values[index]) / prior.u for index, prior in self.priors()]
+        left = np.append(self.b - self.model(values), pulls_of_priors)
         slopes = self.weighted_slopes(values, np.ones(n))[self.indices]
         slopes = slopes / np.linalg.norm(slopes, axis=1, keepdims=True)
         size = math.hypot(float(np.sqrt(np.mean(left[:n] ** 2))), float(known.min()))

@@ -205,8 +205,8 @@ class _Smooth:
     Attributes:
         spin: [Hz].
         half: half the length of the film [s].
-        scales: standard deviations of the coefficients, shape (k, m); those of the `_FREE` first ones do not count, and
-            the last row is the widest.
+        scales: standard deviations of the coefficients, shape (k, m), in the first half without a kink; those of the
+            `_FREE` first ones do not count, and the last row is the widest.
         chances: of each row, relative, shape (k,).
     """
 

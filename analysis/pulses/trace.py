@@ -158,7 +158,12 @@ class Trace:
             return shorten(self.times, self.samples.size // self.bins.size)
         return (np.arange(self.bins.size, dtype=np.float64) + 0.5) / self.bin_rate - 0.5 / self.rate
 
-    @property
+    @cached_property
+    def clock(self) -> Array:
+        """Times of the samples since the first one, shape (n,) [s]."""
+        return np.arange(self.samples.size) / self.rate if self.times is None else self.times
+
+    @cached_property
     def whole(self) -> NDArray[np.bool_]:
         """Which bins have all their samples, shape (n,)."""
         if self.bad is None:
@@ -193,8 +198,7 @@ class Trace:
             hum = hum_beside_pulses(bins[self.whole], self.middles[self.whole], found.fit, self.lines)
             if hum is None:
                 break
-            clock = np.arange(self.samples.size) / self.rate if self.times is None else self.times
-            better = self._match_in_window(samples - hum(clock), found.fit, window)
+            better = self._match_in_window(samples - hum(self.clock), found.fit, window)
             if better is None:
                 return None
             moved = abs(better.fit.middle_frequency - found.fit.middle_frequency) * found.fit.half

@@ -1,4 +1,4 @@
-// How the search of the site ranks pages: first that which has the typed word in words.toml, then users' pages.
+// How the search of the site ranks pages: first the page whose row in words.toml has the typed word, then users' pages.
 // The weights are those of Sphinx (searchtools.js); `score` adds the page's own factor.
 /** What is typed in the letters of the index: indices and powers as plain digits, ⁄ as /. */
 var folded = (typed) => typed.normalize("NFKC").replaceAll("⁄", "/");

@@ -1,4 +1,4 @@
-"""Tables in the dress of what wrote them: Markdown, Arduino's monitor and plotter, a person's notes, LabVIEW, CASSY.
+"""Tables in the dress of their writer: Markdown, Arduino's monitor and plotter, a person's notes, LabVIEW, CASSY.
 
 Each is rewritten line by line, so that the n-th line stays the n-th, with tabs between the fields.
 """

@@ -12,7 +12,7 @@ from support.messages import QUOTED
 from support.paths import ROOT
 
 SITE = ROOT / "build/site"
-WORDS = tomllib.loads((ROOT / "docs/building/words.toml").read_text("utf-8"))
+ROWS = tomllib.loads((ROOT / "docs/building/words.toml").read_text("utf-8"))
 #: Page → what is typed, and it is the first.
 FIRST = {
     "phone": ("phyphox", "smartphone", "wifi", "Handy", "battery"),
@@ -99,7 +99,7 @@ def test_the_search_finds_what_people_type(search, page, words):
 def test_each_word_of_the_table_finds_its_page_first(search):
     first = "words => (history.replaceState(null, '', '?' + new URLSearchParams({q: words})),"
     first += "Search._performSearch(...Search._parseQuery(words)).at(-1)[0])"
-    typed = [(word, page) for page, words in WORDS.items() for word in " ".join(words.split()).split(", ")]
+    typed = [(word, page) for page, words in ROWS.items() for word in " ".join(words.split()).split(", ")]
     assert [(word, page) for word, page in typed if search.evaluate(first, word) != page] == []
 
 

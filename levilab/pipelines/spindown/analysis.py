@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import cached_property
 from itertools import compress
 
 from analysis.spindown.combine import Combined, CombinedLaw, combine
@@ -51,7 +52,7 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
         if any(run.has_tilt for run in self.runs) and not is_seen(self.combined.tilt):
             yield TILT_ALLOWED
 
-    @property
+    @cached_property
     def is_taken(self) -> list[bool]:
         """Whether verdict and means are of each run."""
         return take(self.sources, self.runs)

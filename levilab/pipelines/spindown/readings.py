@@ -119,19 +119,23 @@ def _part(readings: SpinReadings, options: "InputOptions", path: "Path") -> Spin
     if start is not None or stop is not None:
         low, high = readings.time[[0, -1]]
         ends = (low if start is None else start, high if stop is None else stop)
-        readings = _between(readings, readings.time, ends, ("s", "`start`, `stop`"), path)
-    return readings if spins is None else _between(readings, readings.frequency, spins, ("Hz", "`between`"), path)
+        readings = _between(readings, readings.time, ends, path, unit="s", options="`start`, `stop`")
+    if spins is not None:
+        readings = _between(readings, readings.frequency, spins, path, unit="Hz", options="`between`")
+    return readings
 
 
 def _between(
     readings: SpinReadings,
     values: "NDArray[np.float64]",
     ends: tuple[float, float],
-    unit_and_options: tuple[str, str],
     path: "Path",
+    *,
+    unit: str,
+    options: str,
 ) -> SpinReadings:
-    """Return the readings whose values lie between two ends, in the unit of options, with a note on the rest."""
-    (low, high), (unit, options) = ends, unit_and_options
+    """Return the readings whose values lie between two ends, in a unit, which options gave, with a note on the rest."""
+    low, high = ends
     inside = np.flatnonzero((values >= low) & (values <= high))
     if inside.size < FEWEST:
         said = (

@@ -229,7 +229,7 @@ def test_the_base_is_the_calliper_s_or_that_of_a_scan():
     assert scanned.geometry.of_base.value == pytest.approx(9.21, rel=5e-3)
     assert "radii" not in scanned.warnings[0]
     thesis = analyze(TRACK).runs[0]
-    # the calliper rules, and the scan adds a little to what it says of the radii
+    # the calliper rules, and the scan adds a little to its radii
     assert 0.8 < scanned.geometry.of_base.u / thesis.geometry.of_base.u < 1
     assert "radii" in thesis.warnings[0]
 
