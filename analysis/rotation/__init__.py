@@ -1,5 +1,6 @@
 """Spin frequency of a top from the magnetic field that its tilted moment turns past a magnetometer."""
 
+from analysis.rotation.record import rate_of
 from analysis.rotation.result import FieldSpin, Fold
 from analysis.rotation.spin import LineSamples, samples_of_line, spin_of_field
 from analysis.rotation.tilt import transverse_moment
@@ -11,6 +12,7 @@ __all__ = [
     "Flight",
     "Fold",
     "LineSamples",
+    "rate_of",
     "samples_of_line",
     "spin_of_field",
     "track_of_field",

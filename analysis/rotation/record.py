@@ -22,6 +22,8 @@ from analysis.errors import ShapesDiffer, TooFewReadings
 FEWEST, SHORTEST_S = 60, 0.5
 #: Distance of the spline's knots [s]: it follows what is slower than about 2 Hz, as the top's swings at 0.5 to 1.2 Hz.
 KNOTS_S = 0.25
+#: A step of the times from this length on is a gap, which is no part of the sampling [s].
+GAP_S = 0.5
 #: Frequencies of the mains [Hz], wherever they appear at the sampling rate.
 MAINS_HZ = (50.0, 60.0)
 #: Weight of the prior of the amplitudes: they are below ten times the standard deviation of a sample, noise included.
@@ -47,7 +49,7 @@ class Record:
         late: times from their mean on, shape (n,) [s].
         half: half the duration [s].
         middle: mean of the times [s].
-        rate: samples per second.
+        rate: samples per second, without gaps.
         field: without its mean, over `unit`, shape (n, k).
         unit: standard deviation of the differences of neighbours over √2, the greatest of the axes [T].
         late_of_half: `late` over `half`, shape (n,); `powers` its powers 0 to 3, shape (n, 4).
@@ -64,7 +66,7 @@ class Record:
         self.middle = float(times.mean())
         self.late = times - self.middle
         self.half = 0.5 * float(times[-1] - times[0])
-        self.rate = (times.size - 1) / (2 * self.half)
+        self.rate = rate_of(times)
         self.unit = max(float(np.max(deviation(np.diff(field, axis=0)))) / np.sqrt(2), 1e-300)
         self.field = (field - field.mean(axis=0)) / self.unit
         self.late_of_half = x = self.late / self.half
@@ -150,6 +152,13 @@ class Record:
 def deviation(columns: Array) -> Array:
     """Return the root mean square of each column, shape (k,): `std` of columns of mean 0, five times as fast."""
     return np.asarray(np.sqrt(np.einsum("ij,ij->j", columns, columns) / columns.shape[0]))
+
+
+def rate_of(times: Array) -> float:
+    """Return samples per second where there is no gap [1/s]."""
+    steps = np.diff(times)
+    even = steps[steps < GAP_S]
+    return even.size / float(even.sum()) if even.any() else steps.size / float(steps.sum())
 
 
 def read_samples(times: Any, field: Any) -> tuple[Array, Array]:

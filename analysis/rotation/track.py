@@ -13,7 +13,7 @@ from analysis.errors import AnalysisError
 from analysis.rotation.errors import NoLine
 from analysis.rotation.folds import Evidence, evidence_of, images_between, weigh
 from analysis.rotation.line import LineFit, fit_line
-from analysis.rotation.record import FEWEST, Line, Record, deviation, read_samples
+from analysis.rotation.record import FEWEST, Line, Record, deviation, rate_of, read_samples
 from analysis.rotation.result import FieldSpin, Kind
 from analysis.rotation.search import other_lines, refine
 from analysis.rotation.spin import LEAST_GAIN, limits_near, result_of, strongest
@@ -125,7 +125,7 @@ def track_of_field(times: ArrayLike, field: ArrayLike, *, near: float | None = N
     if not found:
         raise NoLine(lowest=low, highest=high, duration=float(t[-1] - t[0]), gain=0.0)
     starts = [k for k, one in enumerate(found) if not one.follows] + [len(found)]
-    rate = (t.size - 1) / float(t[-1] - t[0])
+    rate = rate_of(t)
     spins: list[FieldSpin] = []
     flights: list[Flight] = []
     for k, end in pairwise(starts):
@@ -147,7 +147,7 @@ def track_of_field(times: ArrayLike, field: ArrayLike, *, near: float | None = N
 def _find(t: Array, b: Array, cut: slice, low: float, high: float) -> _Window | None:
     """Return the strongest line in a window; None without one."""
     try:
-        record = Record(t[cut], b[cut])
+        record = Record(*read_samples(t[cut], b[cut]))
         return _Window(cut, record, strongest(record, low, high), follows=False)
     except AnalysisError:
         return None

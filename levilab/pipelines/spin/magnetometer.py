@@ -9,7 +9,7 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.pulses import Finding, SpinFrequency
-from analysis.rotation import FieldSpin, FieldTrack
+from analysis.rotation import FieldSpin, FieldTrack, rate_of
 from analysis.uncertainty import Estimate
 from levilab.formats.columns import TableError
 from levilab.formats.table import read_table
@@ -55,8 +55,8 @@ class FieldRecord:
 
     @property
     def rate(self) -> float:
-        """Samples per second."""
-        return (self.times.size - 1) / self.duration
+        """Samples per second, without gaps."""
+        return rate_of(self.times)
 
     @property
     def kind(self) -> str:

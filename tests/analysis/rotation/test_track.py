@@ -61,6 +61,15 @@ def test_a_jolt_at_the_fall_does_not_move_the_end_of_the_line(fresh):
     assert np.sqrt(np.mean(np.square(moved))) < 0.25  # half of a piece, in which a line keeps its phase
 
 
+@pytest.mark.parametrize("rate", [100.0, 50.0])
+def test_a_gap_longer_than_a_window_is_no_part_of_the_rate_and_of_the_track(fresh, rate):
+    times, field, spin = synthetic_flight(fresh, rate=rate, jitter=0.0)
+    there = (times < 55) | (times > 82)
+    track = track_of_field(times[there], field[there])
+    assert np.abs((track.frequency - np.interp(track.time, times, spin)) / track.u).max() < 4
+    assert [one.rate for one in track.spins] == pytest.approx([rate] * len(track.spins), rel=1e-3)
+
+
 def test_a_line_that_runs_through_half_the_rate_is_followed_there(fresh):
     track, pulls = follow(fresh, start_hz=57.0)
     assert np.abs(pulls).max() < 4
