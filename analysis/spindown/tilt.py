@@ -102,6 +102,7 @@ class Top:
         kappa, kappa_u: κ = 1 − I₁/I₃, and its standard uncertainty.
         beta, beta_u: β = B′²/(B B″) where the top floats.
         resonance_hz: ν_r [Hz]; a run that ends far above it ended before the fall.
+        disc_constant: C of a bare disc of its radius in laminar air [(rad/s)^-1/2/s], see `analysis.spindown.air`.
     """
 
     kappa: float = 0.4
@@ -109,6 +110,7 @@ class Top:
     beta: float = 3.3
     beta_u: float = 0.8
     resonance_hz: float = 22.0
+    disc_constant: float = 2.235e-4
 
 
 #: κ of PHYSICS.md §1, with moments of inertia good to 2 % each; Simon's three tops have it to 0.1.  β is 3.3 in the

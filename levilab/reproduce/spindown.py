@@ -13,6 +13,7 @@ import numpy as np
 
 from analysis.arrays import Array
 from analysis.numbers import digits
+from analysis.spindown.air import AIR_KG_M3, AIR_M2_S, disc_constant
 from analysis.spindown.fit import SpinDown, fit_spin_down
 from analysis.uncertainty import Estimate, mean
 from levilab.present.document.blocks import Note, Picture
@@ -92,21 +93,10 @@ def solve(c1: float, c2: float, n: int) -> Synthetic:
     raise RuntimeError(f"no seed gives C1 = {c1}, C2 = {c2}")
 
 
-#: Air at 20 °C: density [kg/m³] and kinematic viscosity [m²/s].
-AIR_KG_M3, AIR_M2_S = 1.20, 1.50e-5
-#: Torque on both sides of a disc over π ρ R⁴ √(ν ω³): von Kármán's momentum integral, Z. angew. Math. Mech. 1, 233
-#: (1921), with Cochran's number (Schlichting, Boundary-Layer Theory, §5.2.4).
-KARMAN = 0.616
-
-
 def karman_disc() -> float:
-    """Return C of a laminar disc of the top's radius in air, with no free number [(rad/s)^-1/2/s].
-
-    >>> f"{karman_disc():.3e}"
-    '2.234e-04'
-    """
+    """Return C of a laminar disc of the top's radius in air, with no free number [(rad/s)^-1/2/s]."""
     top = preset("undriven").top
-    return KARMAN * math.pi * AIR_KG_M3 * top.magnet_radius_m**4 * math.sqrt(AIR_M2_S) / top.inertia_axial_kg_m2
+    return disc_constant(top.magnet_radius_m, top.inertia_axial_kg_m2)
 
 
 def readings() -> tuple[Synthetic, ...]:

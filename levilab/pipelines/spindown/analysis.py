@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import cached_property
 from itertools import compress
 
+from analysis.spindown.air import disc_constant
 from analysis.spindown.combine import Combined, CombinedLaw, combine
 from analysis.spindown.drag import LAWS
 from analysis.spindown.fit import SpinDown, fit_spin_down
@@ -96,7 +97,8 @@ def fit_source(source: Source[SpinReadings], options: SpinDownOptions) -> SpinDo
 def top_of_device(device: Device | None) -> Top:
     """Return what a device's file says of the top for the count; the thesis's where it says nothing.
 
-    ν_r goes with √(|μ|/(I₃ − I₁)): the field where a top floats is taken for that of the thesis's base.
+    ν_r goes with √(|μ|/(I₃ − I₁)): the field where a top floats is taken for that of the thesis's base.  The radius
+    is that of its largest part.
     """
     if device is None:
         return THESIS_TOP
@@ -110,11 +112,13 @@ def top_of_device(device: Device | None) -> Top:
     u = share * math.hypot((transverse.u or 0.0) / one, (axial.u or 0.0) / three)
     moment = (device.top.moment_a_m2 or THESIS["moment"][0]) / THESIS["moment"][0]
     slow = (three - one) / (THESIS["axial"][0] - THESIS["transverse"][0])
+    radius = max((part.outer_radius_m for part in device.top.parts), default=device.top.magnet_radius_m)
     return replace(
         THESIS_TOP,
         kappa=1 - share,
         kappa_u=u or THESIS_TOP.kappa_u,
         resonance_hz=THESIS_TOP.resonance_hz * math.sqrt(moment / slow),
+        disc_constant=disc_constant(radius or THESIS["radius"][0], three),
     )
 
 

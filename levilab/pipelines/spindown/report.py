@@ -40,6 +40,7 @@ from levilab.pipelines.spindown.words import (
     STRAIGHT_LINES,
     SYMBOLS,
     UNIT_FIRST,
+    doubts_about_law,
     is_prior,
     is_seen,
     law_name,
@@ -69,8 +70,6 @@ from levilab.texts.text import Sentences, Text, how_many, text_from
 _POWERS: Mapping[str, float] = MappingProxyType(
     {law.name: n for law in sorted(LAWS.values(), key=lambda one: one.orders) if (n := law.exponent) is not None}
 )
-#: C₃/₂ of a bare disc as large as the thesis's top in laminar air, without a free parameter (PHYSICS.md §5) [SI].
-KARMAN = 2.235e-4
 #: Power of the laminar layer of air on a disc.
 _LAMINAR = 1.5
 #: The least difference [u].
@@ -127,12 +126,13 @@ def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
     n = _POWERS[combined.best]
     if n == 1:
         yield Text("The spin halves in {time:n} s, whatever it is.", time=plain(math.log(2) / value.value))
-    elif n == _LAMINAR:
-        off = value.value / KARMAN - 1
-        u = value.u / KARMAN
+    elif n == _LAMINAR and not any(doubts_about_law(analysis.taken[0], len(analysis.runs))):
+        disc = analysis.taken[0].model.top.disc_constant
+        off, u = value.value / disc - 1, value.u / disc
         way = "above the value" if off > 0 else "below the value"
         compared = Text("{symbol} lies {percent:n} % {way}", SYMBOLS[name], digits(100 * abs(off)), way)
-        karman = "von Kármán for a bare disc as large as the thesis's top, 2.235×10⁻⁴"
+        top = "this top" if analysis.options.device else "the thesis's top"
+        karman = Text("von Kármán for a bare disc as large as {top}, {value:n}×10⁻⁴", top, digits(1e4 * disc, 4))
         if abs(off) < _DIFFERS * u:
             yield Text("{symbol} agrees with the value of {karman}.", symbol=SYMBOLS[name], karman=karman)
         elif off > 0:

@@ -14,6 +14,7 @@ from analysis.arrays import Array
 from analysis.numbers import digits
 from analysis.remarks import Remark
 from analysis.residuals import independent
+from analysis.spindown.air import LEAST, MOST, drag_over_disc
 from analysis.spindown.combine import Combined, CombinedLaw
 from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.fit import SpinDown
@@ -318,7 +319,7 @@ TILT_ALLOWED = (
 
 
 def doubts_about_law(run: SpinDown, runs: int) -> Iterator[Note]:
-    """Yield that no law describes a run, one of some, and where it leaves them."""
+    """Yield that no law describes a run, one of some, and where it leaves them; or that no drag of air is its drag."""
     change = run.verdict.change
     if change and is_change(change.p, runs):
         said = Text(
@@ -329,6 +330,37 @@ def doubts_about_law(run: SpinDown, runs: int) -> Iterator[Note]:
             first=float(run.time[change.first]), last=float(run.time[change.last]),
         )  # fmt: skip
         yield Note("no law", said, weight="doubt")
+    elif (drag := drag_over_disc(run)).value is not None:
+        yield from _drag_in_doubt(drag.value, _CERTAIN * (drag.u or 0.0))
+
+
+#: A drag is out of bounds by more than this multiple of its u.
+_CERTAIN = 3.0
+#: By which factor it changes the drag where times are taken for others.
+_MISTAKES = {
+    0.001: "milliseconds that are taken for seconds",
+    1 / 60: "seconds that are taken for minutes",
+    0.1: "tenths of a second that are taken for seconds",
+    10: "numbers of readings, 10 s apart, that are taken for seconds",
+    24: "a spreadsheet's days that are taken for hours",
+    60: "minutes that are taken for seconds",
+}
+
+
+def _drag_in_doubt(times: float, u: float) -> Iterator[Note]:
+    """Yield that no air drags a top so, from the drag over that of a bare disc, and the usual cause."""
+    if LEAST - u <= times <= MOST + u:
+        return
+    factor = min(_MISTAKES, key=lambda one: abs(math.log(max(times, 1e-9) / one)))
+    said = Text(
+        "the drag is {times:n} times that of a bare disc of the top's size in laminar air; with rim and washers "
+        "{least:g} to {most:g} times are possible. A factor of about {factor:.2g} is typical of {mistake}. If the "
+        "times are right, {other}",
+        times=digits(times), least=LEAST, most=MOST, factor=factor, mistake=_MISTAKES[factor],
+        other="a drive pushes the top, or it spins in a vacuum" if times < 1 else "more than air brakes the top, as "
+        "eddy currents in metal beside it",
+    )  # fmt: skip
+    yield Note("drag", said, weight="doubt")
 
 
 def remark(of: Remark) -> str:

@@ -15,6 +15,7 @@ from analysis.spindown.drag import LAWS
 from levilab.errors import DataError, LevilabError
 from levilab.files import CannotWrite
 from levilab.formats.columns import NoSuchColumn
+from levilab.formats.device import Device
 from levilab.pipelines.catalogue import ANALYSES
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.document import SPINDOWN
@@ -258,6 +259,37 @@ def test_a_change_counts_once_for_each_run_beside_it(tmp_path):
     change = replace(runs[0].verdict.change, p=5e-4)  # alone below 0.001, among three by chance
     runs[0] = replace(runs[0], verdict=replace(runs[0].verdict, change=change))
     assert [len([*doubts_about_law(runs[0], many)]) for many in (1, 3)] == [1, 0]
+
+
+@pytest.mark.parametrize(
+    ("factor", "mistake"),
+    [
+        (10, "tenths of a second that are taken for seconds. If the times are right, a drive pushes"),
+        (1 / 10, "numbers of readings, 10 s apart, that are taken for seconds. If the times are right, more than air"),
+        (1 / 24, "a spreadsheet's days that are taken for hours. If"),
+    ],
+)
+def test_a_drag_that_no_air_has_is_doubted_and_left_out_of_means(factor, mistake, tmp_path):
+    good, odd = (spin_down_csv(tmp_path / name) for name in ("good.csv", "odd.csv"))
+    time, count, u = np.loadtxt(good, delimiter=",", skiprows=1, unpack=True)
+    rows = np.column_stack([factor * time, count, u])
+    np.savetxt(odd, rows, delimiter=",", header="time_s,spin_frequency_hz,spin_frequency_u_hz", comments="")
+    (doubt,) = SPINDOWN.analyze([odd]).doubts
+    assert mistake in doubt
+    assert "Faktor von etwa" in in_language(doubt, "de")
+    assert "von Kármán for" not in " ".join(meaning(SPINDOWN.analyze([odd])))
+    both = SPINDOWN.analyze([good, odd])
+    assert both.combined == SPINDOWN.analyze([good]).combined
+    assert "verdict and means leave out odd.csv" in " ".join(both.about_all())
+
+
+def test_the_drag_is_compared_with_a_disc_of_the_top_in_the_devices_file(tmp_path):
+    path = spin_down_csv(tmp_path / "my.csv")
+    part = {"name": "disc", "mass_kg": 0.1, "outer_radius_m": 0.014, "height_m": 0.005}  # C of 0.18 times the thesis's
+    heavy = Device.model_validate({"top": {"parts": [part]}})
+    analysis = SPINDOWN.analyze([path], SpinDownOptions(device=heavy))
+    assert analysis.doubts == []
+    assert "as large as this top, 0.3526×10⁻⁴" in meaning(analysis)[0]
 
 
 def test_a_speed_without_unit_may_be_in_hertz_or_turns_per_minute(tmp_path):
