@@ -36,6 +36,8 @@ LEAST_LOST, STEPS = 1e-4, 2.5
 TRIES = 4
 #: No hand spins a Levitron so fast [Hz]: there may be two equal marks, exactly opposite.
 FASTEST_BY_HAND_HZ = 60.0
+#: No drive in print left one faster [Hz]: the thesis's top with loose washers.
+FASTEST_BY_DRIVE_HZ = 66.0
 #: Pulses on each side that show a jump alone: to a quarter of its size and twice their uncertainty.
 BESIDE = 12
 #: Turns that may be lost or repeated at a jump besides, and the natural logarithm of the odds from which they are.

@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 from analysis.numbers import digits
 from analysis.pulses import Finding
+from analysis.pulses.times import FASTEST_BY_DRIVE_HZ
 from levilab.present.numbers import enumeration, filled
 from levilab.texts.note import Weight
 from levilab.texts.text import Text, how_many
@@ -19,7 +20,8 @@ NEAR_UNUSED = "`near` is not used: only a magnetometer's samples and a film's pi
 def finding_weight(found: Finding) -> Weight:
     """Return the weight of a finding: a top that a drive left above 60 Hz is too fast in its first windows alone."""
     in_part = found.name == "fast" and bool(found.where) and found.where[1] < found.where[2]
-    return "doubt" if (found.name, found.of) in _DOUBTS and not in_part else "warning"
+    by_drive = in_part and found.values[0] < FASTEST_BY_DRIVE_HZ
+    return "doubt" if (found.name, found.of) in _DOUBTS and not by_drive else "warning"
 
 
 def finding_text(found: Finding, part: str = "window") -> str:

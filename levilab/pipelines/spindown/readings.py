@@ -14,6 +14,7 @@ from analysis.errors import AnalysisError, NotPositive, TimesNotIncreasing
 from analysis.numbers import digits
 from analysis.pulses import Finding, Track, phases, track_of_times
 from analysis.pulses.times import FASTEST_BY_HAND_HZ
+from analysis.pulses.track import UNLIKE
 from analysis.rotation import FieldTrack, track_of_field
 from analysis.rotation.track import WINDOW_S as FIELD_WINDOW_S
 from analysis.spindown.fall import FALLS_BETWEEN_HZ
@@ -41,7 +42,7 @@ from levilab.pipelines.spin.readings import track_of_record
 from levilab.pipelines.spin.words import NEAR_UNUSED, finding_text, finding_weight
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run
-from levilab.texts.note import Note, is_doubt, of_file
+from levilab.texts.note import Note, Weight, is_doubt, of_file
 from levilab.texts.text import Text, how_many, text_of
 
 #: Columns of a table that are looked at.
@@ -206,16 +207,23 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
             track = track_of_record(record, options.channel, WINDOW_S, "auto")
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)("{path:s}: {error}", path, error) from error
-    notes = [_note(path, note) for note in track.notes]
+    frequency = track.frequency[slice(*_coasting(track))]
+    notes = [_note(path, note, _weight_of(note, frequency)) for note in track.notes]
     what = Text(
         "a list of pulse times of {s:n} s" if times is not None else "a record of {s:n} s", s=digits(duration, 3)
     )
     return _of_track(path, track, WINDOW_S, what, (record.warnings, notes))
 
 
-def _note(path: "Path", found: Finding) -> Note:
-    text = Text(_NAMED, name=path.name, text=finding_text(found))
-    return of_file(found.name, text, finding_weight(found))
+def _weight_of(found: Finding, frequency: "NDArray[np.float64]") -> Weight:
+    """Return the weight of a finding, by the frequencies [Hz] of the windows that are used."""
+    if found.name == "unlike":
+        return "doubt" if np.any(np.abs(np.diff(np.log(frequency))) > UNLIKE) else "warning"
+    return "warning" if found.name == "fast" and frequency.max() < FASTEST_BY_HAND_HZ else finding_weight(found)
+
+
+def _note(path: "Path", found: Finding, weight: Weight) -> Note:
+    return of_file(found.name, Text(_NAMED, name=path.name, text=finding_text(found)), weight)
 
 
 def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions") -> SpinReadings:
@@ -226,7 +234,7 @@ def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions")
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)("{path:s}: {error}", path, error) from error
     found = findings_of(track.spins)
-    notes = [_note(path, note) for note in found]
+    notes = [_note(path, note, finding_weight(note)) for note in found]
     what = Text("a magnetometer's record of {s:n} s", s=digits(record.duration, 3))
     window = record.duration / round(record.duration / FIELD_WINDOW_S)
     readings = _of_track(path, track, window, what, (record.warnings, notes))

@@ -330,12 +330,12 @@ def doubts_about_law(run: SpinDown, runs: int) -> Iterator[Note]:
             first=float(run.time[change.first]), last=float(run.time[change.last]),
         )  # fmt: skip
         yield Note("no law", said, weight="doubt")
-    elif (drag := drag_over_disc(run)).value is not None:
-        yield from _drag_in_doubt(drag.value, _CERTAIN * (drag.u or 0.0))
+    else:
+        yield from _drag_in_doubt(drag_over_disc(run))
 
 
-#: A drag is out of bounds by more than this multiple of its u.
-_CERTAIN = 3.0
+#: A drag that is less than this multiple of its u is not known; one is out of bounds by more than the other.
+_KNOWN, _CERTAIN = 2.0, 3.0
 #: By which factor it changes the drag where times are taken for others.
 _MISTAKES = {
     0.001: "milliseconds that are taken for seconds",
@@ -347,9 +347,16 @@ _MISTAKES = {
 }
 
 
-def _drag_in_doubt(times: float, u: float) -> Iterator[Note]:
+def _drag_in_doubt(drag: Estimate) -> Iterator[Note]:
     """Yield that no air drags a top so, from the drag over that of a bare disc, and the usual cause."""
-    if LEAST - u <= times <= MOST + u:
+    times, u = drag.value or 0.0, drag.u or 0.0
+    if times < _KNOWN * u:
+        said = (
+            "the readings scatter more than the spin falls: they tell no drag. Record longer, or with a clearer signal"
+        )
+        yield Note("drag", said, weight="doubt")
+        return
+    if LEAST - _CERTAIN * u <= times <= MOST + _CERTAIN * u:
         return
     factor = min(_MISTAKES, key=lambda one: abs(math.log(max(times, 1e-9) / one)))
     said = Text(

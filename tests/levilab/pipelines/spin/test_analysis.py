@@ -133,14 +133,27 @@ def test_a_long_list_of_pulse_times_feeds_the_drag_laws(tmp_path):
 
 
 @pytest.mark.parametrize("analysis", [SPIN, SPINDOWN], ids=["spin", "spindown"])
-@pytest.mark.parametrize(("marks", "doubts"), [(2, 1), (1.53, 0)])  # 1.53: a drive let it go at 61 Hz
-def test_a_spin_too_fast_for_a_hand_is_doubted(analysis, marks, doubts, tmp_path):
-    path, turns = tmp_path / "marks.csv", marks * coasting_turns(t := np.linspace(0, 20, 20_001))
+@pytest.mark.parametrize(("marks", "seconds", "doubts"), [(2, 20, 1), (2, 90, 1), (1.53, 20, 0)])  # 1.53: 61 Hz
+def test_a_spin_too_fast_for_hand_and_drive_is_doubted(analysis, marks, seconds, doubts, tmp_path):
+    path, turns = tmp_path / "marks.csv", marks * coasting_turns(t := np.linspace(0, seconds, 1000 * seconds + 1))
     times = np.interp(np.arange(1, int(turns[-1])), turns, t)
     path.write_text("pulse time [s]\n" + "".join(f"{x:.7f}\n" for x in times), encoding="utf-8")
     found = analysis.analyze([path])
     said = [text for text in found.all_warnings if "Hz is too fast for a hand: without a drive there are two" in text]
     assert (len(found.doubts), len(said)) == (doubts, 1)
+
+
+def test_windows_whose_turns_count_once_and_twice_are_doubted_where_they_are_used(tmp_path):
+    turns, t = coasting_turns(np.linspace(0, 24, 24_001)), np.linspace(0, 24, 24_001)
+    halves = np.arange(1, 2 * turns[-1]) / 2
+    times = np.interp(halves, turns, t)
+    doubts = []
+    for name, twice in (("mixed", (8, 12)), ("sound", (20, 24))):  # the last windows are no part of the spin-down
+        kept = times[(halves % 1 == 0) | ((times > twice[0]) & (times < twice[1]))]
+        (path := tmp_path / f"{name}.csv").write_text("pulse time [s]\n" + "".join(f"{x:.7f}\n" for x in kept), "utf-8")
+        doubts.append(" ".join(SPINDOWN.analyze([path]).doubts))
+    assert "pulses are missing or doubled in a pattern" in doubts[0]
+    assert doubts[1] == ""
 
 
 def test_a_coil_whose_spin_is_taken_off_as_hum_is_doubted(tmp_path):

@@ -283,6 +283,13 @@ def test_a_drag_that_no_air_has_is_doubted_and_left_out_of_means(factor, mistake
     assert "verdict and means leave out odd.csv" in " ".join(both.about_all())
 
 
+def test_a_drag_that_readings_do_not_tell_is_doubted(tmp_path):
+    count = 35 - 0.02 * np.arange(12) + 0.5 * np.tile([1, -1], 6)
+    rows = np.column_stack([np.arange(12), count, np.full(12, 0.5)])
+    np.savetxt(path := tmp_path / "my.csv", rows, delimiter=",", header="t [s],f [Hz],u [Hz]", comments="")
+    assert "they tell no drag" in " ".join(SPINDOWN.analyze([path]).doubts)
+
+
 def test_the_drag_is_compared_with_a_disc_of_the_top_in_the_devices_file(tmp_path):
     path = spin_down_csv(tmp_path / "my.csv")
     part = {"name": "disc", "mass_kg": 0.1, "outer_radius_m": 0.014, "height_m": 0.005}  # C of 0.18 times the thesis's
