@@ -84,6 +84,57 @@ def _from_others(x: NDArray[np.float64], u: NDArray[np.float64], k: int) -> floa
     return float(ndtri_exp(below) if below < above else -ndtri_exp(above))
 
 
+#: Tops of one kind differ by some part of a value: the four published drags of one top by 2 %, other washers make more.
+_TOPS = 0.05
+#: Tops of another kind, of another mass and radius, differ by more; values that differ by less are not grossly wrong.
+OTHER_TOPS = 0.15
+#: How many of all values are of such a top, and how many are grossly wrong, before any is seen.
+_SHARE_OTHER, _SHARE_GROSS = 0.1, 0.05
+#: By how much u may be too small, of few readings.
+_U_TOO_SMALL = 3.0
+
+
+def gross_errors(values: ArrayLike, u: ArrayLike) -> NDArray[np.float64]:
+    """Return for each value the probability that it is grossly wrong, as by a wrong unit; 0 of less than three.
+
+    A value is normal about the mean μ, with its u and the τ of the tops; or with the scatter of tops of another kind,
+    too; or it is wrong by about its size, and Cauchy's (good and bad data: D. S. Sivia, Data Analysis, 2nd ed. (2006),
+    section 8.3.2).  μ has the prior 1/|μ|, τ a half Student's t with 2 degrees of freedom, whose scale is a part of μ
+    (A. Gelman, Bayesian Anal. 1, 515 (2006)).  Both are integrated over, so that no value far off widens τ.
+
+    Args:
+        values: shape (n,), finite.
+        u: their standard uncertainties, shape (n,), positive.
+    """
+    x, of_x = np.asarray(values, float)[:, None], np.asarray(u, float)[:, None]
+    if len(x) < 3:  # of two nothing says which one is wrong
+        return np.zeros(len(x))
+    widest, typical = float(np.ptp(x) + of_x.max()), 1 / math.sqrt(np.mean(of_x**-2.0))
+    steps = np.geomspace(of_x[:, 0] / 4, 4 * widest, max(2, 400 // len(x)))  # about each value; many are near others
+    means = np.unique([x[:, 0], *(x[:, 0] + steps), *(x[:, 0] - steps)])
+    taus = typical * np.geomspace(0.03, 10 * widest / typical, 40)
+    size, square = np.abs(means), (x - means) ** 2
+    far, scale = (OTHER_TOPS * size + _U_TOO_SMALL * of_x) ** 2, size + _U_TOO_SMALL * of_x
+    wrong = _SHARE_GROSS / (math.pi * scale * (1 + square / scale**2))
+    of_tau = taus[:, None] / (_TOPS * size + typical)
+    prior = of_tau * (1 + of_tau**2) ** -1.5  # of ln τ
+    log_p = np.log(prior / prior.sum(axis=0) * np.gradient(means) / (size + _U_TOO_SMALL * typical))
+    shares = np.empty((len(taus), *square.shape))
+    for k, tau in enumerate(taus):
+        sound = sum(
+            share * np.exp(-square / variance / 2) / np.sqrt(2 * math.pi * variance)
+            for share, variance in (
+                (1 - _SHARE_OTHER - _SHARE_GROSS, of_x**2 + tau**2),
+                (_SHARE_OTHER, of_x**2 + tau**2 + far),
+            )
+        )
+        log_p[k] += np.log(wrong + sound).sum(axis=0)
+        shares[k] = wrong / (wrong + sound)
+    p = np.exp(log_p - log_p.max())
+    found: NDArray[np.float64] = np.einsum("tm,tkm->k", p / p.sum(), shares)
+    return found
+
+
 def weighted_mean(x: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float, float, float]:
     """Return the mean weighted by 1/u², its u, and χ² about it (W. G. Cochran, Biometrics 10, 101 (1954)).
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from analysis.comparison import Comparison, compare
+from analysis.comparison import OTHER_TOPS, Comparison, compare, gross_errors
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from analysis.uncertainty import Estimate, mean, student
@@ -34,6 +34,21 @@ if TYPE_CHECKING:
 
 #: Distance in u beyond which a value is far off: one in four hundred is by chance.
 FAR = 3.0
+#: Probabilities that a value is grossly wrong, by those of the others: above the one it is in no mean, the other warns.
+_WRONG, _PERHAPS_WRONG = 0.95, 0.2
+#: Mistakes: the factors by which they make spins and times too large.
+_MISTAKES = (
+    (1, 1e3, "times in ms instead of s"),
+    (1, 10, "times in 0.1 s instead of s"),
+    (1, 1 / 10, "readings every 10 s that are counted instead of timed"),
+    (1, 1 / 60, "times in min instead of s"),
+    (60, 1, "spins in rpm instead of Hz"),
+    (math.tau, 1, "spins in rad/s instead of Hz"),
+    (2, 1, "two marks a turn"),
+    (0.5, 1, "one pulse in two turns"),
+)
+#: Factors that differ by less are alike: three times the 2 % by which the published drags differ.
+_ALIKE = 0.06
 #: Quantities that are compared where an analysis names none and has no model.
 _MOST_QUANTITIES = 3
 
@@ -70,9 +85,10 @@ class Compared:
         truths: of each group; None where it is not known.
         mean: of those that are used, by the rule of several runs in a report; None where there are none.
         together: whether those agree; None where there are none.
-        used: whether a group has a value that is neither doubtful nor far from its truth, or no group has.
+        used: whether a group has a value that is neither doubtful, wrong nor far from its truth, or no group has.
         apart: why the groups have no common value, and so no mean; empty: they have.
         shared_u: the part of u of each group that is the same in all, which no mean makes smaller.
+        wrong: the probability that a value is grossly wrong, by those of the others; 0 where its truth is known.
     """
 
     name: str
@@ -86,6 +102,7 @@ class Compared:
     used: tuple[bool, ...]
     apart: str = ""
     shared_u: tuple[float, ...] = ()
+    wrong: tuple[float, ...] = ()
 
     @property
     def shown_unit(self) -> str:
@@ -224,7 +241,9 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
     quantities = tuple(one for one in found_of if one.together)
     if why := analysis.apart(found):
         quantities = tuple(
-            replace(one, mean=None, together=None, apart=why) if one.name in analysis.compared else one
+            replace(one, mean=None, together=None, apart=why, wrong=(0.0,) * len(groups))
+            if one.name in analysis.compared
+            else one
             for one in quantities
         )
     others = {
@@ -299,12 +318,22 @@ def _quantity(
     )
     used = tuple(bool(one) and not (doubt or far) for one, doubt, far in zip(good, doubts, of.off(FAR), strict=True))
     used = used if any(used) else of.used
+    of = replace(of, wrong=_gross_errors(of, used))
+    used = tuple(use and not wrong > _WRONG for use, wrong in zip(used, of.wrong, strict=True))
     known, widened = ([*filter(None, compress(each, used))] for each in (of.estimates, of.widened))
     if not known:
         return replace(of, used=used)
     shared = [*compress(of.shared_u, used)]
     together = compare(*np.array([(one.value, one.u) for one in widened], float).T)
     return replace(of, used=used, mean=mean(known, shared), together=together)
+
+
+def _gross_errors(of: Compared, used: Sequence[bool]) -> tuple[float, ...]:
+    """Return for each group the probability that its value is grossly wrong, by those that are used."""
+    known = [(one.value, one.u) for one in compress(of.widened, used) if one]
+    found = iter(gross_errors(*np.reshape(np.array(known, float), (-1, 2)).T))
+    each = [float(next(found)) if use else 0.0 for use in used]
+    return tuple(0.0 if truth is not None else one for one, truth in zip(each, of.truths, strict=True))
 
 
 def _width(freedom: float | None) -> float:
@@ -345,14 +374,32 @@ def _mark(of: Class, k: int) -> Mark:
                 "or another seed can be the cause"
             )
             wrong.append(Text(said, symbol=one.symbol, times=with_sign(truth, 1)))
+        elif one.wrong[k] > _PERHAPS_WRONG:
+            (wrong if one.wrong[k] > _WRONG else odd).append(_beside_others(of, one, k))
         elif truth is None and others is not None and abs(others) > FAR:
             odd.append(Text("{symbol}: {times:n} u from the others", symbol=one.symbol, times=with_sign(others, 1)))
     wrong = [*group.doubts, *wrong]
     remarks = tuple(text for text in group.warnings if text not in group.doubts)
-    if (short := _too_short(of, k)) or group.doubts:
+    wrong_time = any(one.wrong[k] > _WRONG for one in of.quantities)  # a wrong unit makes a run short, too
+    short = "" if wrong_time else _too_short(of, k)
+    if short or group.doubts:
         return Mark(REPEAT if wrong else LOOK, (*[short] * bool(short), *wrong, *odd), remarks)
     odd += [*filter(None, [_other_seed(of, k)]), *remarks]
     return Mark(REPEAT if wrong else LOOK if odd else GOOD, (*wrong, *odd))
+
+
+def _beside_others(of: Class, one: Compared, k: int) -> str:
+    """Return how many times the median of the others a value is, and the mistake that makes such a factor."""
+    values = [each.value if each else None for each in one.estimates]
+    others = statistics.median(value for value in values[:k] + values[k + 1 :] if value is not None)
+    factor = values[k] / others if others else math.inf  # type: ignore[operator]
+    said = Text("{symbol}: {factor:n} times the median of the others", symbol=one.symbol, factor=digits(factor))
+    orders = dict(zip(LAWS[of.model].constants, LAWS[of.model].orders, strict=False)) if of.model in LAWS else {}
+    for spin, time, mistake in _MISTAKES if one.name in orders else ():
+        makes = spin ** -orders[one.name] / time
+        if factor > 0 and makes != 1 and abs(math.log(factor / makes)) < _ALIKE:
+            return Text("{said}, as with {mistake}", said=said, mistake=mistake)
+    return Text("{said}, more than tops differ", said=said)
 
 
 def _too_short(of: Class, k: int) -> str:
@@ -362,7 +409,8 @@ def _too_short(of: Class, k: int) -> str:
     """
     times = [getattr(group.source.readings, "time", None) for group in of.groups]
     lasts = [count_readings(of.groups[k]) if time is None else float(np.ptp(time)) for k, time in enumerate(times)]
-    usual = statistics.median(lasts[:k] + lasts[k + 1 :] or [0])
+    others = lasts[:k] + lasts[k + 1 :]
+    usual = statistics.median_low(others) if len(others) > 1 else 0  # one may be too long itself
     said = "{n:.0f} readings instead of {usual:.0f}: {advice}"
     said = said if times[k] is None else "{n:.0f} s of readings instead of {usual:.0f} s: {advice}"
     advice, run = "measure longer", of.groups[k].source.run
@@ -521,6 +569,9 @@ def _agreement(of: Compared) -> str:
     together = of.together
     if together is None or together.scatter is None:
         return "there is no other group to compare it with"
+    if together.p < DIFFER and together.scatter > OTHER_TOPS * abs(of.mean.value or 0.0 if of.mean else 0.0):
+        said = "the groups scatter by {scatter}, more than their u, and more than tops do: compare how they measured"
+        return Text(said, scatter=_scatter(of, together))
     if together.p < DIFFER:
         return Text("the groups scatter by {scatter}, more than their u, as different tops do", _scatter(of, together))
     return Text("the groups agree within their u: they scatter by {scatter}", scatter=_scatter(of, together))

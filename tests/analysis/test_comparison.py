@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 from scipy.integrate import quad
 
-from analysis.comparison import compare
+from analysis.comparison import compare, gross_errors
 
 
 def test_p_is_that_of_a_weighted_fit_of_a_constant():
@@ -96,3 +96,35 @@ def test_groups_are_seldom_far_off_by_chance(n, between):
     found = [compare(x + of * random.standard_normal(n), of).distances for x, of in zip(tops, u, strict=True)]
     share = np.mean(np.abs(np.array(found)) > 3)
     assert share < 0.0027 + 4 * math.sqrt(0.0027 / 2400)  # four standard errors of 2400
+
+
+def test_the_probability_of_a_gross_error_is_that_of_its_mixture_over_all_means_and_scatters():
+    """By a sum over a fine grid of even steps."""
+    x, u = np.array([1.0, 1.1, 0.6]), np.array([0.05, 0.1, 0.08])
+    mean, tau = np.arange(-4, 6, 0.01)[:, None, None], np.exp(np.arange(-9, 5, 0.1))[:, None]
+    size, typical, width = abs(mean), np.mean(u**-2.0) ** -0.5, np.hypot(u, tau)
+    wrong = 0.05 * stats.cauchy.pdf(x, mean, size + 3 * u)
+    other = 0.1 * stats.norm.pdf(x, mean, np.hypot(width, 0.15 * size + 3 * u))
+    each = wrong + other + 0.85 * stats.norm.pdf(x, mean, width)
+    prior = stats.t.pdf(math.sqrt(2) * tau / (0.05 * size + typical), 2) / (0.05 * size + typical) * tau
+    p = prior / (size + 3 * typical) * each.prod(axis=2, keepdims=True)
+    assert gross_errors(x, u) == pytest.approx((p * wrong / each).sum(axis=(0, 1)) / p.sum(), abs=2e-3)
+
+
+@pytest.mark.parametrize("n", [3, 6, 30])
+@pytest.mark.parametrize("between", [0.0, 0.02, 0.05])
+def test_no_sound_group_is_grossly_wrong_and_two_that_are_hide_neither(n, between):
+    random = np.random.default_rng(27)
+    tops, u = 1 + between * random.standard_normal((600 // n, n)), random.uniform(0.001, 0.02, (600 // n, n))
+    values = tops + u * random.standard_normal(u.shape)
+    assert max(gross_errors(*one).max() for one in zip(values, u, strict=True)) < 0.2
+    if n > 3:
+        values, u = values * [0.1, 10, *[1] * (n - 2)], u * [0.1, 10, *[1] * (n - 2)]
+        found = np.array([gross_errors(*one) for one in zip(values, u, strict=True)])
+        assert np.mean(found[:, :2] > 0.95) > 0.98
+        assert found[:, 2:].max() < 0.2
+
+
+def test_of_two_values_nothing_says_which_is_wrong():
+    assert gross_errors([1.0, 10.0], [0.1, 0.1]).tolist() == [0, 0]
+    assert gross_errors([1.0, 1.02, 10.0], [0.01] * 3)[2] > 0.95

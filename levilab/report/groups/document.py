@@ -303,8 +303,9 @@ def _marks(of: Class) -> Iterator[Tabular]:
         if mark.word != GOOD
     ]
     note = Text(
-        "repeat: not read, no value, or one more than {far:.0f} u from its truth, or a doubt about the readings; look: "
-        "a warning, another group's readings, or, where no truth is known, more than {far:.0f} u from the others.",
+        "repeat: not read, no value, one more than {far:.0f} u from its truth or far beyond what tops differ by, or a "
+        "doubt about the readings; look: a warning, another group's readings, or, where no truth is known, more than "
+        "{far:.0f} u from the others.",
         far=FAR,
     )
     if rows:

@@ -20,6 +20,7 @@ from levilab.pipelines.suits import save
 from levilab.report.beside import (
     DIFFER,
     GOOD,
+    LOOK,
     REPEAT,
     Compared,
     _quantity,
@@ -593,3 +594,37 @@ def test_a_law_whose_constants_are_not_compared_has_no_part_in_what_to_look_at(t
     assert [one.name for one in of.quantities] == ["c32"]
     assert any("Power: c is known only to a factor" in text for text in of.found.all_warnings)
     assert not any("Power: " in text for mark in of.marks for text in (*mark.why, *mark.notes))
+
+
+def class_of_files(root, factors):
+    """Write a file of each group; factors: of its times and its spins."""
+    for k, (times, spins) in enumerate(factors):
+        path = spin_down_csv(root / f"G{k}.csv", seed=k)
+        heads, *rows = path.read_text(encoding="utf-8").splitlines()
+        scaled = (map(float, row.split(",")) for row in rows)
+        rows = [f"{t * times!r},{f * spins!r},{u * spins!r}" for t, f, u in scaled]
+        path.write_text("\n".join([heads, *rows, ""]), encoding="utf-8")
+    return root
+
+
+def test_a_value_far_beyond_the_others_repeats_with_its_likely_mistake_and_is_in_no_mean(tmp_path):
+    of = compared(class_of_files(tmp_path, [(10, 1), (0.1, 1), (1, 1), (1, 1), (1, 1), (0.65, 1)]))
+    assert [mark.word for mark in of.marks] == [REPEAT, REPEAT, GOOD, GOOD, GOOD, LOOK]
+    assert [mark.why for mark in of.marks[:2]] == [
+        ("C₃/₂: 0.1 times the median of the others, as with times in 0.1 s instead of s",),
+        ("C₃/₂: 10 times the median of the others, as with readings every 10 s that are counted instead of timed",),
+    ]
+    assert "C₃/₂: 1.5 times the median of the others, more than tops differ" in of.marks[5].why
+    (c32,) = of.quantities
+    assert c32.used == (False, False, True, True, True, True)
+
+
+def test_groups_that_all_differ_by_more_than_tops_do_are_not_said_to_differ_as_tops(tmp_path):
+    of = compared(class_of_files(tmp_path, [(1, 1), (10, 1)]))
+    assert [mark.word for mark in of.marks] == [LOOK, LOOK]
+    assert "more than their u, and more than tops do: compare how they measured" in agreement(of)
+
+
+def test_a_run_that_is_too_long_makes_no_other_one_short(tmp_path):
+    of = compared(class_of_files(tmp_path, [(1, 1), (10, 1), (1, 1)]))
+    assert [mark.why for mark in of.marks if mark.word != REPEAT] == [(), ()]
