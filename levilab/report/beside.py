@@ -36,19 +36,6 @@ if TYPE_CHECKING:
 FAR = 3.0
 #: Probabilities that a value is grossly wrong, by those of the others: above the one it is in no mean, the other warns.
 _WRONG, _PERHAPS_WRONG = 0.95, 0.2
-#: Mistakes: the factors by which they make spins and times too large.
-_MISTAKES = (
-    (1, 1e3, "times in ms instead of s"),
-    (1, 10, "times in 0.1 s instead of s"),
-    (1, 1 / 10, "readings every 10 s that are counted instead of timed"),
-    (1, 1 / 60, "times in min instead of s"),
-    (60, 1, "spins in rpm instead of Hz"),
-    (math.tau, 1, "spins in rad/s instead of Hz"),
-    (2, 1, "two marks a turn"),
-    (0.5, 1, "one pulse in two turns"),
-)
-#: Factors that differ by less are alike: three times the 2 % by which the published drags differ.
-_ALIKE = 0.06
 #: Quantities that are compared where an analysis names none and has no model.
 _MOST_QUANTITIES = 3
 
@@ -375,7 +362,7 @@ def _mark(of: Class, k: int) -> Mark:
             )
             wrong.append(Text(said, symbol=one.symbol, times=with_sign(truth, 1)))
         elif one.wrong[k] > _PERHAPS_WRONG:
-            (wrong if one.wrong[k] > _WRONG else odd).append(_beside_others(of, one, k))
+            (wrong if one.wrong[k] > _WRONG else odd).append(_beside_others(one, k))
         elif truth is None and others is not None and abs(others) > FAR:
             odd.append(Text("{symbol}: {times:n} u from the others", symbol=one.symbol, times=with_sign(others, 1)))
     wrong = [*group.doubts, *wrong]
@@ -383,23 +370,19 @@ def _mark(of: Class, k: int) -> Mark:
     wrong_time = any(one.wrong[k] > _WRONG for one in of.quantities)  # a wrong unit makes a run short, too
     short = "" if wrong_time else _too_short(of, k)
     if short or group.doubts:
-        return Mark(REPEAT if wrong else LOOK, (*[short] * bool(short), *wrong, *odd), remarks)
+        others = wrong[len(group.doubts) :]
+        return Mark(REPEAT if wrong else LOOK, (*group.doubts, *[short] * bool(short), *others, *odd), remarks)
     odd += [*filter(None, [_other_seed(of, k)]), *remarks]
     return Mark(REPEAT if wrong else LOOK if odd else GOOD, (*wrong, *odd))
 
 
-def _beside_others(of: Class, one: Compared, k: int) -> str:
-    """Return how many times the median of the others a value is, and the mistake that makes such a factor."""
+def _beside_others(one: Compared, k: int) -> str:
+    """Return how many times the median of the others a value is."""
     values = [each.value if each else None for each in one.estimates]
     others = statistics.median(value for value in values[:k] + values[k + 1 :] if value is not None)
     factor = values[k] / others if others else math.inf  # type: ignore[operator]
-    said = Text("{symbol}: {factor:n} times the median of the others", symbol=one.symbol, factor=digits(factor))
-    orders = dict(zip(LAWS[of.model].constants, LAWS[of.model].orders, strict=False)) if of.model in LAWS else {}
-    for spin, time, mistake in _MISTAKES if one.name in orders else ():
-        makes = spin ** -orders[one.name] / time
-        if factor > 0 and makes != 1 and abs(math.log(factor / makes)) < _ALIKE:
-            return Text("{said}, as with {mistake}", said=said, mistake=mistake)
-    return Text("{said}, more than tops differ", said=said)
+    said = "{symbol}: {factor:n} times the median of the others, more than tops differ"
+    return Text(said, symbol=one.symbol, factor=digits(factor))
 
 
 def _too_short(of: Class, k: int) -> str:
