@@ -7,7 +7,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebder, chebval, chebvander
+from numpy.polynomial.chebyshev import chebder, chebvander
 from numpy.polynomial.polynomial import polyvander
 from numpy.typing import NDArray
 
@@ -50,7 +50,7 @@ _DRIVES, _DRIVE_HZ, _DRIVEN = np.append(0.0, 3 * 10.0 ** np.arange(-4, 4)), 0.1,
 #: greatest relative slope of a free top as a standard deviation, in one film of a hundred.
 _KINK = 0.01
 #: Numbers of times that are tried for it, first in the whole film, then about the best one, and of pictures at most.
-_TRIED = ((400, 300), (40, 3000))
+_TRIED = ((100, 300), (40, 3000))
 #: Terms of the spin after a kink: a shift of its time, the change of the slope, and changes of that by drag.
 _TERMS = 6
 #: Length of a reading of the spin [s], and the fewest pictures in it.
@@ -233,28 +233,30 @@ class _Smooth:
 
     def columns(self, late: Array, kink: float) -> Array:
         """Return turns, spins and slopes of the polynomials and of a kink, shape (3, n, m); see `kinks`."""
-        powers = np.eye(_ORDER + 1)
-        smooth = [chebval(late, chebder(powers, n)).T / self.half**n for n in range(3)]
-        return np.concatenate([smooth, self.kinks(late, kink)], axis=2)
+        values, powers = chebvander(late, _ORDER), np.eye(_ORDER + 1)
+        smooth = [values[:, : _ORDER + 1 - n] @ chebder(powers, n) / self.half**n for n in range(3)]
+        kinks = [self.kinks(late, kink, n) for n in range(3)]
+        return np.concatenate([smooth, kinks], axis=2)
 
-    def kinks(self, late: Array, kink: float | Array) -> Array:
-        """Return turns, spins and slopes of a change of the slope at once, in standard deviations of its prior.
+    def kinks(self, late: Array, kink: float | Array, derivative: int = 0) -> Array:
+        """Return turns (or spins, or slopes) of a change of the slope at once, in standard deviations of its prior.
 
         The columns are a shift of its time, the change, and its own changes.
 
         Args:
             late: times, from -1 at the start of the film to 1 at its end, shape (n,).
             kink: its time, from -1 to 1, or several, shape (k, 1).
+            derivative: 0 of turns, 1 of spins, 2 of slopes.
 
         Returns:
-            Shape (3, n, _TERMS), or (3, k, n, _TERMS).
+            Shape (n, _TERMS), or (k, n, _TERMS).
         """
-        after, power = np.maximum(late - kink, 0) * self.half, np.arange(_TERMS)
-        sizes = self.spin * _SLOWS**power
+        after, term = np.maximum(late - kink, 0) * self.half, np.arange(_TERMS)
+        sizes = self.spin * _SLOWS**term
         sizes[0] = sizes[1] * 2 * self.half / math.sqrt(12)
-        powers = polyvander(after, _TERMS) * (late > kink)[..., None]
-        spins, turns = powers[..., :-1], powers[..., 1:] / (power + 1)
-        return np.asarray(sizes * [turns, spins, power * np.roll(spins, 1, -1)])
+        sizes *= (1 / (term + 1), 1, term)[derivative]
+        powers = polyvander(after, _TERMS)[..., np.maximum(term + 1 - derivative, 0)]
+        return np.asarray(sizes * powers * (late > kink)[..., None])
 
     def time_of_kink(self, late: Array, turns: Array, u: Array, nuisance: Array) -> float:
         """Return the time by which a kink describes turns best, from -1 to 1."""
@@ -264,7 +266,7 @@ class _Smooth:
             some = slice(None, None, -(-late.size // pictures))
             orthonormal, triangle = np.linalg.qr(columns[some, :-1])
             tried = np.clip(best + wide * np.linspace(-1, 1, times), -1, 1)
-            kinks = self.kinks(late[some], tried[:, None])[0, ..., 1:] / u[some, None]
+            kinks = self.kinks(late[some], tried[:, None])[..., 1:] / u[some, None]
             more = np.concatenate([kinks, np.tile(columns[some, -1:], (times, 1, 1))], axis=2)
             seen = orthonormal.T @ more
             unseen = more.mT @ more - seen.mT @ seen
@@ -307,16 +309,16 @@ def _fit(
     design = np.concatenate([basis, nuisance], axis=1)
     triangle = np.linalg.qr(np.column_stack([design, turns]) / u[:, None])[1]
     scales, has_prior = smooth.beside(nuisance)
-    value, spread, _ = _solution(triangle, scales[-1], has_prior)
+    (widest,), (spread,), _ = _solutions(triangle, scales[-1:], has_prior)
     known = float(np.sum((np.diag(spread) / scales[-1] ** 2)[_FREE:m]))
-    rest = (turns - design @ value) / u
+    rest = (turns - design @ widest) / u
     noise = max(_slow_noise(rest, float(np.ptp(turns)), m - known), 1.0)
-    values, covariances, logs = zip(*(_solution(triangle / noise, scale, has_prior) for scale in scales), strict=True)
-    weight = smooth.chances * np.exp(np.array(logs) - max(logs))
+    values, covariances, logs = _solutions(triangle / noise, scales, has_prior)
+    weight = smooth.chances * np.exp(logs - logs.max())
     weight /= weight.sum()
-    found = weight @ np.array(values)
-    off = np.array(values) - found
-    covariance = np.tensordot(weight, np.array(covariances), 1) + (off.T * weight) @ off
+    found = weight @ values
+    off = values - found
+    covariance = np.tensordot(weight, covariances, 1) + (off.T * weight) @ off
     return found, covariance, turns - design @ found, noise
 
 
@@ -341,20 +343,21 @@ def _slow_noise(rest: Array, turns: float, fitted: float) -> float:
     return student(freedom) * math.sqrt(float(means @ means) / worth)
 
 
-def _solution(triangle: Array, scale: Array, has_prior: Array) -> tuple[Array, Array, float]:
-    """Return coefficients, their covariance, and the logarithm of the evidence of a prior.
+def _solutions(triangle: Array, scales: Array, has_prior: Array) -> tuple[Array, Array, Array]:
+    """Return coefficients, their covariances, and the logarithms of the evidence of priors, each of its first axis k.
 
     Args:
         triangle: of the weighted columns and the goal, shape (m + 1, m + 1).
-        scale: standard deviations of the prior, shape (m,).
+        scales: standard deviations of each prior, shape (k, m).
         has_prior: one where a coefficient has a prior, shape (m, m).
     """
-    matrix = np.concatenate([triangle[:, :-1] * scale, has_prior])
-    goal = np.append(triangle[:, -1], np.zeros(len(has_prior)))
-    value = np.linalg.lstsq(matrix, goal, rcond=None)[0]
-    information = matrix.T @ matrix
-    log = -0.5 * (np.sum((goal - matrix @ value) ** 2) + np.linalg.slogdet(information)[1])
-    return scale * value, scale[:, None] * np.linalg.inv(information) * scale, float(log)
+    priors = np.broadcast_to(has_prior, (len(scales), *has_prior.shape))
+    orthonormal, root = np.linalg.qr(np.concatenate([triangle[:, :-1] * scales[:, None], priors], axis=1))
+    goal = np.append(triangle[:, -1], np.zeros(len(has_prior)))[:, None]
+    along, inverse = orthonormal.mT @ goal, scales[:, :, None] * np.linalg.inv(root)
+    squares = np.sum((goal - orthonormal @ along) ** 2, axis=(1, 2))
+    logs = -0.5 * squares - np.sum(np.log(np.abs(np.diagonal(root, axis1=1, axis2=2))), axis=1)
+    return (inverse @ along)[..., 0], inverse @ inverse.mT, logs
 
 
 def _evidence_with(triangle: Array, has_prior: Array, seen: Array, unseen: Array) -> Array:
@@ -362,7 +365,7 @@ def _evidence_with(triangle: Array, has_prior: Array, seen: Array, unseen: Array
 
     Args:
         triangle: of the weighted columns, in standard deviations of the prior, shape (m, m).
-        has_prior: as of `_solution`.
+        has_prior: as of `_solutions`.
         seen: components along these columns of those of a kink, and of the goal, shape (k, m, p + 1).
         unseen: scalar products of what is left of them, shape (k, p + 1, p + 1).
     """
