@@ -326,7 +326,7 @@ _DAY_S, _HOUR_S = 86400, 3600
 def _clocks(
     times: "NDArray[np.float64]", column: Column, first: str, notes: list[str], *, cells: bool
 ) -> "NDArray[np.float64]":
-    """Count dates from the first one on, not from 1970, and the time of a day beyond midnight.
+    """Count dates and the time of a day from the first one on, beyond midnight; a stopwatch's times as they are.
 
     Args:
         times: shape (n,), NaN where one is missed [units of the column].
@@ -347,6 +347,7 @@ def _clocks(
         return times / 60
     if CLOCK.fullmatch(first) and float(times[there].max()) < day:
         times[there] += day * np.cumsum(np.diff(times[there], prepend=times[there][0]) < -day / 2)
+        return np.asarray(times - read[0] * (read[0] >= _HOUR_S / column.factor))
     return times
 
 

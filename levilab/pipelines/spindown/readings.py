@@ -118,8 +118,7 @@ def _part(readings: SpinReadings, options: "InputOptions", path: "Path") -> Spin
     """
     spins, start, stop = (getattr(options, name, None) for name in ("between", "start_s", "stop_s"))
     if start is not None or stop is not None:
-        low, high = readings.time[[0, -1]]
-        ends = (low if start is None else start, high if stop is None else stop)
+        ends = (-math.inf if start is None else start, math.inf if stop is None else stop)
         readings = _between(readings, readings.time, ends, path, unit="s", options="`start`, `stop`")
     if spins is not None:
         readings = _between(readings, readings.frequency, spins, path, unit="Hz", options="`between`")
@@ -138,24 +137,24 @@ def _between(
     """Return the readings whose values lie between two ends, in a unit, which options gave, with a note on the rest."""
     low, high = ends
     inside = np.flatnonzero((values >= low) & (values <= high))
+    said = "from {low:g} {unit:s} on" if high == math.inf else "up to {high:g} {unit:s}"
+    said = said if math.inf in {-low, high} else "between {low:g} {unit:s} and {high:g} {unit:s}"
+    where = Text(said, low=low, high=high, unit=unit)
     if inside.size < FEWEST:
         said = (
-            "{path:s}: {n} of {readings} between {low:g} {unit:s} and {high:g} {unit:s} are too few, at least {fewest} "
-            "are needed: they go from {first:.4g} {unit:s} to {last:.4g} {unit:s}, choose {options:s} in it"
+            "{path:s}: {n} of {readings} {where} are too few, at least {fewest} are needed: they go from "
+            "{first:.4g} {unit:s} to {last:.4g} {unit:s}, choose {options:s} in it"
         )
         first, last = values[[0, -1]]
         all_of_them = how_many(len(readings), "reading")
-        raise DataError(
-            said, path, inside.size, all_of_them, low, high, FEWEST, first, last, unit=unit, options=options
-        )
+        raise DataError(said, path, inside.size, all_of_them, where, FEWEST, first, last, unit=unit, options=options)
+    if inside.size == len(readings):
+        return readings
     part = slice(inside[0], inside[-1] + 1)
     u = None if readings.u is None else readings.u[part]
     kept = replace(readings, time=readings.time[part], frequency=readings.frequency[part], u=u)
-    said = (
-        "only the {n} of {all} readings between {low:g} {unit:s} and {high:g} {unit:s} are fitted, as asked; the "
-        "others are not"
-    )
-    text = Text(said, len(kept), len(readings), low, high, unit=unit)
+    said = "only the {n} of {all} readings {where} are fitted, as asked; the others are not"
+    text = Text(said, len(kept), len(readings), where)
     return replace(kept, warnings=(*readings.warnings, Note("between", text)))
 
 
@@ -207,12 +206,12 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
             track = track_of_record(record, options.channel, WINDOW_S, "auto")
     except AnalysisError as error:
         raise (DataError if options.guess else DoesNotSuit)("{path:s}: {error}", path, error) from error
-    frequency = track.frequency[slice(*_coasting(track))]
+    frequency = track.frequency[slice(*_coasting(track, options)[0])]
     notes = [_note(path, note, _weight_of(note, frequency)) for note in track.notes]
     what = Text(
         "a list of pulse times of {s:n} s" if times is not None else "a record of {s:n} s", s=digits(duration, 3)
     )
-    return _of_track(path, track, WINDOW_S, what, (record.warnings, notes))
+    return _of_track(path, track, WINDOW_S, what, options=options, notes=(record.warnings, notes))
 
 
 def _weight_of(found: Finding, frequency: "NDArray[np.float64]") -> Weight:
@@ -237,7 +236,7 @@ def field_readings(path: "Path", record: "FieldRecord", options: "InputOptions")
     notes = [_note(path, note, finding_weight(note)) for note in found]
     what = Text("a magnetometer's record of {s:n} s", s=digits(record.duration, 3))
     window = record.duration / round(record.duration / FIELD_WINDOW_S)
-    readings = _of_track(path, track, window, what, (record.warnings, notes))
+    readings = _of_track(path, track, window, what, options=options, notes=(record.warnings, notes))
     return replace(readings, doubtful=any(spin.doubtful for spin in track.spins))
 
 
@@ -248,10 +247,16 @@ def _must_last(path: "Path", duration: float, window: float) -> None:
 
 
 def _of_track(
-    path: "Path", track: "Track | FieldTrack", window: float, what: str, notes: "tuple[Iterable[str], Iterable[str]]"
+    path: "Path",
+    track: "Track | FieldTrack",
+    window: float,
+    what: str,
+    *,
+    options: "InputOptions",
+    notes: "tuple[Iterable[str], Iterable[str]]",
 ) -> SpinReadings:
     """Return the windows in which the top coasts.  notes: of the record, and of what was found in it."""
-    first, last = _coasting(track)
+    (first, last), *others = _coasting(track, options)
     start, end = track.frequency[first], track.frequency[last - 1]
     if last - first < FEWEST or end > (1 - LEAST_FALL) * start:
         rises = (
@@ -265,16 +270,30 @@ def _of_track(
         text = "{name:s}: the top coasts from {start:.1f} s to {end:.1f} s; the windows before and after are left out"
         begin, stop = track.time[first], track.time[last - 1]
         how_read.append(of_file("coasts", Text(text, name=path.name, start=begin, end=stop), "advice"))
+    if others:
+        text = "{name:s}: it coasts from {start:.1f} s to {end:.1f} s, too: `start` and `stop` choose"
+        begin, stop = track.time[others[0][0]], track.time[others[0][1] - 1]
+        how_read.append(of_file("coasts again", Text(text, path.name, begin, stop), "advice"))
     part = slice(first, last)
     of_record, of_track = notes
     return SpinReadings(track.time[part], track.frequency[part], track.u[part], (*of_record, *how_read, *of_track))
 
 
-def _coasting(track: "Track | FieldTrack") -> tuple[int, int]:
-    """Return the windows [first, end) of the longest phase in which the top coasts; all without one."""
-    coasting = [phase.windows for phase in phases(track) if phase.kind == "coasting"]
-    first, last = max(coasting, key=lambda ends: ends[1] - ends[0], default=(0, len(track.time)))
-    return (first, last) if last - first >= FEWEST else (0, len(track.time))
+def _coasting(track: "Track | FieldTrack", options: "InputOptions") -> list[tuple[int, int]]:
+    """Return the windows [first, end) of the phases in which the top coasts, else all; first that with most asked for.
+
+    That in which `start` lies counts twice.
+    """
+    start, stop = (getattr(options, name, None) for name in ("start_s", "stop_s"))
+    begin = -1 if start is None else int(np.searchsorted(track.time, start))
+    end = len(track.time) if stop is None else int(np.searchsorted(track.time, stop, "right"))
+    asked = {
+        phase.windows: min(phase.windows[1], end) - max(phase.windows[0], begin)
+        for phase in phases(track)
+        if phase.kind == "coasting"
+    }
+    long = [windows for windows, number in asked.items() if number >= FEWEST]
+    return sorted(long, key=lambda one: -asked[one] * (1 + (one[0] <= begin))) or [(0, len(track.time))]
 
 
 def spin_readings(table: Table) -> SpinReadings:

@@ -159,6 +159,34 @@ def test_readings_between_two_times_are_fitted_as_of_a_top_that_was_spun_again(t
         SPINDOWN.analyze([path], SpinDownOptions(start_s=1e4))
 
 
+def test_a_part_that_is_all_of_a_run_leaves_nothing_out_and_one_beyond_it_says_so(tmp_path):
+    path = spin_down_csv(tmp_path / "a.csv")
+    assert "as asked" not in " ".join(read_spin_file(path, SpinDownOptions(start_s=0.0)).warnings)
+    with pytest.raises(DataError, match=r"0 of 20 readings from 200 s on are too few, .* from 0 s to 190 s"):
+        read_spin_file(path, SpinDownOptions(start_s=200.0))
+
+
+def test_times_of_a_clock_count_from_the_first_reading(tmp_path):
+    rows = "".join(f"14:{58 + k // 6}:{k % 6}0,{38 - k / 10}\n" for k in range(9))
+    (path := tmp_path / "clock.csv").write_text(f"Uhrzeit,f [Hz]\n{rows}", "utf-8")
+    assert read_spin_file(path, SpinDownOptions(start_s=20.0)).time.tolist() == [20, 30, 40, 50, 60, 70, 80]
+
+
+def test_a_record_of_a_top_that_was_spun_again_has_two_falls_to_choose_from(tmp_path):
+    t = np.linspace(0, 32, 32_001)
+    turns = 38 * t - 0.15 * t**2
+    times = np.interp(np.arange(1, int(turns[-1])), turns, t)
+    path = tmp_path / "pulses.csv"
+    path.write_text("pulse time [s]\n" + "".join(f"{x:.7f}\n" for x in [*times, *(times + 40)]), "utf-8")
+    begins = {}
+    for start in (None, 5.0, 45.0):
+        readings = read_spin_file(path, SpinDownOptions(start_s=start))
+        begins[start] = readings.time[0]
+        assert ("too: `start` and `stop` choose" in " ".join(readings.warnings)) == (start != 45)
+    assert begins[None] < 5 < begins[5.0] < 8
+    assert 45 < begins[45.0] < 48
+
+
 def test_the_laws_that_are_asked_for_are_fitted_and_the_others_have_no_numbers(tmp_path):
     path = spin_down_csv(tmp_path / "a.csv")
     found = SPINDOWN.analyze(
