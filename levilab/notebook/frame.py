@@ -142,7 +142,8 @@ def _split_columns(data: Any) -> Any:
     """Return the columns of an array or a list: it may have a row a reading, too, or be one itself."""
     if not hasattr(data, "dtype"):
         shapes = {np.shape(item) for item in data}
-        pairs = len(data) > _MOST_COLUMNS or all(isinstance(item, tuple) for item in data) or shapes == {(2,)}
+        listed = isinstance(data, list) and shapes == {(2,)}
+        pairs = len(data) > _MOST_COLUMNS or all(isinstance(item, tuple) for item in data) or listed
         if shapes != {()} and not (len(data) >= _MOST_COLUMNS and shapes <= {(2,), (3,)} and pairs):
             return data
         data = _as_array(data)

@@ -373,6 +373,7 @@ def test_a_wrong_call_names_the_argument_or_the_kind_of_failure(case):
     (lambda: levilab.analyze(([1, 2, 3], [0.02, 0.03, 0.04])), r"inverted first, analyze\(\(t, 1 / T\)\)"),
     (lambda: levilab.analyze(levilab.analyze(spin_down())), "^data = a result: .* give what it was made of"),
     (lambda: levilab.analyze(([0, 1], [40, 39])), "^the data: holds 2 readings, at least 3"),
+    (lambda: levilab.analyze((FOUR[:2], FOUR[1:3], FOUR[2:]), "precession"), "^the data: holds 2 readings, at least 3"),
     (lambda: levilab.load("nowhere"), "^nowhere: there is no such file or folder in .*levilab runs lists"),
     (lambda: levilab.load(SAMPLE_DATA / "student-files" / "columns.json"), "is a file; a run folder is expected"),
     (lambda: levilab.analyze(levilab), "^data = the module levilab: a run,"),
