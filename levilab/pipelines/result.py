@@ -477,13 +477,14 @@ class Archive(Generic[R]):
                 self._read.setdefault(file, None)
 
     def whole(self, sources: Sequence[Source[Any]]) -> Earlier[R] | None:
-        """Return the result of just these inputs, unchanged."""
+        """Return the result of just these inputs, unchanged, none of which was analyzed again by itself since."""
         files = beside(sources[0].path).results(self._analysis) if len(sources) == 1 else self._together
         wanted = sorted(source.sha256 for source in sources)
         for file in (*self._named, *files):
             result = self._result(file)
             if result and sorted(given.sha256 for given in result.inputs) == wanted:
-                return Earlier(file, result)
+                each = (self.earlier(source.path, source.data, source.sha256) for source in sources)
+                return Earlier(file, result) if all(one and one.file == file for one in each) else None
         return None
 
     def earlier(self, path: Path, data: Path, sha256: str | None = None) -> Earlier[R] | None:
@@ -507,7 +508,8 @@ class Archive(Generic[R]):
 
     def _files(self, path: Path) -> list[Path]:
         """Return where the result of an input may lie."""
-        own = [*self._named, *self._together, *beside(path).results(self._analysis)]
+        written = filter(Path.exists, (*self._together, *beside(path).results(self._analysis)))
+        own = [*self._named, *sorted(written, key=lambda file: -file.stat().st_mtime_ns)]
         above = Place(path.parent).results(self._analysis)
         for file in above:
             if file not in own:

@@ -18,11 +18,13 @@ from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
 from analysis.uncertainty import Estimate, mean, student
 from levilab.crosscheck.truth import Truth, truth_of
-from levilab.errors import unquote
+from levilab.errors import as_typed, unquote
 from levilab.pipelines.inputs.names import seed_of_group, short_paths
+from levilab.pipelines.options import OF_FILES
 from levilab.present.numbers import enumeration, plain, with_sign, with_uncertainty
 from levilab.present.units import unit
-from levilab.texts.note import is_doubt, weight_of
+from levilab.report.reproduction import typed_options
+from levilab.texts.note import Note, is_doubt, weight_of
 from levilab.texts.text import Sentences, Text, how_many, in_language
 
 if TYPE_CHECKING:
@@ -48,8 +50,8 @@ class Group:
         source: with its name and note.
         statistics: of the model; empty where the analysis has none.
         best_model: the law that describes its readings best, or "undecided"; empty where no laws compete.
-        warnings: about it, without advice and those of models that are not compared.
-        doubts: those of them that make its numbers worthless where they are right.
+        warnings: about it, without advice, doubts and those of models that are not compared.
+        doubts: that make its numbers worthless where they are right, with the command that follows their advice.
     """
 
     source: Source[Any]
@@ -215,10 +217,10 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
             source,
             _model(part, model).get("statistics", {}),
             part.get("best_model", "") if part.get("decided", True) else "undecided",
-            tuple(map(plain_text, texts)),
-            tuple(plain_text(text) for text in texts if is_doubt(text)),
+            tuple(plain_text(text) for text in texts if not is_doubt(text)),
+            tuple(_with_command(text, analysis, source, origin.options) for text in texts if is_doubt(text)),
         )
-        for source, part, texts in zip(found.sources, parts, said, strict=True)
+        for source, part, texts, origin in zip(found.sources, parts, said, found.origins, strict=True)
     )
     names = analysis.compared or (_constants(document, model) if has_models else []) or _common(parts)
     doubts = [bool(group.doubts) for group in groups]
@@ -268,6 +270,15 @@ def _common(parts: Sequence[Mapping[str, Any]]) -> list[str]:
 def plain_text(text: str) -> str:
     """Return a message without backquotes, which stand for a terminal's bold letters."""
     return unquote(in_language(text)).replace("`", "")
+
+
+def _with_command(text: str, analysis: Analysis[Any], source: Source[Any], options: Any) -> str:
+    """Return a doubt, with the command that follows its advice, if a program can say it."""
+    if not isinstance(text, Note) or not text.options:
+        return plain_text(text)
+    typed = " ".join(typed_options(replace(options, **text.options)))
+    said = "{doubt}; levilab analyze {name:s} {path:s} {typed:s} fits a part, and levilab class then takes its result"
+    return Text(said, plain_text(text), analysis.name, as_typed(source.path), typed)
 
 
 def _has_u(value: Mapping[str, Any]) -> bool:
@@ -366,13 +377,13 @@ def _mark(of: Class, k: int) -> Mark:
         elif truth is None and others is not None and abs(others) > FAR:
             odd.append(Text("{symbol}: {times:n} u from the others", symbol=one.symbol, times=with_sign(others, 1)))
     wrong = [*group.doubts, *wrong]
-    remarks = tuple(text for text in group.warnings if text not in group.doubts)
+    odd += [*filter(None, [_other_options(of, k)])]
     wrong_time = any(one.wrong[k] > _WRONG for one in of.quantities)  # a wrong unit makes a run short, too
     short = "" if wrong_time else _too_short(of, k)
     if short or group.doubts:
-        others = wrong[len(group.doubts) :]
-        return Mark(REPEAT if wrong else LOOK, (*group.doubts, *[short] * bool(short), *others, *odd), remarks)
-    odd += [*filter(None, [_other_seed(of, k)]), *remarks]
+        why = (*group.doubts, *[short] * bool(short), *wrong[len(group.doubts) :], *odd)
+        return Mark(REPEAT if wrong else LOOK, why, group.warnings)
+    odd += [*filter(None, [_other_seed(of, k)]), *group.warnings]
     return Mark(REPEAT if wrong else LOOK if odd else GOOD, (*wrong, *odd))
 
 
@@ -401,6 +412,20 @@ def _too_short(of: Class, k: int) -> str:
         goes_on = "the run was interrupted, levilab acquire {name:s} --resume {folder:s} continues it"
         advice = Text(goes_on, run.record.experiment, run.folder)
     return Text(said, n=lasts[k], usual=usual, advice=advice) if lasts[k] < usual / 2 else ""
+
+
+#: Options of an input itself, and those of which its analysis has a note.
+_OF_INPUT = frozenset({*OF_FILES, "between", "start_s", "stop_s"})
+
+
+def _other_options(of: Class, k: int) -> str:
+    """Return that a group was analyzed with other options than most, where it was; else nothing."""
+    each = [typed_options(origin.options, _OF_INPUT) for origin in of.found.origins]
+    usual = max(each, key=lambda options: (each.count(options), -len(options)))
+    if each[k] == usual:
+        return ""
+    own, others = (" ".join(options) or "no options" for options in (each[k], usual))
+    return Text("analyzed with {own}, most groups with {others}", own=own, others=others)
 
 
 def _other_seed(of: Class, k: int) -> str:

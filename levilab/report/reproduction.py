@@ -1,7 +1,7 @@
 """A person's title above a report, and how to make its numbers again: commands, data with hashes, seeds, versions."""
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -126,10 +126,12 @@ def reproduction(results: Sequence[tuple[Analysis[Any], Any]], asked: Asked) -> 
 def _commands(results: Sequence[tuple[Analysis[Any], Any]], typed: Sequence[Path]) -> Iterator[str]:
     """Return the commands of the analyses."""
     for analysis, found in results:
-        options = list(dict.fromkeys(_options(origin.options) for origin in found.origins))
+        options = list(dict.fromkeys(typed_options(origin.options) for origin in found.origins))
         for given in options:
             of = [
-                s for s, origin in zip(found.sources, found.origins, strict=True) if _options(origin.options) == given
+                s
+                for s, origin in zip(found.sources, found.origins, strict=True)
+                if typed_options(origin.options) == given
             ]
             yield " ".join(["levilab", "analyze", analysis.name, *paths_in_commands(of, typed), *given])
 
@@ -145,10 +147,13 @@ def paths_in_commands(sources: Sequence[Source[Any]], typed: Sequence[Path] = ()
     return [shlex.quote(str(path)) for path in paths]
 
 
-def _options(options: Any) -> tuple[str, ...]:
-    """Return the options that are not at their defaults, as one types them, if they are plain words."""
+def typed_options(options: Any, without: Container[str] = ()) -> tuple[str, ...]:
+    """Return the options that are not at their defaults, as one types them, if they are plain words.
+
+    without: names of others, which are left out.
+    """
     usual, typed = type(options)(), []
-    for name in filter(_is_plain, OPTIONS):
+    for name in (name for name in OPTIONS if _is_plain(name) and name not in without):
         value = getattr(options, name, None)
         if value != getattr(usual, name, None):
             typed += _option(name, value)

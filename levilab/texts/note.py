@@ -1,6 +1,9 @@
 """Notes on data as data: of which kind and weight, and whether their text names the input."""
 
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal, Self
 
 from levilab.texts.text import Text
@@ -18,13 +21,15 @@ class Note(Text):
         weight: whether advice, a warning or a doubt.
         names_input: whether its text names the input that it is about.
         paths: of the inputs that it is about, where a program needs them.
+        options: of the analysis that follow its advice, by their names.
     """
 
-    __slots__ = ("kind", "names_input", "paths", "weight")
+    __slots__ = ("kind", "names_input", "options", "paths", "weight")
     kind: str
     weight: Weight
     names_input: bool
     paths: tuple[Path, ...]
+    options: Mapping[str, Any]
 
     def __new__(
         cls,
@@ -34,19 +39,19 @@ class Note(Text):
         weight: Weight = "warning",
         names_input: bool = False,
         paths: tuple[Path, ...] = (),
+        options: Mapping[str, Any] = MappingProxyType({}),
     ) -> Self:
         """Make it of a text."""
         self = super().__new__(cls, "{text}", text=text)
-        self.kind, self.weight, self.names_input, self.paths = kind, weight, names_input, paths
+        self.kind, self.weight, self.names_input = kind, weight, names_input
+        self.paths, self.options = paths, options
         return self
 
     def __reduce__(self) -> Any:
         """Return how it is made again in another process."""
-        return _note, (self.kind, self.values["text"], self.weight, self.names_input, self.paths)
-
-
-def _note(kind: str, text: str, weight: Weight, names_input: bool, paths: tuple[Path, ...]) -> Note:  # noqa: FBT001 - of a pickle
-    return Note(kind, text, weight=weight, names_input=names_input, paths=paths)
+        names = ("weight", "names_input", "paths")
+        own = {name: getattr(self, name) for name in names} | {"options": dict(self.options)}
+        return partial(Note, **own), (self.kind, self.values["text"])
 
 
 def of_file(kind: str, text: str, weight: Weight = "warning", paths: tuple[Path, ...] = ()) -> Note:

@@ -329,7 +329,10 @@ def doubts_about_law(run: SpinDown, runs: int) -> Iterator[Note]:
             way="rise" if change.size > 0 else "fall", hz=digits(abs(change.size)),
             first=float(run.time[change.first]), last=float(run.time[change.last]),
         )  # fmt: skip
-        yield Note("no law", said, weight="doubt")
+        before = 2 * change.first > run.time.size - change.last  # the longer part
+        end = run.time[change.first if before else change.last]
+        options = {"stop_s" if before else "start_s": float(f"{end:.4g}")}
+        yield Note("no law", said, weight="doubt", options=options)
     else:
         yield from _drag_in_doubt(drag_over_disc(run))
 

@@ -3,6 +3,7 @@
 import json
 import math
 import re
+import shlex
 import shutil
 from html import escape
 
@@ -625,3 +626,26 @@ def test_groups_that_all_differ_by_more_than_tops_do_are_not_said_to_differ_as_t
 def test_a_run_that_is_too_long_makes_no_other_one_short(tmp_path):
     of = compared(class_of_files(tmp_path, [(1, 1), (3.5, 1), (1, 1)]))
     assert [mark.why for mark in of.marks if mark.word != REPEAT] == [(), ()]
+
+
+def test_a_group_whose_stored_result_has_other_options_is_to_look_at(tmp_path):
+    row = ANALYSES["spindown"]
+    class_of_files(tmp_path, [(1, 1)] * 3)
+    save(row, row.analyze([tmp_path / "G1.csv"], row.options_from({"tilt": "none", "laws": ("disc", "stokes")})))
+    marks = class_of(row, row.recall([tmp_path])).marks
+    assert [mark.word for mark in marks] == [GOOD, LOOK, GOOD]
+    assert marks[1].why[0] == "analyzed with --tilt none --laws disc,stokes, most groups with no options"
+
+
+def test_the_command_that_a_doubt_advises_gives_the_class_another_result(tmp_path, levilab):
+    """Also where the whole class has a result, which is older then."""
+    for k, jump in enumerate((0.0, 3.0)):
+        spin_down_csv(tmp_path / f"G{k}.csv", seed=k, jump=jump, n=20)
+    row = ANALYSES["spindown"]
+    save(row, row.analyze([tmp_path]))
+    write_class([tmp_path], tmp_path / "class.html", tell=(told := []).append)
+    (command,) = re.findall(r"levilab (analyze .* --st\w+ \S+) fits a part", str(told))
+    levilab(*shlex.split(command))
+    write_class([tmp_path], tmp_path / "class.html", tell=(told := []).append)
+    assert "no law describes" not in str(told)
+    assert "are fitted, as asked" in str(told)
