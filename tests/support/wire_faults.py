@@ -1,13 +1,11 @@
 """Faults of a wire, one scripted fault at a time: what becomes of the bytes between a program and an instrument.
 
-A :class:`Wire` decides, for each answer of the instrument and for each message to it, what arrives; it knows nothing of
-sockets.  :mod:`support.proxy` applies it to TCP connections, :class:`FaultyBus` to the links
-within the process.
+A :class:`Wire` decides, for each answer of the instrument and for each message to it, what arrives;
+:class:`FaultyBench` applies it to the links within the process.
 """
 
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import LATE
@@ -39,14 +37,13 @@ class Delivery:
     """What arrives of an answer.
 
     now: the bytes, None: nothing; later: bytes that come ahead of the next answer; marked: as in Fault; ended: the
-    connection ends after them; spoil: what is done to the frame around them.
+    connection ends after them.
     """
 
     now: bytes | None
     later: bytes | None = None
     marked: bool = True
     ended: bool = False
-    spoil: Callable[[bytes], bytes] | None = None
 
 
 @dataclass(frozen=True)
@@ -105,8 +102,6 @@ ANSWERS = {
     "merged": lambda blow: Delivery((blow.before if blow.fault.marked else blow.fault.junk + b"\n") + blow.data),
     "rubbish before": lambda blow: Delivery(blow.fault.junk + blow.data),
     "rubbish behind": lambda blow: Delivery(blow.data + blow.fault.junk),
-    "frame garbled": lambda blow: Delivery(blow.data, spoil=lambda frame: _garbled(replace(blow, data=frame))),
-    "frame cut": lambda blow: Delivery(blow.data, spoil=lambda frame: _gap(replace(blow, data=frame))),
 }
 #: The messages that arrive instead of one to the instrument.
 MESSAGES = {
@@ -115,8 +110,6 @@ MESSAGES = {
     "message garbled": lambda blow: (_garbled(blow),),
     "message doubled": lambda blow: (blow.data, blow.data),
 }
-#: Those that are the same as another one where there are no frames.
-OF_FRAMES = {"frame garbled", "frame cut"}
 
 
 @dataclass
@@ -151,11 +144,6 @@ class Wire:
             self.fault, self.answers, self.messages, self.struck = fault, 0, 0, []
             self.heard.clear()
 
-    def question(self, answer):
-        """What the instrument was asked last that it has answered so."""
-        found = (message for message, given, _ in reversed(self.heard) if given == answer)
-        return next(found, "").encode("latin-1")
-
     def answer(self, question, answer):
         """What arrives of an answer to this question."""
         with self._lock:
@@ -164,10 +152,7 @@ class Wire:
             if fault is None or fault.toward or seen != fault.at:
                 return Delivery(answer)
             delivery = ANSWERS[fault.what](Blow(answer, fault, before))
-            if delivery.now is not None and delivery.spoil is None:
-                self.note(question, answer, delivery.now)
-            else:
-                self.note(question, answer, b"")
+            self.note(question, answer, delivery.now or b"")
             return delivery
 
     def note(self, question, honest, arrived):
@@ -185,9 +170,6 @@ class Wire:
             arriving = MESSAGES[fault.what](Blow(message, fault))
             self.note(message, b"", b"".join(arriving))
             return arriving
-
-
-# --- within the process ---
 
 
 class FaultyBench(VirtualBench):

@@ -1,4 +1,4 @@
-"""A driver, its virtual instrument and a wire that may be faulty between them, over each way there is."""
+"""A driver, its virtual instrument and a wire that may be faulty between them, over each way within the process."""
 
 import contextlib
 import itertools
@@ -6,16 +6,11 @@ import math
 import re
 import struct
 from dataclasses import dataclass
-from types import SimpleNamespace
 from unittest import mock
 
 import numpy as np
-import pyvisa_py.protocols.hislip
-import pyvisa_py.protocols.rpc
-import pyvisa_py.tcpip
 import serial
 
-import instruments.virtual.servers.hislip
 from instruments.drivers.oscilloscope.keysight_dsox import KeysightDSOX
 from instruments.drivers.oscilloscope.rigol_ds1000z import RigolDS1000Z
 from instruments.drivers.oscilloscope.siglent_sds1000xe import SiglentSDS1000XE
@@ -24,21 +19,13 @@ from instruments.drivers.scpi import ScpiInstrument
 from instruments.errors import CommandRefused, InstrumentError, NotConnected
 from instruments.ieee488 import PLAIN_BLOCK, BlockForm, block_of
 from instruments.links.opening import open_link
-from instruments.links.transport import MessageLink
-from instruments.links.visa import VisaPort
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.serial_line import benches
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.parser import ScpiError
-from instruments.virtual.servers.server import BenchServer
 from support import hostile
 from support.models import FAMILIES, KIND_OF, PREPARE, ROWS
-from support.proxy import Proxy
-from support.waiting import HANG_GUARD_S
 from support.wire_faults import FaultyBench, Tapped, Wire
-
-#: A time-out that a fault may make a program wait for, and one that only a failure reaches [s].
-SHORT, AT_MOST = 0.03, HANG_GUARD_S
 
 NETWORK, SOCKET, SERIAL = "TCPIP0::box::inst0::INSTR", "TCPIP0::box::5025::SOCKET", "ASRLbox::INSTR"
 
@@ -317,61 +304,23 @@ SCOPES = tuple(name for name in KINDS if KIND_OF[name] == "oscilloscope")
 #: Those at a serial line.
 ON_A_LINE = tuple(name for name, kind in KINDS.items() if kind.driver.SERIAL)
 
-#: Way → the models that go it.  The first four lie within the process, on the bench's clock; the others are proxied.
+#: Way → the models that go it, all on the bench's clock.
 WAYS = {
     "messages": tuple(KINDS),
     "stream": tuple(KINDS),
     "line": ON_A_LINE,
     "levilab": ON_A_LINE,
-    "socket": tuple(KINDS),
-    "hislip": tuple(KINDS),
-    "vxi11": tuple(KINDS),
 }
-WITHIN = ("messages", "stream", "line", "levilab")
-#: Those without frames: a line feed ends a message.
-FRAMED = ("hislip", "vxi11")
-STREAMS = ("stream", "line", "levilab", "socket")
+#: Those on which a line feed ends a message.
+STREAMS = ("stream", "line", "levilab")
 #: Those that carry seven bits of a byte.
 SEVEN_BITS = ("line", "levilab")
 _bench_numbers = itertools.count()
 
 
-class _Hasty(MessageLink):
-    """The bench's clock jumps to each answer: a measurement takes no longer than any answer."""
-
-    def query(self, message, *, patience=0.0):
-        return super().query(message)
-
-    def query_block(self, message, *, patience=0.0, form=PLAIN_BLOCK):
-        return super().query_block(message, form=form)
-
-
-class _Bound:
-    """How long pyvisa-py's VXI-11 waits: its own bounds are seconds longer than the time-out."""
-
-    seconds = AT_MOST
-
-
-@contextlib.contextmanager
-def hasty_clients():
-    """The clients without waits of their own: at a device clear, at the end of a connection, and for its last words.
-
-    The servers send away none that a busy machine delays.
-    """
-    receive = pyvisa_py.protocols.rpc._recvrecord
-
-    def receive_soon(sock, timeout, **more):
-        return receive(sock, min(timeout, _Bound.seconds), **more)
-
-    with (
-        mock.patch.object(pyvisa_py.protocols.rpc, "_recvrecord", receive_soon),
-        mock.patch.object(pyvisa_py.protocols.hislip, "time", SimpleNamespace(sleep=lambda _: None)),
-        mock.patch.object(pyvisa_py.tcpip.Vxi11CoreClient, "destroy_link", return_value=0),
-        mock.patch.object(serial, "protocol_handler_packages", ["serial.urlhandler", "instruments.virtual.bench"]),
-        mock.patch.object(instruments.virtual.servers.hislip.clients, "FIRST_WORDS", AT_MOST),
-        mock.patch.object(instruments.virtual.servers.hislip, "SECOND_CHANNEL", AT_MOST),
-    ):
-        yield
+def levilab_protocol():
+    """Let pyserial find the virtual instruments without an installation of their hook."""
+    return mock.patch.object(serial, "protocol_handler_packages", ["serial.urlhandler", "instruments.virtual.bench"])
 
 
 class Pair:
@@ -386,7 +335,8 @@ class Pair:
         self._opened = contextlib.ExitStack()
         self.waiting = False
         device = hostile.instrument(name, self.room)
-        self.bench, transport = self._within(device) if way in WITHIN else self._proxied(device)
+        self.tap = Tapped(device, self.wire.heard)
+        self.bench, transport = self._link()
         clock = {"clock": self.room.clock} if name in SCOPES else {}
         side = VirtualBench({NETWORK: device}, lock=self.bench.lock)
         self.side = self.kind.driver(open_link(NETWORK, library=library_for(side)), **clock)
@@ -402,9 +352,8 @@ class Pair:
 
     # --- links ---
 
-    def _within(self, device):
+    def _link(self):
         address = {"messages": NETWORK, "stream": SOCKET}.get(self.way, SERIAL)
-        self.tap = Tapped(device, self.wire.heard)
         bench = FaultyBench({address: self.tap}, self.wire)
         line = {key: value for key, value in self.kind.driver.SERIAL.items() if key != "pause"}
         if self.way == "levilab":
@@ -413,16 +362,6 @@ class Pair:
             self._opened.callback(benches.pop, name)
             return bench, open_link(f"levilab://box?bench={name}", line=line)
         return bench, open_link(address, library=library_for(bench), line=line)
-
-    def _proxied(self, device):
-        self.tap = Tapped(device, self.wire.heard)
-        bench = VirtualBench({NETWORK: self.tap})
-        server = self._opened.enter_context(BenchServer(bench))
-        offer = server.endpoints[0].resources[self.way]
-        port = int(re.findall(r"(?<=[:,])\d+", offer)[-1])
-        proxy = self._opened.enter_context(Proxy(port, self.wire, self.way))
-        near = offer.replace(str(port), str(proxy.port))
-        return bench, _Hasty(VisaPort(near, "@py", {}), near, timeout=AT_MOST)
 
     # --- what the far end knows ---
 
@@ -439,19 +378,6 @@ class Pair:
         return latest is not None and latest.trigger >= self._since
 
     # --- a program's part ---
-
-    def hurry(self):
-        """Wait no longer than need be: a fault is on the wire."""
-        _Bound.seconds = 4 * SHORT
-        if self.way not in WITHIN:
-            self.driver.transport.timeout = SHORT
-
-    def calm(self):
-        """Wait as long as it takes: the wire is sound."""
-        self.wire.arm(None)
-        _Bound.seconds = AT_MOST
-        if self.way not in WITHIN:
-            self.driver.transport.timeout = AT_MOST
 
     def prepare(self):
         """Set the instrument up, with a record for a scope."""
@@ -478,7 +404,7 @@ class Pair:
 
         reset: the instrument may have got a command that the program has not sent, and is switched off and on.
         """
-        self.calm()
+        self.wire.arm(None)
         self.room.clock.sleep(60.0)
         with self.bench.lock:
             self.tap.device.parser.errors.clear()

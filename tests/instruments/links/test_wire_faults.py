@@ -11,12 +11,12 @@ import pytest
 from hypothesis import HealthCheck, Phase, example, given, seed, settings
 from hypothesis import strategies as st
 
-from support.wire_faults import ANSWERS, MESSAGES, OF_FRAMES, Fault
-from support.wire_pairs import FRAMED, KINDS, SEVEN_BITS, STREAMS, WAYS, WITHIN, Pair, attempt, hasty_clients
+from support.wire_faults import ANSWERS, MESSAGES, Fault
+from support.wire_pairs import KINDS, SEVEN_BITS, STREAMS, WAYS, Pair, attempt, levilab_protocol
 
 EXPLORING = settings.get_current_profile_name() == "explore"
-#: Faults for each driver in the suite: on a way within the process, whose waits take no time, and on a proxied one.
-FEW_FAULTS = {way: 6 if way in WITHIN else 3 for way in WAYS}
+#: Faults for each driver in the suite, on each way.
+FEW_FAULTS = 12
 
 #: Way, model, and what became of a fault → how often.  `pytest -s` prints it.
 tally = collections.Counter()
@@ -136,9 +136,7 @@ def excuse(pair):
 
 
 def taken_of(pair, struck):
-    """What a link takes for the answer: all that comes in a frame, or the first line."""
-    if pair.way in FRAMED:
-        return struck.arrived.strip()
+    """What a link takes for the answer: the first line."""
     arrived = bytes(byte & 0x7F for byte in struck.arrived) if pair.way in SEVEN_BITS else struck.arrived
     return arrived.partition(b"\n")[0].strip()
 
@@ -220,11 +218,10 @@ LIES = st.one_of(
 )
 
 
-def faults(framed):
+def faults():
     """One fault, wherever it may strike: `at` is a share of the exchanges in an operation."""
     share = st.floats(0, 1, exclude_max=True)
-    what = [what for what in (*ANSWERS, *ANSWERS, *MESSAGES) if framed or what not in OF_FRAMES]
-    spoilt = st.tuples(st.sampled_from(what), share, share, JUNK, st.booleans())
+    spoilt = st.tuples(st.sampled_from([*ANSWERS, *ANSWERS, *MESSAGES]), share, share, JUNK, st.booleans())
     return st.one_of(spoilt, st.tuples(st.just("another answer"), share, share, LIES, st.booleans()))
 
 
@@ -277,7 +274,7 @@ class Pairs:
 
 @pytest.fixture(scope="module", autouse=True)
 def clients():
-    with hasty_clients():
+    with levilab_protocol():
         yield
     for row, count in sorted(tally.items()):
         print(*row, count, sep="\t")  # noqa: T201 - what `pytest -s` is for
@@ -303,7 +300,6 @@ def strike(pairs, name, wanted, following, drawn):
     fault = Fault(what, int(share * (messages if what in MESSAGES else answers)), place, junk, marked)
     pair = pairs.pair(name)
     pair.wire.arm(fault)
-    pair.hurry()
     became = judged(pair, operation)
     struck = bool(pair.wire.struck)
     if not fault.toward:  # what follows has no excuse but in what arrives then
@@ -324,12 +320,12 @@ def test_a_fault_on_the_wire_gives_the_right_value_or_an_error(way):
     pairs = Pairs(way)
 
     @settings(
-        max_examples=(150 if EXPLORING else FEW_FAULTS[way]) * len(WAYS[way]),
+        max_examples=(150 if EXPLORING else FEW_FAULTS) * len(WAYS[way]),
         deadline=None,
         suppress_health_check=list(HealthCheck),
         phases=[phase for phase in Phase if phase is not Phase.explain],
     )
-    @given(two_operations(way), faults(framed=way in FRAMED))
+    @given(two_operations(way), faults())
     @example(alike(way), ("late", 0.0, 0.0, b"1", True))
     @example(alike(way), ("cut", 0.0, 0.0, b"1", True))
     @example(alike(way), ("cut", 0.0, 0.9, b"1", True))
