@@ -78,6 +78,8 @@ SLOWEST_SPIN_HZ, FASTEST_SPIN_HZ = 15.0, 100.0
 FASTEST_LOSS_PER_S, USUAL_LOSS_PER_S, SLOWEST_LOSS_PER_S = 0.1, 0.003, 1e-4
 #: A record whose spin falls by less than this part is no spin-down: in 6 s, a top that coasts loses twice as much.
 LEAST_FALL = 0.01
+#: Numbers without titles whose range is less than this part of their mean, and that do not grow, are no times.
+_MOST_SPREAD = 0.25
 #: Rank correlation with the number of the row above which spins are those of one top, and not limits of several.
 LEAST_TREND = 0.9
 #: What a title says of an uncertainty that is no standard one, or of a scatter that is not of the mean: f_std.
@@ -948,6 +950,11 @@ def _titles(
     if (len(filled) > len(TITLES_WITHOUT_HEADER) and not taken) or not guess:
         what = '{width} columns and no header; add one, or say `columns` = "t=1,f=2"'
         raise NoSuchColumn(path, what, layout.width, line=layout.first_line)
+    first = np.array(_numbers(layout, 0))
+    alike = len(first) > 2 and np.ptp(first) < _MOST_SPREAD * first.mean() and abs(trend_of(first)) < LEAST_TREND
+    if layout.may_be_one_column and alike and is_possible_spin(median(first)):
+        what = "'{row:s}' is one number with decimal comma, or a time that does not increase; title it f [Hz], or t,f"
+        raise NoSuchColumn(path, what, ",".join(layout.sample[0]), line=layout.first_line)
     time, spin, u = TITLES_WITHOUT_HEADER
     filled = filled[_is_numbered(layout, filled) :]
     names = (spin, time, u) if _spin_comes_first(layout, filled) else TITLES_WITHOUT_HEADER

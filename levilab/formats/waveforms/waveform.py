@@ -118,13 +118,16 @@ class Waveform:
         return first, min(first + int((end - start) * self.rate), self.count)
 
     def signal(self, wanted: str | None = None) -> int:
-        """Return the index of a channel by its name, in any case, or its 1-based number; the first without a name.
+        """Return the index of a channel by its name, in any case, or its 1-based number.
+
+        Without a name that of the first whose samples are not all equal, as of a stereo sound with one microphone.
 
         Raises:
             NoSuchSignal: there is none of that name.
         """
         if wanted is None:
-            return 0
+            several = range(len(self.signals)) if len(self.signals) > 1 else ()
+            return next((k for k in several if any(np.ptp(block) for block in self.read(k))), 0)
         names = [signal.name.casefold() for signal in self.signals]
         if wanted.strip().casefold() in names:
             return names.index(wanted.strip().casefold())

@@ -157,7 +157,8 @@ def single_column(path: Path, *, guess: bool) -> Table | None:
     notes: tuple[str, ...] = ()
     times = [int(line.partition(",")[0]) for _, line in numbers if re.fullmatch(r"\d+,\d+", line)]
     if len(times) == len(numbers) >= _FEWEST and not named:
-        if not titles and times[0] < times[-1] and times == sorted(times):
+        increase = times[0] < times[-1] and times == sorted(times)
+        if increase and (not titles or np.ptp(times) > _MOST_SPREAD * np.mean(times)):
             return None
         said = "{path:s}: its rows, as {row:s}, are taken for one number each, with a decimal comma"
         notes = (of_file("decimal comma", Text(said, path.name, numbers[0][1])),)

@@ -102,13 +102,17 @@ def read_spin_file(path: Path, options: InputOptions) -> Records:
     record = read_record(path, columns=options.columns, rate=options.rate, guess=options.guess)
     if isinstance(record, PulseTimes):
         return Records(path, (), "", record, record.warnings)
-    chosen = record.signals[record.signal(options.channel)].name
-    warnings = list(record.warnings)
-    if options.channel is None and len(record.signals) > 1:
-        names = tuple(one.name for one in record.signals)
-        text = Text(_CHOSEN, names=names, chosen=chosen)
-        warnings.append(of_file("channels", Text("{path:s}: {message}", path=path.name, message=text)))
-    return Records(path, (record,), chosen, None, tuple(warnings))
+    chosen, notes = choose_channel(record, options.channel)
+    return Records(path, (record,), chosen, None, (*record.warnings, *notes))
+
+
+def choose_channel(record: Waveform, channel: str | None) -> tuple[str, tuple[str, ...]]:
+    """Return the name of the channel of a record that is analyzed; and a note where several leave a choice."""
+    chosen = record.signals[record.signal(channel)].name
+    if channel is not None or len(record.signals) == 1:
+        return chosen, ()
+    text = Text(_CHOSEN, names=tuple(one.name for one in record.signals), chosen=chosen)
+    return chosen, (of_file("channels", Text("{path:s}: {message}", path=record.path.name, message=text)),)
 
 
 def read_spin_run(run: Run, options: InputOptions) -> Records:

@@ -38,12 +38,12 @@ from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 from levilab.pipelines.inputs.source import Readings
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.spin.magnetometer import FieldRecord, findings_of, read_field_record
-from levilab.pipelines.spin.readings import track_of_record
+from levilab.pipelines.spin.readings import choose_channel, track_of_record
 from levilab.pipelines.spin.words import NEAR_UNUSED, finding_text, finding_weight
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run
 from levilab.texts.note import Note, Weight, is_doubt, of_file
-from levilab.texts.text import Text, how_many, text_of
+from levilab.texts.text import Sentences, Text, how_many, text_of
 
 #: Columns of a table that are looked at.
 QUANTITIES = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
@@ -51,6 +51,8 @@ QUANTITIES = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 WINDOW_S = 2.0
 #: No top falls below this: the published limits are 21.86 Hz, less five times their scatter [Hz].
 _LOWEST_FALL_HZ = 20.6
+#: No counter is as uncertain [Hz].
+_MOST_U_HZ = 10.0
 #: A first time above this, three years, counts from 1970; as dates, such times count from the first reading [s].
 _SINCE_1970_S = 1e8
 _NAMED = "{name:s}: {text}"
@@ -195,7 +197,7 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
         DoesNotSuit: it is too short for a spin-down, or the spin does not fall.
         DataError: there are no pulses in it.
     """
-    path = record.path
+    path, channels = record.path, tuple[str, ...]()
     times = record.times if isinstance(record, PulseTimes) else None
     duration = record.duration if not isinstance(record, PulseTimes) else float(record.times[-1] - record.times[0])
     _must_last(path, duration, WINDOW_S)
@@ -203,15 +205,17 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
         if isinstance(record, PulseTimes):
             track = track_of_times(record.times, window=WINDOW_S)
         else:
+            _, channels = choose_channel(record, options.channel)
             track = track_of_record(record, options.channel, WINDOW_S, "auto")
     except AnalysisError as error:
-        raise (DataError if options.guess else DoesNotSuit)("{path:s}: {error}", path, error) from error
+        said = Text("{path:s}: {error}", path=path, error=text_of(error))
+        raise (DataError if options.guess else DoesNotSuit)(Sentences(said, *channels, between="; ")) from error
     frequency = track.frequency[slice(*_coasting(track, options)[0])]
     notes = [_note(path, note, _weight_of(note, frequency)) for note in track.notes]
     what = Text(
         "a list of pulse times of {s:n} s" if times is not None else "a record of {s:n} s", s=digits(duration, 3)
     )
-    return _of_track(path, track, WINDOW_S, what, options=options, notes=(record.warnings, notes))
+    return _of_track(path, track, WINDOW_S, what, options=options, notes=((*record.warnings, *channels), notes))
 
 
 def _weight_of(found: Finding, frequency: "NDArray[np.float64]") -> Weight:
@@ -314,6 +318,7 @@ def spin_readings(table: Table) -> SpinReadings:
         raise TableError(table.path, Text(what, n=how_many(time.size, "reading"), fewest=FEWEST))
     _must_be_ordinary(table, time, frequency)
     if u is not None:
+        _must_be_no_decimals(table, frequency, u)
         _must_be_possible(table, u, frequency)
     try:  # as the fit does; here, too, since one run under the drive spoils no search of a folder
         check_readings(time, frequency, u)
@@ -359,8 +364,10 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
     if step * middle < 1:  # nor does a counter give a reading in less
         doubt = Text(
             "{name:s}: the readings lie {step:.3g} ms apart, the top needs {turn:.3g} ms for a turn; if the times are "
-            "in seconds, say so with their column, as t=NAME [s]",
+            "in seconds, say so with their column, as t=NAME [s]{points}",
             name=table.path.name, step=1e3 * step, turn=1e3 / middle,
+            points="; if their point stands behind the thousands, write them without it"
+            if 1e3 * step * middle >= 1 and table.factors.get("time_s") == 1e-3 else "",
         )  # fmt: skip
         return [_doubt(doubt)]
     lasts, first, last = float(time[-1] - time[0]), float(frequency[0]), float(frequency[-1])
@@ -446,6 +453,16 @@ _ABOVE_0 = {
     "spin frequency": ("the frequency", "Hz; above 0 is expected: a sign is the sense of the spin, give the magnitude"),
     "standard uncertainty": ("the uncertainty", "Hz, but must be above 0: correct it or remove the column"),
 }
+
+
+def _must_be_no_decimals(table: Table, frequency: "NDArray[np.float64]", u: "NDArray[np.float64]") -> None:
+    """Refuse whole numbers as uncertainties of whole numbers that are larger than a digit: they are its decimals."""
+    whole = np.all(np.concatenate([frequency, u]) % 1 == 0) and not table.factors.get("spin_frequency_hz", 1.0) % 1
+    said = (
+        "{hz:g} and {u:g} are taken for a spin and its uncertainty; if they are one number with a decimal comma, "
+        "separate the columns by ; or tab, or write a point"
+    )
+    refuse(table, np.full(u.shape, bool(whole and u.max() >= _MOST_U_HZ)), said, frequency, u)
 
 
 def _must_be_possible(table: Table, u: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:

@@ -322,11 +322,13 @@ def doubts_about_law(run: SpinDown, runs: int) -> Iterator[Note]:
     """Yield that no law describes a run, one of some, and where it leaves them; or that no drag of air is its drag."""
     change = run.verdict.change
     if change and is_change(change.p, runs):
+        falls = float(run.frequency[change.first] - run.frequency[change.last])
+        size = min(-change.size, falls) if change.size < 0 < falls else abs(change.size)
         said = Text(
             "no law describes the readings: they {way} by {hz:n} Hz beyond each law between {first:.4g} s and "
             "{last:.4g} s, or bend there, as of a top that was spun again or touched. Fit a part, by `start` and "
             "`stop`, or leave it out",
-            way="rise" if change.size > 0 else "fall", hz=digits(abs(change.size)),
+            way="rise" if change.size > 0 else "fall", hz=digits(size),
             first=float(run.time[change.first]), last=float(run.time[change.last]),
         )  # fmt: skip
         before = 2 * change.first > run.time.size - change.last  # the longer part

@@ -82,6 +82,16 @@ def test_whole_numbers_that_may_be_times_and_rpm_are_no_limits_without_an_answer
     assert any("its rows, as 22,8634, are taken for one number each, with a decimal comma" in note for note in notes)
 
 
+def test_times_and_whole_spins_below_words_are_no_limits_and_decimal_commas_no_times(tmp_path):
+    (file := tmp_path / "a.csv").write_text("Levitron Tuesday\n6,37\n16,35\n26,33\n36,32\n46,31\n", "utf-8")
+    assert 'say `columns` = "t=1,f=2"' in look_at(file, {}).problem
+    file.write_text("21,7\n22,1\n21,9\n21,5\n22,2\n", "utf-8")
+    ((row, found),) = analyze_suiting([file], {})
+    assert (row.name, found.groups[0].statistics.mean.value) == ("limit", pytest.approx(21.88))
+    with pytest.raises(DataError, match="'21,7' is one number with decimal comma, or a time that does not increase"):
+        ANALYSES["spindown"].analyze([file])
+
+
 def test_both_kinds_together_have_values_of_both(sample_data, tmp_path):
     analysis = ANALYSES["limit"].analyze([sample_data])
     document = ANALYSES["limit"].document(analysis, tmp_path)

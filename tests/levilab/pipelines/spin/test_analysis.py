@@ -259,6 +259,18 @@ def test_findings_are_notes_with_their_names(tmp_path):
     assert any(text.endswith("(missing)") for text in analysis.all_warnings)
 
 
+@pytest.mark.parametrize("analysis", [SPIN, SPINDOWN], ids=["spin", "spindown"])
+def test_a_silent_channel_is_passed_over_and_one_without_pulses_names_the_others(analysis, tmp_path):
+    light = pulses(coasting_turns(time := np.arange(8000) / 1000))
+    for name, left in (("silent", np.zeros(8000)), ("dark", np.random.default_rng(2).normal(0, 0.01, 8000))):
+        rows = np.column_stack([time, left, light])
+        np.savetxt(tmp_path / f"{name}.csv", rows, "%.6f", ",", header="time_s,left_v,right_v", comments="")
+    found = analysis.analyze([tmp_path / "silent.csv"])
+    assert "right_v is analyzed, the option `channel` chooses another" in " ".join(found.all_warnings)
+    with pytest.raises(DataError, match=r"pulses in .*left_v is analyzed, the option `channel` chooses another"):
+        analysis.analyze([tmp_path / "dark.csv"])
+
+
 def test_a_record_without_pulses_is_refused_in_one_line(tmp_path):
     path = write_wav(tmp_path / "dark.wav", np.full(4000, 0.1), 1000)
     with pytest.raises(DataError, match=r"dark\.wav: 0 pulses in 4 s, at least 4 are needed"):

@@ -259,6 +259,10 @@ def test_a_change_counts_once_for_each_run_beside_it(tmp_path):
     change = replace(runs[0].verdict.change, p=5e-4)  # alone below 0.001, among three by chance
     runs[0] = replace(runs[0], verdict=replace(runs[0].verdict, change=change))
     assert [len([*doubts_about_law(runs[0], many)]) for many in (1, 3)] == [1, 0]
+    first, last = runs[0].frequency[[5, 9]]  # beyond a law that rises meanwhile they fall by more than they do
+    change = replace(change, first=5, last=9, size=-25.0)
+    (doubt,) = doubts_about_law(replace(runs[0], verdict=replace(runs[0].verdict, change=change)), 1)
+    assert f"they fall by {first - last:.2g} Hz beyond each law" in doubt
 
 
 @pytest.mark.parametrize(

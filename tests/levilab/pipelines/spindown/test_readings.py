@@ -84,6 +84,19 @@ def test_readings_closer_than_a_turn_are_doubted(tmp_path):
     )
 
 
+def test_days_of_a_spreadsheet_are_a_unit_and_thousands_of_ms_are_named(tmp_path):
+    days = read_table(table_of(tmp_path, "t [d],f [Hz]\n0,40\n0.000116,39\n0.000232,38.1\n").path)
+    assert days.column("time_s").round(1).tolist() == [0, 10, 20]
+    thousands = spin_readings(table_of(tmp_path, "t [ms];f [Hz]\n0.000;40\n6.000;39.4\n12.000;38.8\n"))
+    assert thousands.warnings[0].endswith("if their point stands behind the thousands, write them without it")
+
+
+@pytest.mark.parametrize("title", ["", "t,f,u\n"])
+def test_decimals_behind_a_comma_are_no_uncertainties(title, tmp_path):
+    with pytest.raises(TableError, match="40 and 1 are taken for a spin and its uncertainty; if they are one number"):
+        spin_readings(table_of(tmp_path, f"{title}0,40,01\n10,38,58\n20,37,20\n30,35,00\n"))
+
+
 def test_points_behind_thousands_are_named_where_they_pass_for_decimals(tmp_path):
     rows = "t [s];n [U/min]\n0;2.280\n10;2.206\n20;2.133\n30;2.061\n"
     (warning,) = spin_readings(table_of(tmp_path, rows)).warnings
