@@ -167,6 +167,15 @@ class Doubt:
     choices: tuple[Choice, ...]
     open: bool = False
 
+    @property
+    def answer(self) -> str:
+        """The first answer, as it is typed: "t=1,f=2 [rpm]"; with UNIT where more than one is likely."""
+        names = {key: to for choice in self.choices[:1] for key, to in choice.columns.items()}
+        if self.open and self.column is not None:
+            place = f"{self.column + 1} ["
+            names = {key: f"{place}UNIT]" if to.startswith(place) else to for key, to in names.items()}
+        return ",".join(f"{key}={to}" for key, to in names.items())
+
 
 def shorten(text: str, most: int = 40) -> str:
     """Return `text` for a message of one line: no control characters, at most `most` characters."""

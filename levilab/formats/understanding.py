@@ -426,10 +426,7 @@ def _turns_per_reading(layout: Layout, numbers: Sequence[float], time: Column | 
 
 def _unanswered(path: Path, doubt: Doubt) -> NoSuchColumn:
     """Return the error for a spin whose unit is asked for."""
-    example = ",".join(f"{key}={to}" for key, to in doubt.choices[0].columns.items())
-    if doubt.open and doubt.column is not None:
-        example = re.sub(rf"={doubt.column + 1} \[[^\[\]]*\]", f"={doubt.column + 1} [UNIT]", example)
-    return NoSuchColumn(path, '{question} say `columns` = "{example:s}"', doubt.text, example, doubt=doubt)
+    return NoSuchColumn(path, '{question} say `columns` = "{example:s}"', doubt.text, doubt.answer, doubt=doubt)
 
 
 def _must_be_sure(plan: "Plan") -> "Plan":

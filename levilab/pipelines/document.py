@@ -19,7 +19,7 @@ from levilab.pipelines.budget import budgets_of_result
 from levilab.pipelines.inputs.correction import read_correction
 from levilab.pipelines.inputs.search import Found, collect
 from levilab.pipelines.inputs.source import Needs, Source
-from levilab.pipelines.inputs.unread import NoneUsable, Skipped
+from levilab.pipelines.inputs.unread import NoneUsable, Skipped, skip
 from levilab.pipelines.options import OF_FILES, InputOptions, options_of
 from levilab.pipelines.result import (
     AGAIN,
@@ -37,7 +37,7 @@ from levilab.pipelines.result import (
 from levilab.present.units import name_with_unit, split
 from levilab.runs.find import find_run
 from levilab.software import software_versions
-from levilab.texts.text import Sentences, Text, as_tables, text_of
+from levilab.texts.text import Sentences, Text, as_tables
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -247,7 +247,7 @@ class Analysis(Needs[Any], Generic[A]):
             try:
                 done.append(one(source))
             except DataError as error:
-                skipped.append(Skipped(text_of(error), path=source.path))
+                skipped.append(skip(error, source.path))
         if not done:
             raise NoneUsable(Sentences(*(one.reason for one in skipped), between="; "), skipped)
         return done, skipped

@@ -14,12 +14,11 @@ from levilab.pipelines.inputs.files import data_files
 from levilab.pipelines.inputs.names import short_paths
 from levilab.pipelines.inputs.search import find
 from levilab.pipelines.inputs.source import Source
-from levilab.pipelines.inputs.unread import NoneUsable, NotTaken, Skipped
+from levilab.pipelines.inputs.unread import NoneUsable, NotTaken, Skipped, skip
 from levilab.pipelines.options import InputOptions
 from levilab.pipelines.result import Archive, ResultError, Written, read_inputs, results_in
 from levilab.pipelines.suits import Look, Readers, Taken, choose_inputs, look, made_for, together
 from levilab.runs.find import RECORD, find_run, find_runs
-from levilab.texts.text import text_of
 
 T = TypeVar("T")
 
@@ -44,7 +43,7 @@ class Skips:
         except DataError as error:
             if not self.allowed:
                 raise
-            own = error.skipped if isinstance(error, NoneUsable) else [Skipped(text_of(error), path=path)]
+            own = error.skipped if isinstance(error, NoneUsable) else [skip(error, path)]
             self.skipped.extend((*(one for one in skipped if isinstance(one, Skipped)), *own))
             self.errors.append(error)
 

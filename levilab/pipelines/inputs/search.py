@@ -22,6 +22,7 @@ from levilab.pipelines.inputs.names import by_group, with_short_names
 from levilab.pipelines.inputs.source import Needs, R, Source
 from levilab.pipelines.inputs.unread import (
     OTHER_COLUMNS,
+    PROSE,
     UNSUITABLE,
     LeftOut,
     NoneUsable,
@@ -32,6 +33,7 @@ from levilab.pipelines.inputs.unread import (
     files_by_kind,
     kind_of_unused,
     noted,
+    skip,
 )
 from levilab.pipelines.options import InputOptions
 from levilab.runs.find import RECORD, find_runs, no_such_path
@@ -215,7 +217,7 @@ def _search(root: Path, needs: Needs[R], options: Callable[[Path], InputOptions]
             else:
                 others[run.record.experiment] += 1
         except DataError as error:
-            skipped.append(Skipped(text_of(error), type(error).__name__, folder))
+            skipped.append(skip(error, folder, type(error).__name__))
     found.sort(key=_begun)
     files = data_files(root)
     skipped += [LeftOut(file, kind_of_unused(file)) for file in other_files(root)]
@@ -238,11 +240,12 @@ def _skipping(file: Path, skipped: list[NotTaken]) -> Iterator[None]:
     except NoRate as error:
         skipped.append(Skipped(text_of(error), noted=False))
     except DoesNotSuit as error:
-        kind = OTHER_COLUMNS if isinstance(error, NoSuchColumn) else kind_of_unused(file)
+        kind = kind_of_unused(file)
+        kind = OTHER_COLUMNS if isinstance(error, NoSuchColumn) and kind is not PROSE else kind
         fits = kind is OTHER_COLUMNS and not isinstance(error, TableError)
         skipped.append(LeftOut(file, UNSUITABLE, text_of(error)) if fits else LeftOut(file, kind))
     except DataError as error:
-        skipped.append(Skipped(text_of(error), type(error).__name__, file))
+        skipped.append(skip(error, file, type(error).__name__))
 
 
 def _nothing_found(

@@ -1,16 +1,19 @@
 """Runs and files that are not taken, each with the reason, for people and for programs."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeGuard
 
 from levilab.errors import DataError, DoesNotSuit
+from levilab.formats.columns import Ambiguous, NoSuchColumn
 from levilab.formats.kinds import AUDIO, OTHER, Kind, kind_of
+from levilab.formats.table import FEWEST
 from levilab.formats.waveforms.audio import advice_on_sound
 from levilab.formats.waveforms.record import SEARCHED
 from levilab.texts.note import Note
-from levilab.texts.text import Sentences, Text, how_many
+from levilab.texts.text import Sentences, Text, how_many, text_of
 
 
 @dataclass(frozen=True)
@@ -33,18 +36,26 @@ class Skipped:
         kind: skipped ones of one kind are alike.
         path: of what cannot be used.
         noted: whether the result of the analysis has a note on it.
+        answer: `columns` that answer the question of a table, where the reason is one; else empty.
     """
 
     reason: str
     kind: str = ""
     path: Path | None = None
     noted: bool = field(default=True, compare=False)
+    answer: str = field(default="", compare=False)
 
     @property
     def note(self) -> Note:
         """A note on it."""
         text = Text("skipped {things}", things=self.reason)
         return Note(f"skipped {self.kind}".rstrip(), text, names_input=True)
+
+
+def skip(error: DataError, path: Path, kind: str = "") -> Skipped:
+    """Return an input that an error makes unusable, with the answer to the question that the error asks."""
+    doubt = error.doubt if isinstance(error, NoSuchColumn | Ambiguous) else None
+    return Skipped(text_of(error), kind, path, answer=doubt.answer if doubt else "")
 
 
 @dataclass(frozen=True)
@@ -91,6 +102,11 @@ class NothingSuits(DoesNotSuit):
 
 #: Of texts and spreadsheets.
 OTHER_COLUMNS = Kind("a table with other columns", "name one to see why", plural="tables with other columns")
+
+#: A text of sentences.
+PROSE = Kind("a text without readings", "name it if it holds a table", plural="texts without readings",
+             may_hold_readings=False)  # fmt: skip
+_BEGINNING, _WORDS, _NUMBER = 10_000, re.compile(r"[^\W\d_]{2,}( [^\W\d_]{2,}){2}"), re.compile(r"\s*[-+]?\d")
 
 #: Of the right columns, as of a top that does not fall.
 UNSUITABLE = Kind("a table that does not suit", "name one to see why", plural="tables that do not suit")
@@ -142,7 +158,15 @@ def kind_of_unused(file: Path) -> Kind:
         )
     if kind is AUDIO:
         return replace(kind, advice=advice_on_sound())
+    if kind is OTHER and file.suffix.casefold() == ".txt":
+        with file.open(encoding="utf-8", errors="replace") as stream:
+            kind = PROSE if _is_prose(stream.read(_BEGINNING)) else kind
     return OTHER_COLUMNS if kind is OTHER and file.suffix.casefold() in SEARCHED else kind
+
+
+def _is_prose(text: str) -> bool:
+    """Return whether a text has words in a row, and too few lines that begin with a number for a table."""
+    return bool(_WORDS.search(text)) and sum(map(bool, map(_NUMBER.match, text.splitlines()))) < FEWEST
 
 
 def noted(one: NotTaken) -> TypeGuard[Skipped]:

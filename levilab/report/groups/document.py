@@ -70,13 +70,14 @@ from levilab.runs.find import RECORD
 from levilab.runs.run import Run, read_record
 from levilab.texts.note import Note as OneNote
 from levilab.texts.note import of_file
-from levilab.texts.text import Sentences, Text, in_language, spoken, verbatim
+from levilab.texts.text import Sentences, Text, spoken, verbatim
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
     from analysis.uncertainty import Estimate
     from levilab.pipelines.document import Analysis
+    from levilab.pipelines.inputs.source import Source
     from levilab.present.style import Figure
 
 
@@ -128,7 +129,7 @@ def _left_out(results: Results) -> tuple[dict[Path, str], str]:
     used = {source.path for _, found in results for source in found.sources}
     workbooks = {locate(path)[0] for path in used}  # of which sheets are read
     skipped = dict.fromkeys(one for _, found in results for one in found.skipped)  # not all analyses search all folders
-    unread = {one.path: one.reason for one in skipped if isinstance(one, Skipped) and one.path}
+    unread = {one.path: _with_command(one, one.path) for one in skipped if isinstance(one, Skipped) and one.path}
     left_out = [one for one in skipped if isinstance(one, LeftOut) and one.path not in used | workbooks]
     for folder in [path for path in unread if path.is_dir() and not (path / RECORD).exists()]:
         if files := data_files(folder):  # each has its own reason
@@ -149,14 +150,18 @@ def _left_out(results: Results) -> tuple[dict[Path, str], str]:
     return {path: unread[path] for path in sorted(unread) if path not in used | left_out_paths}, about
 
 
+def _with_command(one: Skipped, path: Path) -> str:
+    """Return why an input cannot be used, with the command that answers its question."""
+    said = '{reason}: levilab open {typed:s} --columns "{answer:s}" --keep answers so for all commands'
+    return Text(said, one.reason, as_typed(path), one.answer) if one.answer else one.reason
+
+
 def _why_unread(path: Path, why: str) -> Text:
-    """Return why an input was not read, with a command in the place of the option that would answer its question."""
-    typed = f"levilab open {as_typed(path)} --columns"
-    problem = re.sub(r'`columns` = ("[^"]*"|\S+)', lambda said: f"{typed} {said[1]} --keep", in_language(why))
+    """Return why an input was not read."""
     with suppress(DataError):
         if Run.load(path).status == "interrupted":
-            return Text("not read, and the run was interrupted: {problem}", problem=plain_text(problem))
-    return Text("not read: {problem}", problem=plain_text(problem))
+            return Text("not read, and the run was interrupted: {problem}", problem=plain_text(why))
+    return Text("not read: {problem}", problem=plain_text(why))
 
 
 def _copies(results: Results) -> dict[Path, Path]:
@@ -194,14 +199,14 @@ def _with_folders_as_groups(results: Results, folder_of: Callable[[Path], str]) 
     return done
 
 
-def _folders_of_groups(results: Results, unread: Iterable[Path]) -> Callable[[Path], str]:
+def _folders_of_groups(results: Results, unread: Iterable[Path], paths: Sequence[Path]) -> Callable[[Path], str]:
     """Return the function file → its folder below the deepest one of all inputs, empty there; run → its group."""
     used = (one.path for _, found in results for one in found.sources if not one.run)
     files = {path: locate(path)[0].resolve() for path in (*used, *unread)}
     folders = {path: file.parent.parts for path, file in files.items() if not (file / RECORD).exists()}
     of_runs = [one.path.resolve().parent.parts for _, found in results for one in found.sources if one.run]
     common = takewhile(lambda parts: len({*parts}) == 1, zip(*folders.values(), *of_runs, strict=False))
-    depth = len([*common])
+    depth = len([*common]) - (len(files) == 1 and not of_runs and files.keys().isdisjoint(paths))  # of one group alone
     groups = {path: _group_in(file) for path, file in files.items() if path not in folders}
     return lambda path: groups.get(path) or "".join(folders.get(path, ())[depth : depth + 1])
 
@@ -237,6 +242,34 @@ def _each_reading_once(results: Results) -> Results:
     return [*joined.values()]
 
 
+def _without_spins_of_falls(results: Results) -> Results:
+    """Return results without spin frequencies of inputs whose fall is analyzed: a fall has no common frequency."""
+    falls = {source.path for analysis, found in results if analysis.name == "spindown" for source in found.sources}
+    kept = []
+    for analysis, found in results:
+        sources = [one for one in found.sources if analysis.name != "spin" or one.path not in falls]
+        if len(sources) == len(found.sources):
+            kept.append((analysis, found))
+        elif sources:
+            kept.append((analysis, _of_sources(analysis, [found], sources, found.warnings)))
+    return kept
+
+
+def _of_sources(
+    analysis: Analysis[A], results: Sequence[A], sources: Sequence[Source[Any]], warnings: Iterable[str]
+) -> A:
+    """Return the result of some inputs of results."""
+    done = {
+        source.name: (source, run, origin)
+        for one in results
+        for source, run, origin in zip(one.sources, one.runs, one.origins, strict=True)
+    }
+    skipped = tuple(skipped for one in results for skipped in one.skipped)
+    together = Found(tuple(sources), tuple(warnings), skipped)
+    paths = [source.path for source in sources]
+    return analysis.gather(paths, together, results[0].options, lambda source: done[source.name])
+
+
 def _with_other_readings(analysis: Analysis[A], first: A, found: A) -> A:
     """Return a result together with those inputs of another one whose readings it has not, and a note of the rest."""
     said = "{names:s}: not counted, as {first:s} is a result of the same readings; levilab report shows all"
@@ -244,15 +277,8 @@ def _with_other_readings(analysis: Analysis[A], first: A, found: A) -> A:
     again = {source.name: known[source.sha256] for source in found.sources if source.sha256 in known}
     note = of_file("repeated", Text(said, names=(*again,), first=(*again.values(),)))
     sources = (*first.sources, *(source for source in found.sources if source.name not in again))
-    done = {
-        source.name: (source, run, origin)
-        for one in (found, first)
-        for source, run, origin in zip(one.sources, one.runs, one.origins, strict=True)
-    }
     warnings = (*first.warnings, *found.warnings, *([note] if again else []))
-    together = Found(sources, warnings, (*first.skipped, *found.skipped))
-    paths = [source.path for source in sources]
-    return analysis.gather(paths, together, first.options, lambda source: done[source.name])
+    return _of_sources(analysis, [found, first], sources, warnings)
 
 
 def _subject(of: Class) -> str:
@@ -462,13 +488,13 @@ def write_class(
         form.check()
     with writing_report(output):
         check_writable(output)
-    results = _each_reading_once(recall_suiting(paths, given or {}, skips=True))
+    results = _without_spins_of_falls(_each_reading_once(recall_suiting(paths, given or {}, skips=True)))
     unread, others = _left_out(results)
     copies = _copies(results)
     used = [source.path for _, found in results for source in found.sources]
     runs = [path for path in (*used, *copies, *unread) if (path / RECORD).exists()]
     unread = {path: why for path, why in unread.items() if not (path.is_file() and is_archive_of(path, runs))}
-    folder_of = _folders_of_groups(results, [*unread, *copies, *copies.values()])
+    folder_of = _folders_of_groups(results, [*unread, *copies, *copies.values()], paths)
     results = _with_folders_as_groups(results, folder_of)
     classes = [class_of(analysis, found) for analysis, found in results]
     classes.sort(key=lambda of: -len(of.groups))  # what one group alone measured comes last

@@ -6,12 +6,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.numbers import digits
 from levilab.present.drawing import SMALL, in_mathtext, new_figure, panel, power_of_ten, write
 from levilab.present.looks import BLUE, GREEN, VERMILION
 from levilab.present.style import label_of_run
 from levilab.present.units import unit
 from levilab.report.beside import Class, Compared, Group, finding
-from levilab.texts.text import in_language
+from levilab.texts.text import Text, in_language
 
 #: Left edge of the panels, their right edge, from panel to panel, above them, below them, and a group's row [inch].
 _LEFT, _RIGHT, _GAP, _HEAD, _FOOT, _ROW = 1.75, 6.85, 0.25, 0.85, 0.55, 0.135
@@ -19,6 +20,8 @@ _LEFT, _RIGHT, _GAP, _HEAD, _FOOT, _ROW = 1.75, 6.85, 0.25, 0.85, 0.55, 0.135
 _MOST_PANELS = 3
 #: Of the name of a group, that have room at the left, and those at its end, in which runs of one group differ.
 _LETTERS, _END = 26, 9
+#: Bars of u longer than this multiple of their median go beyond the edge; and the empty part at each side.
+_LONGEST, _MARGIN = 3.0, 0.06
 #: Distances from the truth beyond it are arrows at the edge [u].
 _FARTHEST = 4.7
 
@@ -57,8 +60,15 @@ def _label(group: Group) -> str:
 
 def _draw_values(axes: Axes, of: Compared) -> None:
     factor = unit(of.unit).shown.factor
-    power, times = power_of_ten([one.value * factor for one in of.estimates if one and one.value])
+    used = [(one.value, one.u) for one, use in zip(of.estimates, of.used, strict=True) if one and use]
+    values, u = np.array(used or [(one.value, one.u) for one in of.estimates if one], float).T
+    power, times = power_of_ten([*(values * factor)])
     scale = factor / power
+    bars = np.minimum(u, _LONGEST * np.median(u))
+    known = [*(values - bars), *(values + bars), *(truth for truth in of.truths if truth is not None)]
+    low, high = scale * min(known), scale * max(known)
+    margin = _MARGIN * (high - low)
+    axes.set_xlim(low - margin, high + margin)
     if of.mean and of.mean.value is not None and of.mean.u is not None:
         mean, u = of.mean.value * scale, of.mean.u * scale
         axes.axvspan(mean - u, mean + u, color=BLUE, alpha=0.2)
@@ -66,8 +76,15 @@ def _draw_values(axes: Axes, of: Compared) -> None:
     for k, (one, truth) in enumerate(zip(of.estimates, of.truths, strict=True)):
         if truth is not None:
             axes.plot(truth * scale, k, marker="D", markersize=5, color=VERMILION, markerfacecolor="none")
-        if one is not None and one.value is not None and one.u is not None:
+        if one is None or one.value is None or one.u is None:
+            continue
+        if low <= one.value * scale <= high:
             axes.errorbar(one.value * scale, k, xerr=one.u * scale, fmt="o", markersize=3, color="black", elinewidth=1)
+            continue
+        edge, marker, side = (low, "<", "left") if one.value * scale < low else (high, ">", "right")
+        axes.plot(edge, k, marker=marker, markersize=3.5, color="black")
+        said = in_language(Text("{value:n}", value=digits(one.value * scale, 3)))
+        axes.text(edge, k, f"   {said}   ", fontsize=SMALL, ha=side, va="center")
     symbol, shown = in_mathtext(of.symbol), in_mathtext(of.shown_unit)
     axes.set_xlabel(f"{symbol}  [{times}{shown}]" if times or shown else symbol, fontsize=8)
 

@@ -1,6 +1,7 @@
 """A class → a spreadsheet: all digits, the numbers as numbers, every reading with its residual."""
 
 import io
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime
 from typing import Any
@@ -31,7 +32,7 @@ def class_workbook(classes: Sequence[Class], date: datetime | None) -> bytes:
     buffer = io.BytesIO()
     # a text is never a formula, a link or a number, whatever a person typed
     never = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False, "in_memory": True}
-    with xlsxwriter.Workbook(buffer, {**never, "nan_inf_to_errors": True}) as book:
+    with xlsxwriter.Workbook(buffer, never) as book:
         book.set_properties({"created": (date or _NO_DATE).replace(tzinfo=None), "keywords": "levilab"})
         bold = book.add_format({"bold": True, "text_wrap": True, "valign": "top"})
         red = {
@@ -63,7 +64,7 @@ def _write(sheet: Any, bold: Any, heads: Sequence[str], rows: Iterable[Sequence[
         for k, cell in enumerate(cells):
             if isinstance(cell, str):
                 sheet.write_string(number, k, cell)
-            elif cell is not None:
+            elif cell is not None and math.isfinite(cell):
                 sheet.write_number(number, k, cell)
             widths[k] = max(widths[k], len(str(cell)) if isinstance(cell, str) else 12)
     for k, width in enumerate(widths):

@@ -5,6 +5,7 @@ import math
 import re
 import shlex
 import shutil
+import zipfile
 from html import escape
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import xlsxwriter
 from python_calamine import CalamineWorkbook
 from scipy import stats
+from scipy.io import wavfile
 
 from analysis.comparison import compare
 from levilab.crosscheck.truth import Truth
@@ -344,7 +346,7 @@ def test_a_file_of_a_folder_that_only_one_analysis_searches_is_named(of_three, t
     (files / "good.csv").unlink()
     page = Page(write_class([of_three, files], tmp_path / "class.html").read_text(encoding="utf-8")).text
     assert re.search(r"repeat not read: \S+rpm.csv: a table.* levilab open \S+rpm.csv asks for them", page)
-    assert f'say levilab open {files / "rpm.csv"} --columns "t=1,f=2 [rpm]" --keep' in str(told)
+    assert f'levilab open {files / "rpm.csv"} --columns "t=1,f=2 [rpm]" --keep answers' in str(told)
 
 
 def test_a_group_with_a_seed_that_is_not_its_worksheets_is_named(tmp_path):
@@ -401,7 +403,7 @@ def test_who_must_repeat_is_said_first_and_why(of_three, tmp_path):
     assert f"{whose} levilab class says why." in Page(render([(of.analysis, of.found)])).text
     assert of.quantities[0].used == tuple(group.source.name != "Group 2" for group in of.groups)
     assert of.quantities[0].mean.value == pytest.approx(2.4e-4, rel=0.03)  # the halved spins have 3.3e-4
-    assert [line.get_marker() for axes in class_figure(of).axes for line in axes.lines].count(">") == 1
+    assert [[line.get_marker() for line in axes.lines].count(">") for axes in class_figure(of).axes] == [1, 1]
     (root / "Group 6.xlsx").write_bytes(b"PK\x03\x04" + bytes(300))
     (root / "Group 7.csv").write_bytes(b"")
     (root / "photo.jpg").write_bytes(b"\xff\xd8\xff" + bytes(300))
@@ -494,7 +496,7 @@ def test_a_table_that_was_analyzed_without_doubtful_rows_is_not_called_unusable(
     save(row := ANALYSES["spindown"], row.analyze([table], row.options_from({"skip_doubtful": True})))
     write_class([tmp_path], tmp_path / "class.html", tell=(told := []).append)
     (said,) = told
-    assert "a.csv: the readings lie on the power law" in said  # as they are made, and nothing of a row
+    assert f"{tmp_path.name}: the readings lie on the power law" in said  # as they are made, and nothing of a row
 
 
 def test_page_and_spreadsheet_of_a_mixed_class_have_the_same_groups_and_numbers(of_three, tmp_path):
@@ -649,3 +651,51 @@ def test_the_command_that_a_doubt_advises_gives_the_class_another_result(tmp_pat
     write_class([tmp_path], tmp_path / "class.html", tell=(told := []).append)
     assert "no law describes" not in str(told)
     assert "are fitted, as asked" in str(told)
+
+
+def test_what_lies_far_beyond_the_others_is_an_arrow_with_its_value_and_stretches_no_axis(tmp_path):
+    root = class_of_files(tmp_path, [(1, 1), (1, 1), (20, 1), (1, 1)])
+    values = compared(root).quantities[0].estimates
+    (axes,) = class_figure(compared(root)).axes
+    assert [line.get_marker() for line in axes.lines].count("<") == 1
+    assert [text.get_text().strip() for text in axes.texts] == [f"{1e4 * values[2].value:.3g}"]
+    low, high = axes.get_xlim()
+    assert high - low < 2e4 * np.ptp([values[k].value + side * values[k].u for k in (0, 1, 3) for side in (-1, 1)])
+
+
+def test_a_group_without_u_leaves_no_error_in_the_spreadsheet(tmp_path):
+    for k in range(3):
+        spin_down_csv(tmp_path / f"{k}.csv", seed=k, u=k > 0)
+    with zipfile.ZipFile(write_class([tmp_path], tmp_path / "class.xlsx")) as book:
+        assert not any(b"#NUM!" in book.read(name) for name in book.namelist())
+
+
+def test_sentences_in_a_text_file_are_no_result_to_repeat(tmp_path):
+    class_of_files(tmp_path, [(1, 1), (1, 1)])
+    (tmp_path / "notes.txt").write_text("Anna was ill.\nGroup 2 began at 12:30 with 3 tops\n", "utf-8")
+    (tmp_path / "G3.txt").write_text("t in s\tf in Hz\n0\t40\n10\t39\n", "utf-8")
+    page = write_class([tmp_path], tmp_path / "class.html", tell=(told := []).append).read_text("utf-8")
+    assert "2 of 3 results are good. To repeat: G3.txt." in Page(page).text
+    assert "without readings: a text without readings (notes.txt)" in told
+
+
+def test_the_only_file_of_a_folder_is_of_the_folders_group(tmp_path):
+    (tmp_path / "Anna").mkdir()
+    file = spin_down_csv(tmp_path / "Anna" / "spin.csv")
+    for path, name in ((tmp_path, "Anna"), (tmp_path / "Anna", "Anna"), (file, "spin.csv")):
+        write_class([path], tmp_path / "class.html", show=(shown := []).append)
+        assert [row.cells[0] for row in shown[0].rows] == [name]
+
+
+def test_recordings_of_falls_are_compared_by_their_drag_and_not_by_a_frequency(tmp_path):
+    time = np.arange(4000 * 30) / 4000
+    for k, c in enumerate((2.3e-4, 2.4e-4)):
+        root = (2 * np.pi * 40) ** -0.5 + c * time / 2
+        pulses = np.exp(20 * (np.cos(2 / c * (2 * np.pi * 40) ** 0.5 - 2 / c / root) - 1))
+        noise = 0.02 * np.random.default_rng(k).standard_normal(time.size)
+        wavfile.write(tmp_path / f"{k}.wav", 4000, (12000 * (pulses + noise)).astype(np.int16))
+    write_class([tmp_path], tmp_path / "class.html", show=(shown := []).append)
+    assert [one.title for one in shown] == ["spin-down"]
+    shutil.copy(SAMPLE_DATA / "scope-files" / "recording.wav", tmp_path)  # of a spin that does not fall
+    write_class([tmp_path], tmp_path / "class.html", show=(shown := []).append)
+    assert [[row.cells[0] for row in one.rows] for one in shown] == [["0.wav", "1.wav"], ["recording.wav"]]
