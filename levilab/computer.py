@@ -1,6 +1,6 @@
 """The computer as runs use it: its disk, its clock, and what no other process has.
 
-Everything that is to survive a crash is written through `computer()`.  The laboratory (`fuzz/laboratories`) puts
+Everything that is to survive a crash is written through `computer()`.  The laboratory (`levilab.laboratory`) puts
 another one in its place, whose disk fills up, whose clock jumps and which loses its power.
 """
 

@@ -75,9 +75,9 @@ def carry_out(order: dict[str, Any]) -> dict[str, Any]:
         coverage.start()
     started, digests = time.process_time(), list[str]()
     try:
-        from laboratories.plan import draw
-        from laboratories.visit import visit
         from levilab.cli.exit_codes import exit_status
+        from levilab.laboratory.plan import draw
+        from levilab.laboratory.visit import visit
 
         for seed in range(order["laboratories"]):
             told = visit(draw(seed), exit_status)

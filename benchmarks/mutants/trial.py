@@ -126,11 +126,7 @@ def _obey(order: dict[str, Any]) -> None:
     """
     os.chdir(TREE)
     os.environ.update(_environment())
-    sys.path[:] = [
-        str(TREE),
-        str(TREE / "fuzz"),
-        *(entry for entry in sys.path if Path(entry or ".").resolve() != ROOT),
-    ]
+    sys.path[:] = [str(TREE), *(entry for entry in sys.path if Path(entry or ".").resolve() != ROOT)]
     with open(WORK / "trial.log", "w", encoding="utf-8") as log:  # noqa: PTH123
         os.dup2(log.fileno(), 1)
         os.dup2(log.fileno(), 2)

@@ -1,7 +1,5 @@
 """The simulated laboratory, for people who work on levilab."""
 
-import sys
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -9,10 +7,6 @@ import typer
 from levilab.cli import exit_codes
 from levilab.cli.options import flag, option
 from levilab.cli.output import message, result
-from levilab.errors import UsageError
-
-#: The tools for people who work on levilab, in a clone.
-_TOOLS = Path(__file__).parents[2] / "fuzz"
 
 
 def fuzz(
@@ -23,13 +17,10 @@ def fuzz(
     trace: Annotated[bool, flag("Print each step of one laboratory.", "--trace")] = False,
 ) -> None:
     """Carry out laboratories, and end with 1 where something is wrong."""
-    if not _TOOLS.is_dir():
-        raise UsageError("fuzz", "the laboratories lie in a clone of levilab: `pip install --editable .` there")
-    sys.path.insert(0, str(_TOOLS))
-    from laboratories.explore import explore
-    from laboratories.plan import draw
-    from laboratories.shrink import shrink
-    from laboratories.visit import Told, visit
+    from levilab.laboratory.explore import explore
+    from levilab.laboratory.plan import draw
+    from levilab.laboratory.shrink import shrink
+    from levilab.laboratory.visit import Told, visit
 
     def tell(told: Told) -> None:
         small = shrink(told, exit_codes.exit_status)

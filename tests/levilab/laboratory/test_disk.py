@@ -5,10 +5,10 @@ from random import Random
 
 import pytest
 
-from laboratories.disk import SimulatedComputer
-from laboratories.fate import Fate
 from levilab.computer import at_another_computer
 from levilab.files import replace_atomically
+from levilab.laboratory.disk import SimulatedComputer
+from levilab.laboratory.fate import Fate
 
 
 def computer(seed):

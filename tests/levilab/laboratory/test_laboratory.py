@@ -8,19 +8,19 @@ import pytest
 
 from instruments.drivers.counter.reciprocal import ReciprocalCounter
 from instruments.drivers.magnetometer.lakeshore import LakeShoreGaussmeter
-from laboratories import explore
-from laboratories import visit as visiting
-from laboratories.disk import SimulatedComputer
-from laboratories.fate import Event
-from laboratories.plan import draw
-from laboratories.shrink import shrink
-from laboratories.visit import visit
 from levilab.acquisition import driving
 from levilab.acquisition.experiments import field
 from levilab.acquisition.session import Session
 from levilab.bench.bench import Bench
 from levilab.cli.exit_codes import exit_status
 from levilab.interruption import interruption_blocked
+from levilab.laboratory import explore
+from levilab.laboratory import visit as visiting
+from levilab.laboratory.disk import SimulatedComputer
+from levilab.laboratory.fate import Event
+from levilab.laboratory.plan import draw
+from levilab.laboratory.shrink import shrink
+from levilab.laboratory.visit import visit
 from levilab.runs.run import Run
 from levilab.runs.writer import RunWriter
 from levilab.workers.ways import this_process

@@ -5,9 +5,9 @@ from random import Random
 import numpy as np
 import pytest
 
-from laboratories.disk import Node, SimulatedComputer
-from laboratories.fate import Event, Fate, Killed
 from levilab.computer import at_another_computer
+from levilab.laboratory.disk import Node, SimulatedComputer
+from levilab.laboratory.fate import Event, Fate, Killed
 from levilab.sweeps.run import tasks_of
 from levilab.sweeps.store import Store
 from support.maps import cheap_values, expected, plan

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from random import Random
 
-    from laboratories.fate import Fate
+    from levilab.laboratory.fate import Fate
 
 #: When each laboratory begins.
 _BEGIN = datetime(2026, 11, 20, 10, 15, tzinfo=UTC)

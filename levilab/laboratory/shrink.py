@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from laboratories.plan import MOST_LIVES, Plan
-from laboratories.visit import Told, visit
+from levilab.laboratory.plan import MOST_LIVES, Plan
+from levilab.laboratory.visit import Told, visit
 
 #: More attempts would take longer than a person waits.
 _MOST_TRIES = 200
@@ -13,7 +13,7 @@ _MOST_TRIES = 200
 def shrink(told: Told, status_of: Callable[[Exception], int | None]) -> Told:
     """Return the smallest laboratory that was found to break the first of the same rules.
 
-    status_of: see `laboratories.visit.Visit`.
+    status_of: see `levilab.laboratory.visit.Visit`.
     """
     oracle, tries = told.findings[0].oracle, 0
     again = True

@@ -7,8 +7,8 @@ from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, field
 from functools import partial
 
-from laboratories.plan import draw
-from laboratories.visit import Told, visit
+from levilab.laboratory.plan import draw
+from levilab.laboratory.visit import Told, visit
 from levilab.workers.ways import processes
 
 StatusOf = Callable[[Exception], int | None]
@@ -52,7 +52,7 @@ def explore(
 
     Args:
         seed: of the first one.
-        status_of: see `laboratories.visit.Visit`; another process finds it by its name.
+        status_of: see `levilab.laboratory.visit.Visit`; another process finds it by its name.
         number: of laboratories; None: no end.
         seconds: after which no more are begun; None: no end.
         cores: None: all.

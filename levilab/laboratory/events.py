@@ -13,9 +13,9 @@ from instruments.virtual.bench.faults import Fault as LinkFault
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from laboratories.bench import LaboratoryBench, LaboratoryClock, LaboratoryPerson
-    from laboratories.disk import SimulatedComputer
-    from laboratories.fate import Fate
+    from levilab.laboratory.bench import LaboratoryBench, LaboratoryClock, LaboratoryPerson
+    from levilab.laboratory.disk import SimulatedComputer
+    from levilab.laboratory.fate import Fate
     from levilab.world.spin_world import World
 
 T = TypeVar("T")

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 from random import Random
 
 from instruments.catalogue import CATALOGUE
-from laboratories.events import EVENTS
-from laboratories.fate import Event
+from levilab.laboratory.events import EVENTS
+from levilab.laboratory.fate import Event
 from levilab.simulator.laws import LAWS
 from levilab.world.light import Tape
 from levilab.world.spin_world import SpinScene, random_scene

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from laboratories.bench import LaboratoryBench
-from laboratories.events import out_s
-from laboratories.plan import Plan
 from levilab.acquisition.session import Row, Session
 from levilab.errors import LevilabError
+from levilab.laboratory.bench import LaboratoryBench
+from levilab.laboratory.events import out_s
+from levilab.laboratory.plan import Plan
 from levilab.runs.run import Run
 from levilab.simulator.laws import LAWS
 from levilab.world.spin_world import SpinWorld, World

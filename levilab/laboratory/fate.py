@@ -14,7 +14,7 @@ class Event:
     """Something that goes wrong.
 
     Attributes:
-        what: a name in `laboratories.events.EVENTS`.
+        what: a name in `levilab.laboratory.events.EVENTS`.
         life: in which process of the laboratory, from 0 on.
         at: at which of its steps, or of the person's tasks.
         value: what it draws, from 0 to 1.

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
     from instruments.virtual.bench.session import Session
     from instruments.virtual.core.device import VirtualInstrument
-    from laboratories.disk import SimulatedComputer
-    from laboratories.fate import Fate
     from levilab.bench.config import Limits
     from levilab.bench.wiring import Wiring
+    from levilab.laboratory.disk import SimulatedComputer
+    from levilab.laboratory.fate import Fate
     from levilab.world.spin_world import World
 
 #: Time that a person takes for a task [s].

@@ -19,13 +19,6 @@ from typing import Any
 
 from analysis.errors import AnalysisError
 from instruments.errors import InstrumentError
-from laboratories import judge
-from laboratories.bench import LaboratoryBench, LaboratoryClock, LaboratoryPerson, laboratory_wiring
-from laboratories.disk import SimulatedComputer
-from laboratories.events import EVENTS
-from laboratories.fate import Event, Fate, Killed
-from laboratories.judge import Finding, Life
-from laboratories.plan import MOST_LIVES, Plan
 from levilab.acquisition.loop import AcquisitionRequest, acquire
 from levilab.acquisition.request import AcquisitionOptions, request_for
 from levilab.acquisition.session import Row, Session
@@ -34,6 +27,13 @@ from levilab.bench.config import Limits
 from levilab.bench.wiring import Wiring
 from levilab.computer import at_another_computer
 from levilab.errors import LevilabError
+from levilab.laboratory import judge
+from levilab.laboratory.bench import LaboratoryBench, LaboratoryClock, LaboratoryPerson, laboratory_wiring
+from levilab.laboratory.disk import SimulatedComputer
+from levilab.laboratory.events import EVENTS
+from levilab.laboratory.fate import Event, Fate, Killed
+from levilab.laboratory.judge import Finding, Life
+from levilab.laboratory.plan import MOST_LIVES, Plan
 from levilab.pipelines.suits import analyze_suiting
 from levilab.present.progress import Display
 from levilab.report.document import document_of
