@@ -30,8 +30,8 @@ SLOW = """
     analysis/pulses/test_trace.py  analysis/rotation/test_track.py  analysis/spindown/test_fit.py
     analysis/spindown/test_tilt.py  analysis/sway/test_sway.py  analysis/test_comparison.py
     instruments/drivers/counter/test_phyphox.py  instruments/drivers/oscilloscope/test_on_the_bench.py
-    instruments/links/test_wire_faults.py  instruments/links/test_wire.py  instruments/virtual/bench/test_fuzz.py
-    instruments/virtual/core/test_long_lines.py  instruments/virtual/servers/test_at_work.py
+    instruments/virtual/bench/test_fuzz.py  instruments/virtual/core/test_long_lines.py
+    instruments/virtual/servers/test_at_work.py
     levilab/acquisition/experiments/test_hold.py  levilab/acquisition/experiments/test_limit.py
     levilab/acquisition/experiments/test_precession.py  levilab/acquisition/experiments/test_sway.py
     levilab/acquisition/experiments/test_trace.py  levilab/acquisition/test_loop.py  levilab/acquisition/test_losses.py

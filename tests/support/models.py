@@ -67,4 +67,5 @@ MEASUREMENTS = {"counter": _count, "generator": _generate, "oscilloscope": _reco
 def measure(name, driver):
     """A measurement as a program makes it, with a far end that is in order."""
     driver.forget_errors()
+    driver.identity()
     MEASUREMENTS[KIND_OF[name]](driver)

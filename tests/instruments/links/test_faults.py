@@ -5,15 +5,18 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.drivers.scpi import ScpiInstrument, parse_reading
 from instruments.drivers.setting import Setting
-from instruments.errors import BadAnswer, CommandRefused, NoAnswer, NotConnected
+from instruments.errors import BadAnswer, CommandRefused, InstrumentError, NoAnswer, NotConnected
 from instruments.links.opening import open_link
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.faults import FAULTS, LATE, Fault
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import VirtualInstrument
 from instruments.virtual.core.rows import Ask, Number
+from support import hostile
+from support.models import FAMILIES, ROWS, SERIAL, measure
 
 MESSAGES, STREAM = "TCPIP0::box.levilab::inst0::INSTR", "TCPIP0::box.levilab::5025::SOCKET"
+LINE = "ASRLbox.levilab::INSTR"
 DATA = bytes(range(256)) * 3
 
 
@@ -173,3 +176,71 @@ def test_a_lock_keeps_another_program_out_and_is_gone_with_its_link(box):
     other.close()
     box.transport.lock()
     assert box.reading() == 25.0
+
+
+# --- every driver ---
+
+#: The first model of each driver.
+MODELS = sorted({ROWS[name].driver: name for name in reversed(FAMILIES)}.values())
+NOTICED = ["late answer", "two answers at once", "garbage before", "cut in the middle", "disconnected"]
+
+
+def connect(name):
+    """A driver, the bench at which its instrument is, and the clock there; a stream, or a serial line."""
+    driver, room = ROWS[name].driver, hostile.Room()
+    address = LINE if name in SERIAL else STREAM
+    bench = VirtualBench({address: hostile.instrument(name, room)})
+    line = {key: value for key, value in driver.SERIAL.items() if key != "pause"}
+    clock = {"clock": room.clock} if hasattr(driver, "CHANNEL") else {}
+    return driver(open_link(address, library=library_for(bench), line=line), **clock), bench, room.clock
+
+
+def error_of(name, driver):
+    """The error in which a measurement ends; None where it is right."""
+    try:
+        measure(name, driver)
+    except InstrumentError as error:
+        return error
+    return None
+
+
+@pytest.mark.parametrize("what", NOTICED)
+@pytest.mark.parametrize("name", MODELS)
+def test_a_fault_gives_each_driver_the_right_value_or_an_error_and_no_more(name, what):
+    driver, bench, clock = connect(name)
+    count = Fault(what, times=0)
+    bench.faults.append(count)
+    measure(name, driver)
+    for place in (0.0, 0.5, 0.99):
+        bench.faults[:] = [Fault(what, after=int(place * count.seen))]
+        if error := error_of(name, driver):
+            assert error.address == driver.transport.address
+            assert "\n" not in str(error)
+            clock.sleep(60.0)
+        if isinstance(error, NotConnected):
+            driver.transport.reopen()
+        bench.faults.clear()
+        measure(name, driver)
+
+
+@pytest.mark.parametrize(
+    ("name", "question", "line"),
+    [
+        ("53230A", r"READ\?", b"9" * 5000 + b",x"),  # longer than Python makes a whole number of
+        ("425", r".*RDGFIELD\?.*", b"9" * 5000),
+        ("DS1000Z", r":WAV:PRE\?", b""),
+        ("DS1000Z", r":WAV:PRE\?", b"0,0,1e999,1,1,0,0,1,0,0"),
+        ("DSOX1000", r":WAV:PRE\?", b"0,0,1e18,1,1,0,0,1,0,0"),  # more than there is memory for
+        ("DSOX1000", r":WAV:PRE\?", b"0,0,1000,1,nan,0,0,nan,0,0"),
+        ("33500B", r".*FREQ\?", b"+9.91E+37"),  # "not a number" is no setting
+        ("33500B", r".*VOLT\?", b"nan"),
+        ("33500B", r"\*IDN\?", b"\x7f~#!Agilent Technologies,33522B,1,1"),
+        ("DS1000Z", r"\*IDN\?", b"DS1054Z"),
+    ],
+)
+def test_an_answer_that_has_broken_a_driver_is_an_error(monkeypatch, name, question, line):
+    driver, bench, _ = connect(name)
+    monkeypatch.setitem(FAULTS, "a lie", lambda _, answer: answer._replace(data=line + b"\n"))
+    bench.faults.append(Fault("a lie", question=question))
+    assert error_of(name, driver)
+    assert bench.faults[0].seen

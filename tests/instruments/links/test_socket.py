@@ -1,4 +1,4 @@
-"""The transport over a TCP connection on loopback, with pyvisa-py; test_wire_faults.py has what goes wrong on it."""
+"""The transport over TCP on loopback, with pyvisa-py: silence, a lost connection, each driver over each protocol."""
 
 import contextlib
 import socket
@@ -9,6 +9,13 @@ import pytest
 
 from instruments.errors import NoAnswer, NotConnected
 from instruments.links.opening import open_link
+from instruments.virtual.bench.bench import VirtualBench
+from instruments.virtual.bench.faults import Fault
+from instruments.virtual.servers.server import BenchServer
+from support import hostile
+from support.models import FAMILIES, ROWS, measure
+from support.served import Thing
+from support.served import serving as serving_things
 from support.waiting import HANG_GUARD_S as AT_MOST
 
 #: A time-out that is meant to be reached [s].
@@ -96,3 +103,29 @@ def test_a_port_where_no_program_listens_raises():
         address = server.address
     with pytest.raises(NotConnected), contextlib.closing(open_link(address)) as transport:
         transport.query("*IDN?")
+
+
+PROTOCOLS = ("socket", "hislip", "vxi11")
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("name", FAMILIES)
+def test_a_driver_measures_over_each_protocol(name, protocol):
+    room = hostile.Room()
+    with BenchServer(VirtualBench({"TCPIP0::box::inst0::INSTR": hostile.instrument(name, room)})) as server:
+        link = open_link(server.endpoints[0].resources[protocol], timeout=AT_MOST)
+        clock = {"clock": room.clock} if hasattr(ROWS[name].driver, "CHANNEL") else {}
+        with contextlib.closing(ROWS[name].driver(link, **clock)) as driver:
+            measure(name, driver)
+
+
+@pytest.mark.parametrize("what", ["no answer", "late answer"])
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_after_a_silence_the_next_question_gets_its_answer(protocol, what):
+    with serving_things() as served:
+        served.server.bench.faults.append(Fault(what, question="LEV.*"))
+        with contextlib.closing(open_link(served.names()[protocol], timeout=SHORT)) as transport:
+            with pytest.raises(NoAnswer):
+                transport.query("LEV?")
+            transport.timeout = AT_MOST
+            assert transport.query("*IDN?") == Thing.identity

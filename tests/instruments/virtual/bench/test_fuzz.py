@@ -1,6 +1,6 @@
 """Whatever a program sends: no instrument hangs, crashes or grows, and it works afterwards.
 
-What an instrument may answer is in links/test_wire_faults.py.
+What an instrument may answer is in links/test_faults.py.
 """
 
 import itertools
