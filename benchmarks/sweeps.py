@@ -24,7 +24,9 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,12 +41,10 @@ from levilab.sweeps.observables import cut
 from levilab.sweeps.plan import Plan
 from levilab.sweeps.run import compile_for, compute, tasks_of, with_step
 from levilab.sweeps.store import Store
-from levilab.workers import cluster, processes, results_of, this_process, threads
+from levilab.workers import Workers, cluster, processes, results_of, this_process
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-
-    from levilab.workers import Workers
 
 RESULTS = Path(__file__).parent / "results" / "sweeps.json"
 #: Points of the map along each axis, and seconds of motion, by what is observed.
@@ -71,7 +71,8 @@ def main() -> None:
     begun = time.perf_counter()
     with dask_cluster(2) as address:
         ways = {
-            "this process": this_process(), "1 process": processes(1), "2 threads": threads(2),
+            "this process": this_process(), "1 process": processes(1),
+            "2 threads": Workers(partial(ThreadPoolExecutor, 2), 2, elsewhere=False),
             "2 processes": processes(2), "Dask, 2 workers": cluster(address),
         }  # fmt: skip
         found: dict[str, Any] = {"machine": {"processor": processor(), "cores": os.cpu_count()}, "brief": options.brief}

@@ -1,4 +1,4 @@
-"""Compute many independent tasks: in this process, in threads, in processes, or on a cluster.
+"""Compute many independent tasks: in this process, in processes, or on a cluster.
 
     with contextlib.closing(results_of(function, tasks, processes(4))) as results:
         for done in results:
@@ -10,6 +10,6 @@
 
 from levilab.workers.dask import cluster
 from levilab.workers.results import Done, results_of
-from levilab.workers.ways import Workers, processes, this_process, threads
+from levilab.workers.ways import Workers, processes, this_process
 
-__all__ = ["Done", "Workers", "cluster", "processes", "results_of", "this_process", "threads"]
+__all__ = ["Done", "Workers", "cluster", "processes", "results_of", "this_process"]

@@ -1,8 +1,8 @@
-"""Kinds of workers: this process, threads, processes, or any executor of a caller."""
+"""Kinds of workers: this process, processes, or any executor of a caller."""
 
 import os
 from collections.abc import Callable
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -57,19 +57,6 @@ class Workers:
 def this_process() -> Workers:
     """Compute one task after the other in this thread; nothing is started or pickled."""
     return Workers(_InThisThread, name="this process", elsewhere=False, in_flight=1)
-
-
-def threads(count: int | None = None) -> Workers:
-    """Return workers in threads of this process, for functions that release Python's lock most of the time.
-
-    Args:
-        count: None: one for each core that this process may use.
-
-    Raises:
-        UsageError: the count makes no sense.
-    """
-    number = _count_of(count)
-    return Workers(partial(ThreadPoolExecutor, number), number, "threads", elsewhere=False)
 
 
 def processes(count: int | None = None) -> Workers:

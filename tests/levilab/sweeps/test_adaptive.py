@@ -1,6 +1,7 @@
 """An adaptive map in its store: right where it is computed, marked where not, the same however it came about."""
 
 import contextlib
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from levilab.sweeps.adaptive import FOUND, begin_adaptive, in_words, run_adaptiv
 from levilab.sweeps.observables import observe
 from levilab.sweeps.plan import Axis, Plan
 from levilab.sweeps.store import Store
-from levilab.workers import this_process, threads
+from levilab.workers import Workers, this_process
 
 SCENE = preset("undriven").changed({"start.place": "given"})
 
@@ -57,7 +58,7 @@ def test_a_map_with_islands_agrees_with_the_full_one_within_its_limit():
 def test_the_result_does_not_depend_on_the_workers(monkeypatch):
     monkeypatch.setattr(adaptive, "compute", made_up)
     asked, found = plan(41, 41, 0.01), []
-    for workers in (this_process(), threads(3)):
+    for workers in (this_process(), Workers(lambda: ThreadPoolExecutor(3), 3, elsewhere=False)):
         store = Store.create(None, asked)
         begin_adaptive(store, audit=100)
         report = run_adaptive(store, workers)

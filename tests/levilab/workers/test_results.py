@@ -14,12 +14,13 @@ from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 import pytest
 
 from levilab.errors import LevilabError, UsageError, WorkersLost
-from levilab.workers import Workers, packing, processes, results, results_of, this_process, threads
+from levilab.workers import Workers, packing, processes, results, results_of, this_process
 from levilab.workers.pool import Pool
 from support import tasks
 from support.worker_sockets import DEADLINE_S, assert_dead, listening, worker_at_work
 
-WAYS = {"this process": this_process(), "threads": threads(2), "processes": processes(2)}
+THREADS = Workers(lambda: ThreadPoolExecutor(2), 2, elsewhere=False)
+WAYS = {"this process": this_process(), "threads": THREADS, "processes": processes(2)}
 
 
 @pytest.mark.parametrize("name", WAYS)
@@ -44,7 +45,7 @@ def test_tasks_are_taken_only_as_they_are_needed():
             taken.append(n)
             yield n
 
-    with contextlib.closing(results_of(tasks.square, endless(), threads(2), window=8)) as results:
+    with contextlib.closing(results_of(tasks.square, endless(), THREADS, window=8)) as results:
         assert len(list(itertools.islice(results, 100))) == 100
     assert len(taken) <= 100 + 8
 
