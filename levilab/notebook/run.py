@@ -10,7 +10,7 @@ import levilab
 from levilab.errors import UsageError
 from levilab.notebook.analysis import analyze_data
 from levilab.notebook.labels import dataset_of_contents
-from levilab.notebook.names import Exportable, Helpful, NoSuchAttribute, bare, meant
+from levilab.notebook.names import Exportable, Helpful, bare, meant
 from levilab.notebook.quantity import NoSuchName
 from levilab.present.html import facts_as_html, table_as_html
 from levilab.report.export.contents import contents_of_results
@@ -19,35 +19,15 @@ from levilab.runs.run import Run
 from levilab.texts.text import how_many
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Mapping, Sequence
+    from collections.abc import Iterator, Mapping, Sequence
     from os import PathLike
 
     import pandas as pd
     import xarray
 
-    from levilab.formats.table import Table
     from levilab.notebook.figure import Axes
     from levilab.notebook.result import AnalysisResult
     from levilab.present.style import Figure
-
-
-@dataclass(frozen=True)
-class _Readings:
-    """A run's `readings()`; taken for the readings themselves, it says how to have those."""
-
-    read: Callable[[], Table]
-
-    def __call__(self) -> Table:
-        return self.read()
-
-    def __repr__(self) -> str:
-        return "<readings of a run: call readings() for a table, or take df>"
-
-    @bare
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-        raise NoSuchAttribute(f"readings has no {name!r}: take df.{name}")
 
 
 @dataclass(frozen=True, repr=False)
@@ -81,11 +61,6 @@ class RecordedRun(Exportable, Run):
     def path(self) -> Path:
         """Its folder."""
         return self.folder
-
-    @property
-    def readings(self) -> _Readings:
-        """Its readings, as `readings()` returns them; `df` is a DataFrame."""
-        return _Readings(super().readings)
 
     @property
     def df(self) -> pd.DataFrame:
