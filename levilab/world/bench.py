@@ -12,7 +12,6 @@ import numpy as np
 from instruments.catalogue import CATALOGUE
 from instruments.clock import Clock, VirtualClock
 from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.protocol_levilab import plug_in
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.core.device import VirtualInstrument
 from levilab.bench.config import ConfigError, InstrumentSettings, Limits
@@ -228,20 +227,6 @@ class VirtualPerson:
             case ShieldProbe():
                 self.world.place_probe(None)
         return ""
-
-
-def plug_in_serial(bus: VirtualBench | None = None) -> VirtualBench:
-    """Let pyserial find a virtual bench, and return the bench.
-
-    From then on ``serial.serial_for_url("levilab://magnetometer")`` is its magnetometer, and for pyvisa-py
-    ``ASRLlevilab://magnetometer::INSTR``.
-
-    Args:
-        bus: by default a fresh bench with a top of its own.
-    """
-    bus = bus or virtual_bus()
-    plug_in(lambda: bus)
-    return bus
 
 
 #: Time from a fall until the top floats again on a bench for practice [s].

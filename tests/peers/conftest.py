@@ -12,9 +12,9 @@ import pytest
 import pyvisa
 
 from instruments.virtual.bench.bench import VirtualBench
+from instruments.virtual.bench.protocol_levilab import plug_in
 from instruments.virtual.bench.visa_library import library_for
 from instruments.virtual.servers.server import BenchServer
-from levilab.world.bench import plug_in_serial
 
 #: The modules that need another program than PyMeasure.
 PROGRAMS = {"test_pymodaq.py": "pymodaq"}
@@ -70,7 +70,7 @@ def _reached(bench, way):
         yield address, {"visa_library": library}
         pyvisa.ResourceManager(library).close()
     elif way == "pyserial":
-        plug_in_serial(bench)
+        plug_in(bench)
         yield "ASRLlevilab://there::INSTR", {"visa_library": "@py"}
     else:
         with BenchServer(bench) as server:

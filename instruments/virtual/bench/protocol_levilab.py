@@ -1,34 +1,35 @@
 """The virtual instruments for pyserial: ``serial.serial_for_url("levilab://magnetometer")``.
 
-pyserial imports this module by its name; :func:`plug_in` registers this package with pyserial, and in
-:data:`instruments.virtual.bench.serial_line.benches` the bench that the URL means.  pyvisa-py takes the same URL as
-``ASRLlevilab://magnetometer::INSTR``.
+pyserial imports this module by its name; :func:`plug_in` registers this package with pyserial, and the bench that the
+URL means.  pyvisa-py takes the same URL as ``ASRLlevilab://magnetometer::INSTR``.
 """
 
 import contextlib
 import errno
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
 import serial
 from serial.serialutil import PortNotOpenError, SerialBase, SerialException
 
 from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.serial_line import SerialLine, benches
+from instruments.virtual.bench.serial_line import SerialLine
 from instruments.virtual.bench.session import LinkLost, Session
 from instruments.virtual.core.line import LineSettings
 
 #: Where pyserial looks for the module of a URL's scheme: the package that this one is in.
 _PACKAGE = __name__.rpartition(".")[0]
+#: The benches that were plugged in: the last one is found.
+plugged: list[VirtualBench] = []
 
 
-def plug_in(bench: Callable[[], VirtualBench], name: str = "") -> None:
-    """Let pyserial find this bench from now on, as ``levilab://instrument?bench=name`` (no name: without the query)."""
+def plug_in(bench: VirtualBench) -> None:
+    """Let pyserial find this bench from now on, its magnetometer as ``levilab://magnetometer``."""
     if _PACKAGE not in serial.protocol_handler_packages:
         serial.protocol_handler_packages.append(_PACKAGE)
-    benches[name] = bench
+    plugged.append(bench)
 
 
 class Serial(SerialBase):
@@ -131,12 +132,7 @@ def _use(line: SerialLine) -> Iterator[SerialLine]:
 
 def _open_session(url: str) -> Session:
     """Open a session with the instrument that the URL names.  Raises SerialException."""
-    parts = urlsplit(url)
-    wanted = parse_qs(parts.query).get("bench", [""])[0]
-    if wanted not in benches:
-        raise SerialException(errno.ENOENT, f"no virtual bench is named {wanted!r}: known are {sorted(benches)}")
-    bench = benches[wanted]()
-    name = parts.netloc
+    bench, name = plugged[-1], urlsplit(url).netloc
     plain = name.upper().removeprefix("ASRL")
     for address in (f"ASRLlevilab://{name}::INSTR", f"ASRL{plain}.levilab::INSTR", f"ASRL{plain}::INSTR"):
         if session := bench.open(address):

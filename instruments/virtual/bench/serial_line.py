@@ -5,14 +5,9 @@ receiver samples the sender's bits at the wrong places, as a UART does, and gets
 """
 
 import math
-from collections.abc import Callable
 
-from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.bench.session import ClientLock, Session
 from instruments.virtual.core.line import LineSettings, receive
-
-#: Where the URL handler finds the benches: by the name in ``levilab://instrument?bench=name``, "" when there is none.
-benches: dict[str, Callable[[], VirtualBench]] = {}
 
 #: What one look for received bytes costs [s], so that a program that waits by polling advances on a virtual clock, too.
 _LOOK = 1e-3

@@ -10,7 +10,7 @@ from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected
 from instruments.links.opening import open_link
 from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.serial_line import benches
+from instruments.virtual.bench.protocol_levilab import plugged
 from instruments.virtual.bench.visa_library import library_for
 from support.slow import ANY_BYTES, IDENTITY, Slow
 
@@ -35,7 +35,7 @@ def link(request, clock, monkeypatch):
     monkeypatch.setattr(
         serial, "protocol_handler_packages", [*serial.protocol_handler_packages, "instruments.virtual.bench"]
     )
-    monkeypatch.setitem(benches, "", lambda: bench)
+    plugged.append(bench)
     with contextlib.closing(open_link(port) if port else open_link(address, library=library_for(bench))) as link:
         yield link
 

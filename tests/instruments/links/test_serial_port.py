@@ -21,7 +21,7 @@ from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnecte
 from instruments.links.opening import open_link
 from instruments.links.serial_port import port_name
 from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.serial_line import benches
+from instruments.virtual.bench.protocol_levilab import plugged
 from instruments.virtual.core.line import LineSettings, receive
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from support.slow import IDENTITY, Slow
@@ -50,7 +50,7 @@ def bench(clock, monkeypatch):
     monkeypatch.setattr(
         serial, "protocol_handler_packages", [*serial.protocol_handler_packages, "instruments.virtual.bench"]
     )
-    monkeypatch.setitem(benches, "", lambda: bench)
+    plugged.append(bench)
     return bench
 
 
@@ -300,7 +300,6 @@ def test_a_read_that_would_wait_for_ever_raises(bench):
     [
         ("levilab://absent", "no 'absent' on a serial line: it has ASRLlevilab"),
         ("levilab://gpib0::1", "no 'gpib0::1'"),
-        ("levilab://slow?bench=other", "no virtual bench is named 'other'"),
     ],
 )
 def test_a_url_that_leads_nowhere(bench, url, words):

@@ -9,10 +9,10 @@ from instruments.catalogue import COUNTERS
 from instruments.drivers.counter.keysight_53230a import Keysight53230A
 from instruments.drivers.counter.pendulum_cnt91 import PendulumCNT91
 from instruments.links.opening import open_link
-from instruments.virtual.bench import serial_line
+from instruments.virtual.bench.protocol_levilab import plug_in
 from instruments.virtual.bench.visa_library import library_for
 from levilab.bench.config import ConfigError
-from levilab.world.bench import VIRTUAL, plug_in_serial, practice_world, virtual_bus
+from levilab.world.bench import VIRTUAL, practice_world, virtual_bus
 
 LINE = {"baudrate": 57600, "bytesize": 7, "parity": "O", "timeout": 1.0}
 
@@ -21,10 +21,7 @@ LINE = {"baudrate": 57600, "bytesize": 7, "parity": "O", "timeout": 1.0}
 def pyserial(monkeypatch):
     """pyserial, put back afterwards."""
     monkeypatch.setattr(serial, "protocol_handler_packages", ["serial.urlhandler"])
-    monkeypatch.setattr(serial_line, "benches", serial_line.benches)
-    monkeypatch.delitem(serial_line.benches, "", raising=False)
-    yield serial
-    serial_line.benches.pop("", None)
+    return serial
 
 
 def who_is_at(url):
@@ -36,15 +33,16 @@ def who_is_at(url):
 def test_pyserial_finds_the_magnetometer_of_a_fresh_bench(pyserial):
     with pytest.raises(ValueError, match="not known"):
         serial.serial_for_url("levilab://magnetometer")
-    bus = plug_in_serial()
+    bus = virtual_bus()
+    plug_in(bus)
     assert set(bus.instruments) == {settings.address for settings in VIRTUAL.values()}
     assert who_is_at("levilab://magnetometer") == b"LSCI,MODEL425,VIRTUAL,1.0\r\n"
 
 
 def test_the_bench_given_is_the_one_that_pyserial_finds_however_often_it_is_plugged_in(pyserial):
-    plug_in_serial()
+    plug_in(virtual_bus())
     bus = virtual_bus()
-    assert plug_in_serial(bus) is bus
+    plug_in(bus)
     assert pyserial.protocol_handler_packages.count("instruments.virtual.bench") == 1
     before = bus.instruments[VIRTUAL["magnetometer"].address].clock.now()
     who_is_at("levilab://magnetometer")
