@@ -67,13 +67,6 @@ def test_a_property_of_the_scope(scope, name, values):
         assert getattr(scope, name) == value
 
 
-@pytest.mark.parametrize("points", [100, 250, 500, 1000, 2000, 5000, 10000, 20000, 50000, 62500])
-def test_a_number_of_points(scope, points):
-    scope.waveform_points_mode = "raw"
-    scope.waveform_points = points
-    assert scope.waveform_points == points
-
-
 def test_a_whole_setting_at_once(scope):
     scope.ch1.setup(
         probe_attenuation=1, coupling="dc", vertical_range=1.6, offset=0.2, bwlimit=True, display=True, label="photo"

@@ -21,6 +21,7 @@ def converter():
 
 def test_a_message_behind_one_without_an_answer_is_sent_at_once(converter):
     transport, _ = converter
+    transport.lock()  # sockets have none
     assert transport.port.connection().getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
 
 

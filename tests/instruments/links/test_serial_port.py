@@ -3,7 +3,6 @@
 import contextlib
 import errno
 import os
-import socketserver
 import sys
 import threading
 from unittest.mock import Mock
@@ -330,42 +329,6 @@ def test_pyvisa_py_takes_the_url_too(bench):
 
 
 # --- real links ---
-
-
-class Connection(socketserver.StreamRequestHandler):
-    """Answers ``*IDN?`` and ``TEXT?``, byte by byte; ``BYE`` ends the connection."""
-
-    def handle(self):
-        for line in self.rfile:
-            answer = {b"*IDN?\n": b"levilab,loopback,0,0\r\n", b"TEXT?\n": b"+1.0\r\n"}.get(line, b"")
-            if line == b"BYE\n":
-                return
-            for byte in answer:
-                self.wfile.write(bytes([byte]))
-                self.wfile.flush()
-
-
-@contextlib.contextmanager
-def serving():
-    socketserver.ThreadingTCPServer.allow_reuse_address = True
-    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), Connection) as server:
-        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
-        thread.start()
-        try:
-            yield f"socket://127.0.0.1:{server.server_address[1]}"
-        finally:
-            server.shutdown()
-            thread.join(AT_MOST)
-
-
-def test_a_line_behind_a_socket_that_is_lost_and_found_again():
-    with serving() as address, contextlib.closing(open_link(address, timeout=AT_MOST)) as transport:
-        transport.lock()  # sockets have none
-        assert transport.query("TEXT?") == "+1.0"
-        with pytest.raises(NotConnected):
-            transport.query("BYE")
-        transport.reopen()
-        assert transport.query("TEXT?") == "+1.0"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="a pseudo-terminal")

@@ -87,7 +87,7 @@ def test_an_input_that_is_unplugged_for_a_while_costs_readings_and_no_more(tmp_p
 
         card.open_input = open_input
 
-    run = acquire(with_card(request("spin", tmp_path, *RAISED_QUICKLY), unplug), Silent())
+    run = acquire(with_card(request("spin", tmp_path, *RAISED_QUICKLY, "spin.longest_s=80"), unplug), Silent())
     assert run.status == "finished"
     kinds = [event["kind"] for event in run.events()]
     assert "instrument lost" in kinds
@@ -159,15 +159,16 @@ def test_any_oscilloscope_can_count(tmp_path):
 
 @pytest.mark.parametrize("experiment", ["spin", "limit"])
 def test_a_top_that_is_spun_by_hand_needs_no_generator(experiment, tmp_path):
-    more = ("limit.repetitions=1",) if experiment == "limit" else ()
-    run = acquire(request(experiment, tmp_path, f"{experiment}.drive_waveform=NONE", *more), Silent())
+    is_limit = experiment == "limit"
+    ends = "limit.repetitions=1" if is_limit else "spin.longest_s=80"
+    run = acquire(request(experiment, tmp_path, f"{experiment}.drive_waveform=NONE", ends), Silent())
     assert "generator" not in run.record.instruments
-    assert run.count() == 1 if more else run.count() > 5
-    if more:
+    assert run.count() == 1 if is_limit else run.count() > 5
+    if is_limit:
         limit, u = (run.readings().column(name)[0] for name in ("spin_frequency_hz", "spin_frequency_u_hz"))
         fell = float(run.record.synthetic_how.rpartition("the first at ")[2].split()[0])
         assert limit == pytest.approx(fell, abs=4 * u)
-    analysis = ANALYSES["limit" if more else "spindown"]
+    analysis = ANALYSES["limit" if is_limit else "spindown"]
     assert analysis.analyze([run.folder]).runs
 
 

@@ -47,9 +47,3 @@ def test_each_value_has_a_word_and_no_type_of_python():
 
 def test_a_misspelt_command_below_a_stand_in_gets_its_suggestion(tmp_path):
     assert "Did you mean 'spin'?" in command("acquire", "spni", cwd=tmp_path).err
-
-
-def test_a_wrong_value_is_refused_in_plain_words(tmp_path):
-    said = command("bench", "serve", "--speed", "fast", cwd=tmp_path).err
-    assert "'--speed': 'fast': a number is expected" in said
-    assert "Input should" not in said

@@ -3,7 +3,6 @@
 What an instrument may answer is in links/test_faults.py.
 """
 
-import itertools
 import math
 import tracemalloc
 
@@ -79,29 +78,6 @@ def test_no_message_makes_an_instrument_crash_hang_or_grow(name, stream):
         bench.recover()
 
     any_messages()
-
-
-@pytest.mark.parametrize("name", ["53230A", "33500B", "425"])
-def test_bytes_cut_anywhere_make_the_same_messages(name):
-    """One with blocks among them; core/test_message.py cuts what all of them read messages with."""
-
-    @FEW
-    @given(st.lists(MESSAGES[name], min_size=1, max_size=4).map(b"\n".join), st.lists(st.integers(1, 30), min_size=1))
-    def any_cuts(data, sizes):
-        data += b"\n"
-        whole, pieces = hostile.Bench(name, stream=True), hostile.Bench(name, stream=True)
-        whole.send(data)
-        place = 0
-        for size in itertools.cycle(sizes):
-            pieces.send(data[place : place + size])
-            place += size
-            if place >= len(data):
-                break
-        assert pieces.device.settings == whole.device.settings
-        assert pieces.device.parser.errors == whole.device.parser.errors
-        assert pieces.read() == whole.read()
-
-    any_cuts()
 
 
 @pytest.mark.parametrize("name", ["53230A", "33500B", "DS1000Z", "475"])

@@ -82,12 +82,12 @@ def compare(found, flight):
 
 
 def test_a_dot_on_the_stem_shows_the_precession_and_the_size_of_the_rim_the_rise(folder, path):
-    level = level_flight(2.3, 31.0)
+    level = level_flight(1.7, 31.0)
     lean = 0.02 * np.exp(2j * np.pi * 7.3 * level.times) + 0.01 * np.exp(2j * np.pi * 1.1 * level.times)
     rise = 2e-3 * np.sin(2 * np.pi * 1.3 * level.times)
     flight = replace(level, lean=np.stack([lean.real, lean.imag], axis=1), rise=rise)
     camera = Camera(stem=0.02, distance=0.4)
-    stem = film(folder / "stem.mp4", camera, flight, phone_times(2.2)[::2])
+    stem = film(folder / "stem.mp4", camera, flight, phone_times(1.6)[::2])
     options = VideoOptions(rim_m=2 * RIM, stem_m=0.02, camera_m=0.47, height_m=0.07)
     video = ANALYSES["video"]
     analysis = video.analyze([stem], options)
