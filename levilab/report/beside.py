@@ -405,9 +405,11 @@ def _too_short(of: Class, k: int) -> str:
     lasts = [count_readings(of.groups[k]) if time is None else float(np.ptp(time)) for k, time in enumerate(times)]
     others = lasts[:k] + lasts[k + 1 :]
     usual = statistics.median_low(others) if len(others) > 1 else 0  # one may be too long itself
-    said = "{n:.0f} readings instead of {usual:.0f}: {advice}"
-    said = said if times[k] is None else "{n:.0f} s of readings instead of {usual:.0f} s: {advice}"
-    advice, run = "measure longer", of.groups[k].source.run
+    said, advice = "{n:.0f} readings instead of {usual:.0f}: {advice}", "measure longer"
+    if times[k] is not None:
+        said = "{n:.0f} s of readings instead of {usual:.0f} s: {advice}"
+        advice = "measure longer, if the times are right"
+    run = of.groups[k].source.run
     if run and run.status == "interrupted":
         goes_on = "the run was interrupted, levilab acquire {name:s} --resume {folder:s} continues it"
         advice = Text(goes_on, run.record.experiment, run.folder)
