@@ -49,16 +49,10 @@ def test_a_bench_finds_every_twin_by_the_identity_that_its_driver_reads(kind):
     for model in CATALOGUE[kind]:
         wiring = virtual_wiring(practice_world(), models={kind: model.name})
         with open_bench(wiring, (kind,)) as bench:
-            assert driver_for_identity(bench.instruments[kind].identity()) == (kind, model.name)
+            identity = bench.instruments[kind].identity()
+            assert driver_for_identity(identity) == (kind, model.name)
+            assert "VIRTUAL" in identity_fields(identity)[2]  # so that a run with it is known as synthetic
             assert {type(value) for value in bench.instruments[kind].settings().values()} <= {bool, int, float, str}
-
-
-@EACH
-def test_a_twin_gives_the_identity_by_which_its_driver_is_found(name):
-    opened = Opened(name)
-    identity = opened.driver.identity()
-    assert driver_for_identity(identity) == (KIND_OF[name], name)
-    assert "VIRTUAL" in identity_fields(identity)[2]  # so that a run with it is known as synthetic
 
 
 @EACH

@@ -283,14 +283,6 @@ def test_a_changed_setting_is_noticed_and_what_the_instrument_rounds_is_no_chang
     assert not getattr(driver, name).differs(now, now)
 
 
-def test_a_gate_that_another_program_changed_is_named():
-    lines = [*accepted("SENS:FREQ:GATE:TIME 0.001")]
-    with conversation(Keysight53230A, *lines) as counter:
-        counter.gate = 1e-3
-        now = {row.name_with_unit: 0.0 for row in counter.declared_settings()} | {"gate_s": 5e-3}
-        assert counter.changed_settings(now) == {"gate_s": (1e-3, 5e-3)}
-
-
 def test_closing_the_driver_closes_its_transport():
     with conversation(ScpiInstrument) as instrument:
         instrument.close()

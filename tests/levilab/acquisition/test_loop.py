@@ -403,7 +403,8 @@ def test_the_practice_benchs_top_falls_within_the_time_left_that_is_shown(tmp_pa
             between.append((elapsed + remaining[0], elapsed + remaining[1]))
 
     between = []
-    run = acquire(mock(tmp_path, 3, scene="practice"), Watching())
+    settings = ("spin.hold_s=0", "spin.drive_frequency_hz=32")
+    run = acquire(asked("spin", out=tmp_path, seed=3, scene="practice", settings=settings), Watching())
     (fell,) = [event["time_s"] for event in events(run, "fell")]
     for earliest, latest in between[len(between) // 2 :]:
         assert earliest < fell < latest

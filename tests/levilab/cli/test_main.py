@@ -211,9 +211,10 @@ def test_a_run_is_meant_by_its_short_name_and_not_resumed_once_finished(levilab)
         assert "is finished" in levilab("acquire", "spin", "--resume", name, check=1).stderr
 
 
-def test_a_reader_that_goes_away_costs_neither_the_run_nor_the_result(tmp_path):
+def test_a_reader_that_goes_away_costs_neither_the_run_nor_the_result(tmp_path, sample_data):
     """As in `levilab … | head -1`: the first line is read, then the pipe is closed."""
-    for words in (["acquire", "spin", "--mock", *QUICKLY], ["analyze", "spindown", "runs"]):
+    analyze = ["analyze", "field", sample_data / "field-scan", "--out", "found"]
+    for words in (["acquire", "spin", "--mock", *QUICKLY], analyze):
         process = subprocess.Popen(
             [sys.executable, "-m", "levilab", *words], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT
         )
@@ -222,7 +223,7 @@ def test_a_reader_that_goes_away_costs_neither_the_run_nor_the_result(tmp_path):
         process.wait(timeout=HANG_GUARD_S)
     (run,) = (tmp_path / "runs").iterdir()
     assert '"finished"' in (run / "run.json").read_text(encoding="utf-8")
-    assert (run / "result.json").exists()
+    assert (tmp_path / "found" / "result.json").exists()
 
 
 def test_the_bench_file_sets_the_experiment_of_the_virtual_bench_too(levilab, tmp_path):

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
-from instruments.virtual.core.message import Framer, split_parameters, split_units
 from instruments.virtual.core.parameters import MOST_DIGITS, boolean, number
 from instruments.virtual.core.parser import ScpiError
 from instruments.virtual.core.steps import Work
@@ -65,13 +64,6 @@ def test_a_long_line_is_worked_on_and_the_next_is_answered(text):
         send(counter, f"{header}{text}\n".encode())
         send(counter, b"*CLS\n")
     assert "53230A" in ask(counter, "*IDN?", timeout=1e9)
-
-
-@pytest.mark.parametrize("text", LONG.values(), ids=LONG)
-def test_a_long_line_is_cut_apart(text):
-    assert sum(len(message) for message in Framer().feed(text.encode() + b"\n")) == len(text)
-    assert sum(1 for parameter in split_parameters(text) if parameter is not None) <= MANY
-    assert sum(1 for unit in split_units(text) if unit) <= MANY
 
 
 def test_a_long_list_of_channels_is_none_and_is_not_read():
