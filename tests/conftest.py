@@ -51,7 +51,7 @@ SLOW = """
 #: all other slow ones, and .github/workflows/tests.yml carries out every test on each version.
 VERSIONED = """
     instruments/links  instruments/virtual/servers  levilab/cli  levilab/live/practice/test_bench.py
-    levilab/live/test_doors.py  levilab/live/test_hostile.py  levilab/live/test_serve.py
+    levilab/live/test_doors.py  levilab/live/test_serve.py
     levilab/notebook/test_front_door.py  levilab/notebook/test_guesses.py  levilab/runs  levilab/sweeps
     levilab/workers  levilab/world/test_serve.py
 """
