@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -126,8 +127,7 @@ class Waveform:
             NoSuchSignal: there is none of that name.
         """
         if wanted is None:
-            several = range(len(self.signals)) if len(self.signals) > 1 else ()
-            return next((k for k in several if any(np.ptp(block) for block in self.read(k))), 0)
+            return self._first_heard
         names = [signal.name.casefold() for signal in self.signals]
         if wanted.strip().casefold() in names:
             return names.index(wanted.strip().casefold())
@@ -136,6 +136,12 @@ class Waveform:
         has = quote_names(signal.name for signal in self.signals)
         what = "{path:s} has {names:s}: name one of them"
         raise NoSuchSignal("channel", what, shorten(str(self.path), 200), has, value=f"'{shorten(wanted)}'")
+
+    @cached_property
+    def _first_heard(self) -> int:
+        """The index of the first channel whose samples are not all equal, else 0; a silent one is read whole, once."""
+        several = range(len(self.signals)) if len(self.signals) > 1 else ()
+        return next((k for k in several if any(block.size and np.ptp(block) for block in self.read(k))), 0)
 
     def blocks(self, wanted: str | None = None) -> Iterator[Array]:
         """Return the samples of a channel in order, in blocks that fit into memory."""

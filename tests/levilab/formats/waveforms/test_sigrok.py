@@ -1,6 +1,7 @@
 """Captures of sigrok: levels and voltages in pieces, as sigrok-cli 0.7.2 writes them, and ZIPs that are bombs."""
 
 import zipfile
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -54,6 +55,15 @@ def test_levels_and_voltages_are_read_from_their_pieces(tmp_path, monkeypatch):
     np.testing.assert_array_equal(record.samples("D0"), LEVELS & 1)
     np.testing.assert_array_equal(record.samples("D9"), LEVELS >> 9 & 1)
     np.testing.assert_array_equal(record.samples("A0"), VOLTS)
+
+
+def test_silent_levels_that_are_longer_than_voltages_are_passed_over_and_read_once(tmp_path, monkeypatch):
+    monkeypatch.setattr(sigrok, "BLOCK", 99)
+    record = read_record(capture(tmp_path / "a.sr", **{"logic-1-1": bytes(5000), "logic-1-2": b"", "logic-1-10": b""}))
+    reads = []
+    record = replace(record, read=lambda k, read=record.read: (reads.append(k), read(k))[1])
+    assert [record.signal(), record.signal()] == [2, 2]
+    assert reads == [0, 1, 2]
 
 
 def test_the_sample_capture_has_the_tape_in_both_of_its_channels(sample_data):
