@@ -20,8 +20,7 @@ from levilab.settings import in_one_line
 Table = TypeVar("Table", BaseTable, TopTable)
 
 #: The thesis's top: what is taken where nothing is known, with a warning.
-THESIS = {"transverse": (1.04e-6, "kg m^2"), "axial": (1.731314e-6, "kg m^2"), "moment": (0.714, "A m^2"),
-          "radius": (0.0144, "m")}  # fmt: skip
+THESIS = {"transverse": (1.04e-6, "kg m^2"), "axial": (1.731314e-6, "kg m^2"), "moment": (0.714, "A m^2")}
 #: What a run says of the base and of the top begins with these in the settings of its experiment.
 _OF_BASE, _OF_TOP = "base_", "top_"
 

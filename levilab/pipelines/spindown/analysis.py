@@ -97,12 +97,12 @@ def fit_source(source: Source[SpinReadings], options: SpinDownOptions) -> SpinDo
 def top_of_device(device: Device | None) -> Top:
     """Return what a device's file says of the top for the count; the thesis's where it says nothing.
 
-    ν_r goes with √(|μ|/(I₃ − I₁)): the field where a top floats is taken for that of the thesis's base.  The radius
-    is that of its largest part.
+    ν_r goes with √(|μ|/(I₃ − I₁)): the field where a top floats is taken for that of the thesis's base.  The drag of a
+    disc goes with R⁴/I₃ and is the thesis's unless both are said; R is that of the largest part.
     """
     if device is None:
         return THESIS_TOP
-    transverse, axial, _ = inertias(device.top)
+    transverse, axial, missing = inertias(device.top)
     one, three = transverse.value or 0.0, axial.value or 0.0
     if not 0 < one < three:
         raise DataError(
@@ -118,7 +118,7 @@ def top_of_device(device: Device | None) -> Top:
         kappa=1 - share,
         kappa_u=u or THESIS_TOP.kappa_u,
         resonance_hz=THESIS_TOP.resonance_hz * math.sqrt(moment / slow),
-        disc_constant=disc_constant(radius or THESIS["radius"][0], three),
+        disc_constant=disc_constant(radius, three) if radius and not missing else THESIS_TOP.disc_constant,
     )
 
 

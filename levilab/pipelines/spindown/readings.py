@@ -284,9 +284,9 @@ def _of_track(
 
 
 def _coasting(track: "Track | FieldTrack", options: "InputOptions") -> list[tuple[int, int]]:
-    """Return the windows [first, end) of the phases in which the top coasts, else all; first that with most asked for.
+    """Return the windows [first, end) in which the top coasts: the phase with most asked for, and others; or all.
 
-    That in which `start` lies counts twice.
+    The phase in which `start` lies counts twice.  Others have as many windows asked for as a fit needs.
     """
     start, stop = (getattr(options, name, None) for name in ("start_s", "stop_s"))
     begin = -1 if start is None else int(np.searchsorted(track.time, start))
@@ -294,10 +294,11 @@ def _coasting(track: "Track | FieldTrack", options: "InputOptions") -> list[tupl
     asked = {
         phase.windows: min(phase.windows[1], end) - max(phase.windows[0], begin)
         for phase in phases(track)
-        if phase.kind == "coasting"
+        if phase.kind == "coasting" and phase.windows[1] - phase.windows[0] >= FEWEST
     }
-    long = [windows for windows, number in asked.items() if number >= FEWEST]
-    return sorted(long, key=lambda one: -asked[one] * (1 + (one[0] <= begin))) or [(0, len(track.time))]
+    order = sorted(asked, key=lambda one: -max(asked[one], 0) * (1 + (one[0] <= begin)))
+    others = [one for one in order[1:] if asked[one] >= FEWEST]
+    return [*order[:1], *others] or [(0, len(track.time))]
 
 
 def spin_readings(table: Table) -> SpinReadings:

@@ -17,7 +17,7 @@ from analysis.spindown.fit import SpinDown
 from analysis.spindown.lawfit import LawFit
 from analysis.spindown.selection import Statistics
 from analysis.spindown.tilt import PARAMETERS as WOBBLE
-from analysis.spindown.tilt import count_of
+from analysis.spindown.tilt import THESIS_TOP, count_of
 from analysis.uncertainty import Estimate, Mean
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SpinDownOptions
@@ -131,7 +131,7 @@ def _constant(analysis: SpinDownAnalysis) -> Iterator[str]:
         off, u = value.value / disc - 1, value.u / disc
         way = "above the value" if off > 0 else "below the value"
         compared = Text("{symbol} lies {percent:n} % {way}", SYMBOLS[name], digits(100 * abs(off)), way)
-        top = "this top" if analysis.options.device else "the thesis's top"
+        top = "the thesis's top" if disc == THESIS_TOP.disc_constant else "this top"
         karman = Text("von Kármán for a bare disc as large as {top}, {value:n}×10⁻⁴", top, digits(1e4 * disc, 4))
         if abs(off) < _DIFFERS * u:
             yield Text("{symbol} agrees with the value of {karman}.", symbol=SYMBOLS[name], karman=karman)

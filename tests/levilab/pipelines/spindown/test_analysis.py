@@ -301,6 +301,13 @@ def test_the_drag_is_compared_with_a_disc_of_the_top_in_the_devices_file(tmp_pat
     analysis = SPINDOWN.analyze([path], SpinDownOptions(device=heavy))
     assert analysis.doubts == []
     assert "as large as this top, 0.3526×10⁻⁴" in meaning(analysis)[0]
+    for top in (
+        {"magnet_radius_m": 0.03, "magnet_height_m": 0.01},
+        {"inertia_transverse_kg_m2": 5e-6, "inertia_axial_kg_m2": 9e-6},
+    ):  # of a larger top R⁴ and I₃ are larger
+        half_known = SPINDOWN.analyze([path], SpinDownOptions(device=Device.model_validate({"top": top})))
+        assert half_known.doubts == []
+        assert "as large as the thesis's top, 2.235×10⁻⁴" in meaning(half_known)[0]
 
 
 def test_a_speed_without_unit_may_be_in_hertz_or_turns_per_minute(tmp_path):

@@ -200,6 +200,15 @@ def test_a_record_of_a_top_that_was_spun_again_has_two_falls_to_choose_from(tmp_
     assert 45 < begins[45.0] < 48
 
 
+def test_a_part_with_too_little_of_a_fall_has_no_readings_under_the_drive(tmp_path):
+    t = np.linspace(0, 60, 60_001)
+    turns = 38 * t - 0.15 * np.maximum(t - 20, 0) ** 2
+    times = np.interp(np.arange(1, int(turns[-1])), turns, t)
+    (path := tmp_path / "p.csv").write_text("pulse time [s]\n" + "".join(f"{x:.7f}\n" for x in times), "utf-8")
+    with pytest.raises(DataError, match=r"2 of 21 readings between 10 s and 22 s are too few, .* go from 19"):
+        read_spin_file(path, SpinDownOptions(start_s=10.0, stop_s=22.0))
+
+
 def test_the_laws_that_are_asked_for_are_fitted_and_the_others_have_no_numbers(tmp_path):
     path = spin_down_csv(tmp_path / "a.csv")
     found = SPINDOWN.analyze(
