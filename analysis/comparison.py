@@ -92,6 +92,8 @@ OTHER_TOPS = 0.15
 _SHARE_OTHER, _SHARE_GROSS = 0.1, 0.05
 #: By how much u may be too small, of few readings.
 _U_TOO_SMALL = 3.0
+#: Values about which means are tried: of 1000 groups it takes 1 s, of all 10 s, and probabilities agree to 10⁻⁵.
+_CENTRES = 300
 
 
 def gross_errors(values: ArrayLike, u: ArrayLike) -> NDArray[np.float64]:
@@ -110,8 +112,9 @@ def gross_errors(values: ArrayLike, u: ArrayLike) -> NDArray[np.float64]:
     if len(x) < 3:  # of two nothing says which one is wrong
         return np.zeros(len(x))
     widest, typical = float(np.ptp(x) + of_x.max()), 1 / math.sqrt(np.mean(of_x**-2.0))
-    steps = np.geomspace(of_x[:, 0] / 4, 4 * widest, max(2, 400 // len(x)))  # about each value; many are near others
-    means = np.unique([x[:, 0], *(x[:, 0] + steps), *(x[:, 0] - steps)])
+    some = np.argsort(x[:, 0])[:: 1 + len(x) // _CENTRES]  # many are near others
+    steps = np.geomspace(of_x[some, 0] / 4, 4 * widest, max(2, 400 // len(x)))
+    means = np.unique([x[some, 0], *(x[some, 0] + steps), *(x[some, 0] - steps)])
     taus = typical * np.geomspace(0.03, 10 * widest / typical, 40)
     size, square = np.abs(means), (x - means) ** 2
     far, scale = (OTHER_TOPS * size + _U_TOO_SMALL * of_x) ** 2, size + _U_TOO_SMALL * of_x
@@ -119,7 +122,7 @@ def gross_errors(values: ArrayLike, u: ArrayLike) -> NDArray[np.float64]:
     of_tau = taus[:, None] / (_TOPS * size + typical)
     prior = of_tau * (1 + of_tau**2) ** -1.5  # of ln τ
     log_p = np.log(prior / prior.sum(axis=0) * np.gradient(means) / (size + _U_TOO_SMALL * typical))
-    shares = np.empty((len(taus), *square.shape))
+    tops, sums, shares = np.empty(len(taus)), np.empty(len(taus)), np.empty((len(taus), len(x)))
     for k, tau in enumerate(taus):
         sound = sum(
             share * np.exp(-square / variance / 2) / np.sqrt(2 * math.pi * variance)
@@ -129,10 +132,11 @@ def gross_errors(values: ArrayLike, u: ArrayLike) -> NDArray[np.float64]:
             )
         )
         log_p[k] += np.log(wrong + sound).sum(axis=0)
-        shares[k] = wrong / (wrong + sound)
-    p = np.exp(log_p - log_p.max())
-    found: NDArray[np.float64] = np.einsum("tm,tkm->k", p / p.sum(), shares)
-    return found
+        tops[k] = log_p[k].max()
+        p = np.exp(log_p[k] - tops[k])
+        sums[k], shares[k] = p.sum(), wrong / (wrong + sound) @ p
+    weight = np.exp(tops - tops.max())
+    return np.asarray(weight @ shares / (weight @ sums))
 
 
 def weighted_mean(x: NDArray[np.float64], u: NDArray[np.float64]) -> tuple[float, float, float]:

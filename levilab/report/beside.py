@@ -388,12 +388,14 @@ def _mark(of: Class, k: int) -> Mark:
 
 
 def _beside_others(one: Compared, k: int) -> str:
-    """Return how many times the median of the others a value is."""
-    values = [each.value if each else None for each in one.estimates]
-    others = statistics.median(value for value in values[:k] + values[k + 1 :] if value is not None)
-    factor = values[k] / others if others else math.inf  # type: ignore[operator]
-    said = "{symbol}: {factor:n} times the median of the others, more than tops differ"
-    return Text(said, symbol=one.symbol, factor=digits(factor))
+    """Return how many times the median of the others a value is, or, where that may be zero, how many u beside it."""
+    mine, others = one.estimates[k], [*filter(None, one.estimates[:k] + one.estimates[k + 1 :])]
+    median, u = (statistics.median(each) for each in zip(*((each.value, each.u) for each in others), strict=True))
+    if abs(median) > FAR * u:
+        said = "{symbol}: {factor:n} times the median of the others, more than tops differ"
+        return Text(said, symbol=one.symbol, factor=digits(mine.value / median))  # type: ignore[union-attr]
+    times = (mine.value - median) / math.hypot(mine.u, u)  # type: ignore[union-attr, arg-type]
+    return Text("{symbol}: {times:n} u from the others", symbol=one.symbol, times=with_sign(times, 1))
 
 
 def _too_short(of: Class, k: int) -> str:

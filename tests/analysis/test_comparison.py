@@ -1,6 +1,7 @@
 """Whether several groups agree, and how far each lies from the others."""
 
 import math
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -123,6 +124,18 @@ def test_no_sound_group_is_grossly_wrong_and_two_that_are_hide_neither(n, betwee
         found = np.array([gross_errors(*one) for one in zip(values, u, strict=True)])
         assert np.mean(found[:, :2] > 0.95) > 0.98
         assert found[:, 2:].max() < 0.2
+
+
+def test_of_many_groups_the_wrong_ones_are_found_in_little_memory():
+    values, u = 1 + 0.02 * np.random.default_rng(4).standard_normal(400), np.full(400, 0.01)
+    values[[7, 300]] *= 0.1, 10
+    tracemalloc.start()
+    found = gross_errors(values, u)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 6e7  # arrays of 400 values and 1000 means have 3e6, those of each scatter, too, 1e8
+    assert np.flatnonzero(found > 0.95).tolist() == [7, 300]
+    assert np.delete(found, [7, 300]).max() < 0.2
 
 
 def test_of_two_values_nothing_says_which_is_wrong():

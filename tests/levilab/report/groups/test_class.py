@@ -26,6 +26,7 @@ from levilab.report.beside import (
     LOOK,
     REPEAT,
     Compared,
+    _beside_others,
     _quantity,
     _width,
     agreement,
@@ -617,6 +618,14 @@ def test_a_value_far_beyond_the_others_repeats_and_is_in_no_mean(tmp_path):
         (f"C₃/₂: {factor} times the median of the others, more than tops differ",) for factor in ("0.33", "3.3", "1.5")
     ]
     assert of.quantities[0].used == (False, False, True, True, True, True)
+
+
+def test_a_wrong_value_of_what_may_be_zero_is_some_u_and_no_multiple_of_the_others():
+    values = [0.01, -0.01, 0.0, 0.5]
+    parts = [{"values": {"intercept": {"value": one, "u": 0.01, "unit": "Hz"}}} for one in values]
+    of = _quantity("intercept", ANALYSES["precession"], "", parts, [Truth()] * 4, runs=parts, doubts=[False] * 4)
+    assert of.wrong[3] > 0.95
+    assert _beside_others(of, 3).endswith(": +35.4 u from the others")
 
 
 def test_groups_that_all_differ_by_more_than_tops_do_are_not_said_to_differ_as_tops(tmp_path):
