@@ -152,6 +152,13 @@ def test_one_client_too_many_is_sent_away_until_another_leaves(served, way):
     until(lambda: welcome(served, way))
 
 
+@pytest.mark.parametrize("way", ["socket", "hislip", "vxi11"])
+def test_who_says_nothing_makes_way_where_all_places_are_taken(served, way):
+    silent = [served.bare(way) for _ in range(clients.MOST_CLIENTS * (2 if way == "hislip" else 1))]
+    until(lambda: welcome(served, way))
+    assert silent[0].recv(1) == b""
+
+
 def test_a_clock_that_jumps_jumps_to_every_answer():
     with serving(clock=VirtualClock()) as served:
         assert served.open("socket").query("SLOW?").strip() == "slow"
