@@ -21,7 +21,7 @@ from instruments.virtual.core.line import LineSettings
 
 #: Where pyserial looks for the module of a URL's scheme: the package that this one is in.
 _PACKAGE = __name__.rpartition(".")[0]
-#: The benches that were plugged in: the last one is found.
+#: The bench that was plugged in last, which is found; none before.
 plugged: list[VirtualBench] = []
 
 
@@ -29,7 +29,7 @@ def plug_in(bench: VirtualBench) -> None:
     """Let pyserial find this bench from now on, its magnetometer as ``levilab://magnetometer``."""
     if _PACKAGE not in serial.protocol_handler_packages:
         serial.protocol_handler_packages.append(_PACKAGE)
-    plugged.append(bench)
+    plugged[:] = [bench]
 
 
 class Serial(SerialBase):
@@ -132,7 +132,9 @@ def _use(line: SerialLine) -> Iterator[SerialLine]:
 
 def _open_session(url: str) -> Session:
     """Open a session with the instrument that the URL names.  Raises SerialException."""
-    bench, name = plugged[-1], urlsplit(url).netloc
+    if not plugged:
+        raise SerialException(errno.ENOENT, "no virtual bench is plugged in: plug_in(bench) comes first")
+    (bench,), name = plugged, urlsplit(url).netloc
     plain = name.upper().removeprefix("ASRL")
     for address in (f"ASRLlevilab://{name}::INSTR", f"ASRL{plain}.levilab::INSTR", f"ASRL{plain}::INSTR"):
         if session := bench.open(address):

@@ -9,8 +9,8 @@ import serial
 from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected
 from instruments.links.opening import open_link
+from instruments.virtual.bench import protocol_levilab
 from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.protocol_levilab import plugged
 from instruments.virtual.bench.visa_library import library_for
 from support.slow import ANY_BYTES, IDENTITY, Slow
 
@@ -35,7 +35,7 @@ def link(request, clock, monkeypatch):
     monkeypatch.setattr(
         serial, "protocol_handler_packages", [*serial.protocol_handler_packages, "instruments.virtual.bench"]
     )
-    plugged.append(bench)
+    monkeypatch.setattr(protocol_levilab, "plugged", [bench])
     with contextlib.closing(open_link(port) if port else open_link(address, library=library_for(bench))) as link:
         yield link
 

@@ -19,8 +19,8 @@ from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied, OutOfRange
 from instruments.links.opening import open_link
 from instruments.links.serial_port import port_name
+from instruments.virtual.bench import protocol_levilab
 from instruments.virtual.bench.bench import VirtualBench
-from instruments.virtual.bench.protocol_levilab import plugged
 from instruments.virtual.core.line import LineSettings, receive
 from instruments.virtual.magnetometer.lakeshore_425 import Virtual425
 from support.slow import IDENTITY, Slow
@@ -49,7 +49,7 @@ def bench(clock, monkeypatch):
     monkeypatch.setattr(
         serial, "protocol_handler_packages", [*serial.protocol_handler_packages, "instruments.virtual.bench"]
     )
-    plugged.append(bench)
+    monkeypatch.setattr(protocol_levilab, "plugged", [bench])
     return bench
 
 
@@ -292,6 +292,12 @@ def test_a_read_that_would_wait_for_ever_raises(bench):
         assert port.read(5) == b"slow\n"
         with pytest.raises(serial.SerialException, match="for ever"):
             port.read(1)
+
+
+def test_a_url_before_a_bench_is_plugged_in_is_refused(bench, monkeypatch):
+    monkeypatch.setattr(protocol_levilab, "plugged", [])
+    with pytest.raises(serial.SerialException, match=r"plug_in\(bench\) comes first"):
+        serial.serial_for_url("levilab://absent")
 
 
 @pytest.mark.parametrize(
