@@ -106,7 +106,8 @@ OTHER_COLUMNS = Kind("a table with other columns", "name one to see why", plural
 #: A text of sentences.
 PROSE = Kind("a text without readings", "name it if it holds a table", plural="texts without readings",
              may_hold_readings=False)  # fmt: skip
-_BEGINNING, _WORDS, _NUMBER = 10_000, re.compile(r"[^\W\d_]{2,}( [^\W\d_]{2,}){2}"), re.compile(r"\s*[-+]?\d")
+_BEGINNING, _WORDS = 10_000, re.compile(r"[^\W\d_]{2,}( [^\W\d_]{2,}){2}")
+_NUMBER = re.compile(r"\s*[\"']?[-+]?[.,]?\d")
 
 #: Of the right columns, as of a top that does not fall.
 UNSUITABLE = Kind("a table that does not suit", "name one to see why", plural="tables that do not suit")

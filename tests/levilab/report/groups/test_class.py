@@ -683,8 +683,9 @@ def test_sentences_in_a_text_file_are_no_result_to_repeat(tmp_path):
     class_of_files(tmp_path, [(1, 1), (1, 1)])
     (tmp_path / "notes.txt").write_text("Anna was ill.\nGroup 2 began at 12:30 with 3 tops\n", "utf-8")
     (tmp_path / "G3.txt").write_text("t in s\tf in Hz\n0\t40\n10\t39\n", "utf-8")
+    (tmp_path / "G4.txt").write_text('time of the reading;spin of the top\n"0";"40"\n"10";"39"\n"20";"38"\n', "utf-8")
     page = write_class([tmp_path], tmp_path / "class.html", tell=(told := []).append).read_text("utf-8")
-    assert "2 of 3 results are good. To repeat: G3.txt." in Page(page).text
+    assert "2 of 4 results are good. To repeat: G3.txt and G4.txt." in Page(page).text
     assert "without readings: a text without readings (notes.txt)" in told
 
 
