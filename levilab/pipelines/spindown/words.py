@@ -325,15 +325,15 @@ def doubts_about_law(run: SpinDown, runs: int) -> Iterator[Note]:
         falls = float(run.frequency[change.first] - run.frequency[change.last])
         size = min(-change.size, falls) if change.size < 0 < falls else abs(change.size)
         said = Text(
-            "no law describes the readings: they {way} by {hz:n} Hz beyond each law between {first:.4g} s and "
-            "{last:.4g} s, or bend there, as of a top that was spun again or touched. Fit a part, by `start` and "
+            "no law describes the readings: they {way} by {hz:n} Hz beyond each law between {first:.6g} s and "
+            "{last:.6g} s, or bend there, as of a top that was spun again or touched. Fit a part, by `start` and "
             "`stop`, or leave it out",
             way="rise" if change.size > 0 else "fall", hz=digits(size),
             first=float(run.time[change.first]), last=float(run.time[change.last]),
         )  # fmt: skip
-        before = 2 * change.first > run.time.size - change.last  # the longer part
+        before = change.first + 1 >= run.time.size - change.last  # the part with more readings
         end = run.time[change.first if before else change.last]
-        options = {"stop_s" if before else "start_s": float(f"{end:.4g}")}
+        options = {"stop_s" if before else "start_s": float(f"{end:.9g}")}
         yield Note("no law", said, weight="doubt", options=options)
     else:
         yield from _drag_in_doubt(drag_over_disc(run))

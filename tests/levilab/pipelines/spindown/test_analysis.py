@@ -265,6 +265,15 @@ def test_a_change_counts_once_for_each_run_beside_it(tmp_path):
     assert f"they fall by {first - last:.2g} Hz beyond each law" in doubt
 
 
+@pytest.mark.parametrize(("first", "option"), [(7, {"start_s": 50732.8}), (9, {"stop_s": 50734.7})])
+def test_a_doubt_about_a_bend_advises_the_part_with_more_readings_to_its_last_one(first, option, tmp_path):
+    run = SPINDOWN.analyze([spin_down_csv(tmp_path / "a.csv", jump=3.0)]).runs[0]
+    change = replace(run.verdict.change, first=first, last=first + 1)
+    late = replace(run, time=50717.6 + 1.9 * np.arange(20), verdict=replace(run.verdict, change=change))
+    (doubt,) = doubts_about_law(late, 1)
+    assert doubt.options == pytest.approx(option)
+
+
 @pytest.mark.parametrize(
     ("factor", "mistake"),
     [
