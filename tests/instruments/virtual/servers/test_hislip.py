@@ -1,6 +1,7 @@
 """HiSLIP (IVI-6.1), word for word over bare sockets, and with pyvisa-py's own client."""
 
 import asyncio
+import socket
 import struct
 
 import pytest
@@ -9,7 +10,7 @@ from instruments.clock import WallClock
 from instruments.virtual.bench.bench import VirtualBench
 from instruments.virtual.servers.clients import Link, ServedInstrument
 from instruments.virtual.servers.hislip import HEADER, LONGEST, Channel, Client, Message, Type
-from support.served import NETWORK, NO_ERROR, Thing, channels, header, send, until
+from support.served import NETWORK, NO_ERROR, Thing, channels, header, send, serving, until
 
 
 def test_one_session_too_many_gets_a_fatal_error(served, monkeypatch):
@@ -132,6 +133,22 @@ def test_a_wrong_beginning_gets_a_fatal_error_and_ends(served, first, code):
     assert header(bare)[:2] == (Type.FATAL_ERROR, code)
     with pytest.raises(EOFError):
         header(bare)
+
+
+def test_a_header_that_does_not_begin_with_hs_gets_a_fatal_error(served):
+    bare = served.bare("hislip")
+    bare.sendall(HEADER.pack(b"SH", Type.INITIALIZE, 0, 0x01000000, 0))
+    assert header(bare)[:2] == (Type.FATAL_ERROR, 1)
+
+
+def test_a_client_that_leaves_within_a_header_is_no_failure(caplog):
+    with serving() as served, served.bare("hislip") as leaving:
+        send(leaving, Type.INITIALIZE, 0, 0x01000000, b"hislip0")
+        header(leaving)
+        leaving.sendall(b"HS\0")
+        leaving.shutdown(socket.SHUT_WR)
+        assert leaving.recv(1) == b""  # the server has closed it, too
+    assert not caplog.records
 
 
 def test_one_channel_alone_carries_nothing(served):
