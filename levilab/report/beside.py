@@ -425,7 +425,8 @@ _OF_INPUT = frozenset({*OF_FILES, "between", "start_s", "stop_s"})
 def _other_options(of: Class, k: int) -> str:
     """Return that a group was analyzed with other options than most, where it was; else nothing."""
     each = [typed_options(origin.options, _OF_INPUT) for origin in of.found.origins]
-    usual = max(each, key=lambda options: (each.count(options), -len(options)))
+    groups = Counter(each)
+    usual = max(groups, key=lambda options: (groups[options], -len(options)))
     if each[k] == usual:
         return ""
     own, others = (" ".join(options) or "no options" for options in (each[k], usual))
