@@ -53,6 +53,8 @@ WINDOW_S = 2.0
 _LOWEST_FALL_HZ = 20.6
 #: No counter is as uncertain [Hz].
 _MOST_U_HZ = 10.0
+#: Whole uncertainties of one counter differ by no more; five random digits from 1 on do in 97 of 100 tables [Hz].
+_MOST_APART_HZ = 2.0
 #: A first time above this, three years, counts from 1970; as dates, such times count from the first reading [s].
 _SINCE_1970_S = 1e8
 _NAMED = "{name:s}: {text}"
@@ -318,8 +320,9 @@ def spin_readings(table: Table) -> SpinReadings:
         what = "holds {n}, at least {fewest} are needed: record longer"
         raise TableError(table.path, Text(what, n=how_many(time.size, "reading"), fewest=FEWEST))
     _must_be_ordinary(table, time, frequency)
+    notes = table.warnings
     if u is not None:
-        _must_be_no_decimals(table, frequency, u)
+        notes = (*_of_decimals(table, frequency, u), *notes)
         _must_be_possible(table, u, frequency)
     try:  # as the fit does; here, too, since one run under the drive spoils no search of a folder
         check_readings(time, frequency, u)
@@ -327,9 +330,7 @@ def spin_readings(table: Table) -> SpinReadings:
         raise _in_the_file(table, error) from error
     time = time - time[0] if time[0] > _SINCE_1970_S else time
     doubts = _doubts(table, time, frequency)
-    return SpinReadings(
-        time, frequency, u, (*doubts, *table.warnings), doubtful=any(map(is_doubt, [*doubts, *table.warnings]))
-    )
+    return SpinReadings(time, frequency, u, (*doubts, *notes), doubtful=any(map(is_doubt, [*doubts, *notes])))
 
 
 def _without_rest(table: Table) -> Table:
@@ -456,14 +457,16 @@ _ABOVE_0 = {
 }
 
 
-def _must_be_no_decimals(table: Table, frequency: "NDArray[np.float64]", u: "NDArray[np.float64]") -> None:
-    """Refuse whole numbers as uncertainties of whole numbers that are larger than a digit: they are its decimals."""
+def _of_decimals(table: Table, frequency: "NDArray[np.float64]", u: "NDArray[np.float64]") -> list[Note]:
+    """Refuse whole uncertainties of whole numbers that are larger than a digit; warn of digits that scatter so."""
     whole = np.all(np.concatenate([frequency, u]) % 1 == 0) and not table.factors.get("spin_frequency_hz", 1.0) % 1
     said = (
         "{hz:g} and {u:g} are taken for a spin and its uncertainty; if they are one number with a decimal comma, "
         "separate the columns by ; or tab, or write a point"
     )
     refuse(table, np.full(u.shape, bool(whole and u.max() >= _MOST_U_HZ)), said, frequency, u)
+    text = Text(_NAMED, table.path.name, Text(said, frequency[0], u[0]))
+    return [of_file("decimals", text)] if whole and np.ptp(u) > _MOST_APART_HZ else []
 
 
 def _must_be_possible(table: Table, u: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:

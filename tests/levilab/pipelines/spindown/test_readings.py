@@ -95,6 +95,11 @@ def test_days_of_a_spreadsheet_are_a_unit_and_thousands_of_ms_are_named(tmp_path
 def test_decimals_behind_a_comma_are_no_uncertainties(title, tmp_path):
     with pytest.raises(TableError, match="40 and 1 are taken for a spin and its uncertainty; if they are one number"):
         spin_readings(table_of(tmp_path, f"{title}0,40,01\n10,38,58\n20,37,20\n30,35,00\n"))
+    warnings = [
+        spin_readings(table_of(tmp_path, f"{title}0,40,{first}\n10,38,5\n20,37,4\n30,35,4\n")).warnings
+        for first in (1, 3)
+    ]
+    assert ["40 and 1 are taken for a spin" in " ".join(one) for one in warnings] == [True, False]
 
 
 def test_points_behind_thousands_are_named_where_they_pass_for_decimals(tmp_path):
