@@ -120,13 +120,18 @@ def _part(readings: SpinReadings, options: "InputOptions", path: "Path") -> Spin
 
     Raises DataError: too few.
     """
-    spins, start, stop = (getattr(options, name, None) for name in ("between", "start_s", "stop_s"))
-    if start is not None or stop is not None:
-        ends = (-math.inf if start is None else start, math.inf if stop is None else stop)
+    spins = getattr(options, "between", None)
+    if (ends := _ends(options)) != (-math.inf, math.inf):
         readings = _between(readings, readings.time, ends, path, unit="s", options="`start`, `stop`")
     if spins is not None:
         readings = _between(readings, readings.frequency, spins, path, unit="Hz", options="`between`")
     return readings
+
+
+def _ends(options: "InputOptions") -> tuple[float, float]:
+    """Return the first and the last time that `start` and `stop` ask for [s], infinite where they are not given."""
+    start, stop = (getattr(options, name, None) for name in ("start_s", "stop_s"))
+    return -math.inf if start is None else start, math.inf if stop is None else stop
 
 
 def _between(
@@ -212,7 +217,8 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
     except AnalysisError as error:
         said = Text("{path:s}: {error}", path=path, error=text_of(error))
         raise (DataError if options.guess else DoesNotSuit)(Sentences(said, *channels, between="; ")) from error
-    frequency = track.frequency[slice(*_coasting(track, options)[0])]
+    part, (start, stop) = slice(*_coasting(track, options)[0]), _ends(options)
+    frequency = track.frequency[part][(track.time[part] >= start) & (track.time[part] <= stop)]
     notes = [_note(path, note, _weight_of(note, frequency)) for note in track.notes]
     what = Text(
         "a list of pulse times of {s:n} s" if times is not None else "a record of {s:n} s", s=digits(duration, 3)
@@ -224,7 +230,9 @@ def _weight_of(found: Finding, frequency: "NDArray[np.float64]") -> Weight:
     """Return the weight of a finding, by the frequencies [Hz] of the windows that are used."""
     if found.name == "unlike":
         return "doubt" if np.any(np.abs(np.diff(np.log(frequency))) > UNLIKE) else "warning"
-    return "warning" if found.name == "fast" and frequency.max() < FASTEST_BY_HAND_HZ else finding_weight(found)
+    return (
+        "warning" if found.name == "fast" and frequency.max(initial=0.0) < FASTEST_BY_HAND_HZ else finding_weight(found)
+    )
 
 
 def _note(path: "Path", found: Finding, weight: Weight) -> Note:
@@ -290,15 +298,15 @@ def _coasting(track: "Track | FieldTrack", options: "InputOptions") -> list[tupl
 
     The phase in which `start` lies counts twice.  Others have as many windows asked for as a fit needs.
     """
-    start, stop = (getattr(options, name, None) for name in ("start_s", "stop_s"))
-    begin = -1 if start is None else int(np.searchsorted(track.time, start))
-    end = len(track.time) if stop is None else int(np.searchsorted(track.time, stop, "right"))
+    start, stop = _ends(options)
+    begin = int(np.searchsorted(track.time, start)) if start > -math.inf else -1
+    end = int(np.searchsorted(track.time, stop, "right"))
     asked = {
         phase.windows: min(phase.windows[1], end) - max(phase.windows[0], begin)
         for phase in phases(track)
         if phase.kind == "coasting" and phase.windows[1] - phase.windows[0] >= FEWEST
     }
-    order = sorted(asked, key=lambda one: -max(asked[one], 0) * (1 + (one[0] <= begin)))
+    order = sorted(asked, key=lambda one: (-max(asked[one], 0) * (1 + (one[0] <= begin)), one[0] - one[1]))
     others = [one for one in order[1:] if asked[one] >= FEWEST]
     return [*order[:1], *others] or [(0, len(track.time))]
 

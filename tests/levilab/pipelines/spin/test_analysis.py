@@ -15,7 +15,7 @@ from instruments.drivers.oscilloscope import Trace
 from levilab.computer import utc_now
 from levilab.errors import DataError, DoesNotSuit
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.options import SpinOptions
+from levilab.pipelines.options import SpinDownOptions, SpinOptions
 from levilab.pipelines.spin import words
 from levilab.pipelines.spin.analysis import Series, drive_offset, in_a_sentence
 from levilab.pipelines.spin.document import SPIN
@@ -154,6 +154,9 @@ def test_windows_whose_turns_count_once_and_twice_are_doubted_where_they_are_use
         doubts.append(" ".join(SPINDOWN.analyze([path]).doubts))
     assert "pulses are missing or doubled in a pattern" in doubts[0]
     assert doubts[1] == ""
+    assert SPINDOWN.analyze([tmp_path / "mixed.csv"], SpinDownOptions(start_s=14.0)).doubts == []
+    with pytest.raises(DataError, match=r"they go from 11.* s to 23.* s"):  # of the longer part
+        SPINDOWN.analyze([tmp_path / "mixed.csv"], SpinDownOptions(start_s=50.0))
 
 
 def test_a_coil_whose_spin_is_taken_off_as_hum_is_doubted(tmp_path):
