@@ -18,7 +18,7 @@ from analysis.pulses.track import UNLIKE
 from analysis.rotation import FieldTrack, track_of_field
 from analysis.rotation.track import WINDOW_S as FIELD_WINDOW_S
 from analysis.spindown.fall import FALLS_BETWEEN_HZ
-from analysis.spindown.readings import check_readings
+from analysis.spindown.readings import NoSpinDown, check_readings
 from analysis.spindown.tilt import Release
 from levilab.errors import DataError, DoesNotSuit
 from levilab.formats.columns import SHORTHANDS, NoTable, TableError
@@ -51,6 +51,8 @@ QUANTITIES = ("time_s", "spin_frequency_hz", "spin_frequency_u_hz")
 WINDOW_S = 2.0
 #: No top falls below this: the published limits are 21.86 Hz, less five times their scatter [Hz].
 _LOWEST_FALL_HZ = 20.6
+#: Nor floats faster, by linear theory [Hz]; and the most marks on a rim that are thought of.
+_FASTEST_HZ, _MOST_MARKS = 80.6, 6
 #: No counter is as uncertain [Hz].
 _MOST_U_HZ = 10.0
 #: Whole uncertainties of one counter differ by no more; five random digits from 1 on do in 97 of 100 tables [Hz].
@@ -83,7 +85,7 @@ class SpinReadings(Readings):
 def read_run_readings(run: "Run", options: "InputOptions") -> SpinReadings:
     """Return the readings of a run of the experiment `spin`, which drives the top up."""
     readings = replace(
-        spin_readings(run.readings()), release=release_of(run.events()), upright=run.record.world == "spin"
+        spin_readings(run.readings(), options), release=release_of(run.events()), upright=run.record.world == "spin"
     )
     return _part(readings, options, run.folder)
 
@@ -184,7 +186,7 @@ def _read_pulses_or_table(path: "Path", options: "InputOptions") -> SpinReadings
     else:
         return record_readings(record, options)
     try:
-        return spin_readings(_read_spin_table(path, options))
+        return spin_readings(_read_spin_table(path, options), options)
     except NoTable as error:
         raise asks or error from None
 
@@ -311,11 +313,12 @@ def _coasting(track: "Track | FieldTrack", options: "InputOptions") -> list[tupl
     return [*order[:1], *others] or [(0, len(track.time))]
 
 
-def spin_readings(table: Table) -> SpinReadings:
+def spin_readings(table: Table, options: "InputOptions | None" = None) -> SpinReadings:
     """Return the readings of a spin-down: time, spin frequency and, if the table has it, its standard uncertainty.
 
     Args:
         table: with `time_s` and `spin_frequency_hz`.
+        options: `start_s` and `stop_s`, between which the spin must fall; all are returned.
 
     Raises:
         TableError: a column is missing, there are too few readings, times repeat or go back, the spin does not fall,
@@ -332,13 +335,29 @@ def spin_readings(table: Table) -> SpinReadings:
     if u is not None:
         notes = (*_of_decimals(table, frequency, u), *notes)
         _must_be_possible(table, u, frequency)
-    try:  # as the fit does; here, too, since one run under the drive spoils no search of a folder
-        check_readings(time, frequency, u)
-    except AnalysisError as error:
-        raise _in_the_file(table, error) from error
     time = time - time[0] if time[0] > _SINCE_1970_S else time
-    doubts = _doubts(table, time, frequency)
+    part = _part_of_times(time, options)
+    doubts = []
+    if time[part].size:  # else the options are wrong
+        try:  # as the fit does; here, too, since one run under the drive spoils no search of a folder
+            check_readings(table.column("time_s")[part], frequency[part], None if u is None else u[part])
+        except AnalysisError as error:
+            raise _in_the_file(_rows(table, part), error) from error
+        doubts = _doubts(table, time[part], frequency[part])
     return SpinReadings(time, frequency, u, (*doubts, *notes), doubtful=any(map(is_doubt, [*doubts, *notes])))
+
+
+def _part_of_times(time: "NDArray[np.float64]", options: "InputOptions | None") -> slice:
+    """Return the rows from the first to the last one between `start_s` and `stop_s`; none where they are too few."""
+    start, stop = (getattr(options, name, None) for name in ("start_s", "stop_s"))
+    low, high = -math.inf if start is None else start, math.inf if stop is None else stop
+    inside = np.flatnonzero((time >= low) & (time <= high))
+    return slice(inside[0], inside[-1] + 1) if inside.size >= FEWEST else slice(0)
+
+
+def _rows(table: Table, part: slice) -> Table:
+    columns = {name: values[part] for name, values in table.columns.items()}
+    return replace(table, columns=columns, lines=table.lines[part])
 
 
 def _without_rest(table: Table) -> Table:
@@ -351,10 +370,7 @@ def _without_rest(table: Table) -> Table:
     note = (
         f"{table.path.name}: the last {rows} of 0 Hz, after the top fell, {'is' if left_out == 1 else 'are'} left out"
     )
-    columns = {name: values[:end] for name, values in table.columns.items()}
-    return replace(
-        table, columns=columns, lines=table.lines[:end], warnings=(*table.warnings, of_file("rest", note, "advice"))
-    )
+    return replace(_rows(table, slice(end)), warnings=(*table.warnings, of_file("rest", note, "advice")))
 
 
 def _doubt(text: str) -> Note:
@@ -387,22 +403,24 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
         say = _say_unit(table, "t", {unit: length_of(lasts / factor * of) for unit, of in units})
         text = "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz in {length}, in air it takes minutes{say}"
         return [_doubt(Text(text, table.path.name, first, last, length_of(lasts), say))]
-    if first > FASTEST_BY_HAND_HZ and _LOWEST_FALL_HZ < last / 2 < FALLS_BETWEEN_HZ[0]:
+    marks = next((n for n in range(2, _MOST_MARKS + 1) if _LOWEST_FALL_HZ < last / n < FALLS_BETWEEN_HZ[0]), None)
+    if first > (FASTEST_BY_HAND_HZ if marks else _FASTEST_HZ):
+        n = marks or math.ceil(first / FASTEST_BY_HAND_HZ)
         doubt = Text(
-            "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz: is each turn counted twice? No hand starts a "
-            'top so fast, and it falls at {half:.3g} Hz{say}',
-            name=table.path.name, first=first, last=last, half=last / 2, say=_say_half(table),
+            "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz, no hand starts a top so fast: with {n} marks a "
+            "turn it would go from {begin:.3g} to {end:.3g} Hz{say}",
+            name=table.path.name, first=first, last=last, n=n, begin=first / n, end=last / n, say=_say_marks(table, n),
         )  # fmt: skip
         return [_doubt(doubt)]
     return []
 
 
-def _say_half(table: Table) -> str:
-    """Return the advice to take half of the unit of the spin; nothing for periods."""
+def _say_marks(table: Table, marks: int) -> str:
+    """Return the advice to take a part of the unit of the spin; nothing for periods."""
     factor, n = table.factors.get("spin_frequency_hz"), table.numbers.get("spin_frequency_hz")
     per, unit = (PER_MINUTE, "min") if factor == PER_MINUTE else (1, "s")
-    said = '; `columns` = "f={n} [1/{length:g}{unit:s}]" halves the numbers'
-    return Text(said, n, 2 * per / factor, unit) if factor and n else ""
+    said = '; `columns` = "f={n} [1/{length:g}{unit:s}]" divides the numbers by {marks}'
+    return Text(said, n, marks * per / factor, unit, marks) if factor and n else ""
 
 
 def _say_unit(table: Table, key: Literal["t", "f"], units: Mapping[str, str]) -> str:
@@ -455,7 +473,8 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
             advice = "Hz, as after a fall or without a pulse: delete such rows"
         line = int(table.lines[error.index])
         return TableError(table.path, "{what} is {value:.9g} {advice}", what, error.value, advice, line=line)
-    return TableError(table.path, text_of(error))
+    spun = "Was the top spun again? `start` and `stop` choose a part" if isinstance(error, NoSpinDown) else ""
+    return TableError(table.path, Sentences(text_of(error), Text(spun)))
 
 
 #: What the analysis calls a column, in the words of a file, and what to do.

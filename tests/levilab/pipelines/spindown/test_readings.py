@@ -119,13 +119,31 @@ def test_a_count_that_ends_at_twice_the_lower_limit_is_doubted(first, last, asks
     assert halved.column("spin_frequency_hz")[-1] == last / 2
 
 
+@pytest.mark.parametrize(("first", "last", "marks"), [(114, 66, 3), (114, 80, 2), (95, 70, 3)])
+def test_the_marks_on_a_rim_are_those_with_which_the_count_ends_at_the_lower_limit(first, last, marks, tmp_path):
+    (doubt,) = spin_readings(table_of(tmp_path, f"t,f\n0,{first}\n90,{(first + last) / 2}\n180,{last}\n")).warnings
+    assert f'"f=2 [1/{marks}s]" divides the numbers by {marks}' in doubt
+
+
+def test_a_part_by_time_of_a_top_that_was_spun_again_must_fall_and_no_more(tmp_path):
+    spins = [38, 36, 34, 32, 30, 44, 42, 40, 38, 36]
+    path = tmp_path / "data.csv"
+    path.write_text("t [s],f [Hz]\n" + "".join(f"{10 * k},{spin}\n" for k, spin in enumerate(spins)), "utf-8")
+    with pytest.raises(TableError, match="`start` and `stop` choose a part"):
+        read_spin_file(path, SpinDownOptions())
+    assert read_spin_file(path, SpinDownOptions(start_s=45)).frequency.tolist() == spins[5:]
+    assert read_spin_file(path, SpinDownOptions(stop_s=45)).frequency.tolist() == spins[:5]
+    with pytest.raises(DataError, match="0 of 10 readings from 300 s on are too few"):
+        read_spin_file(path, SpinDownOptions(start_s=300))
+
+
 @pytest.mark.parametrize(
     ("unit", "factor"), [("Hz", 1), ("rpm", 60), ("1/min", 60), ("rad/s", 2 * np.pi), ("kHz", 1e-3)]
 )
 def test_half_of_a_unit_is_named_as_the_column_has_it(unit, factor, tmp_path):
     rows = f"t [s],f [{unit}]\n0,{76 * factor}\n90,{60 * factor}\n180,{44 * factor}\n"
     (doubt,) = spin_readings(table_of(tmp_path, rows)).warnings
-    said = re.search(r'`columns` = "f=2 (\[1/.+\])" halves the numbers', doubt)
+    said = re.search(r'`columns` = "f=2 (\[1/.+\])" divides the numbers by 2', doubt)
     assert said
     halved = read_table(tmp_path / "data.csv", columns={"f": f"f {said[1]}"})
     assert halved.column("spin_frequency_hz").round(3).tolist() == [38, 30, 22]
