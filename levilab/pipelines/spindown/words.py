@@ -339,7 +339,7 @@ def doubts_about_law(run: SpinDown, runs: int) -> Iterator[Note]:
         yield from _drag_in_doubt(drag_over_disc(run))
 
 
-#: A drag that is less than this multiple of its u is not known; one is out of bounds by more than the other.
+#: A drag below this multiple of its u is not known; one is out of bounds if it is so by more than the other multiple.
 _KNOWN, _CERTAIN = 2.0, 3.0
 #: By which factor it changes the drag where times are taken for others.
 _MISTAKES = {
@@ -357,7 +357,8 @@ def _drag_in_doubt(drag: Estimate) -> Iterator[Note]:
     times, u = drag.value or 0.0, drag.u or 0.0
     if times < _KNOWN * u:
         said = (
-            "the readings scatter more than the spin falls: they tell no drag. Record longer, or with a clearer signal"
+            "the spin falls by less than twice the uncertainty of the fall, so the readings do not determine the drag. "
+            "Record longer, or with a clearer signal"
         )
         yield Note("drag", said, weight="doubt")
         return
