@@ -87,7 +87,7 @@ def _from_others(x: NDArray[np.float64], u: NDArray[np.float64], k: int) -> floa
 #: Tops of one kind differ by some part of a value: the four published drags of one top by 2 %, other washers make more.
 _TOPS = 0.05
 #: Tops of another kind, of another mass and radius, differ by more; values that differ by less are not grossly wrong.
-OTHER_TOPS = 0.15
+_OTHER_TOPS = 0.15
 #: How many of all values are of such a top, and how many are grossly wrong, before any is seen.
 _SHARE_OTHER, _SHARE_GROSS = 0.1, 0.05
 #: By how much u may be too small, of few readings.
@@ -117,7 +117,7 @@ def gross_errors(values: ArrayLike, u: ArrayLike) -> NDArray[np.float64]:
     means = np.unique([x[some, 0], *(x[some, 0] + steps), *(x[some, 0] - steps)])
     taus = typical * np.geomspace(0.03, 10 * widest / typical, 40)
     size, square = np.abs(means), (x - means) ** 2
-    far, scale = (OTHER_TOPS * size + _U_TOO_SMALL * of_x) ** 2, size + _U_TOO_SMALL * of_x
+    far, scale = (_OTHER_TOPS * size + _U_TOO_SMALL * of_x) ** 2, size + _U_TOO_SMALL * of_x
     wrong = _SHARE_GROSS / (math.pi * scale * (1 + square / scale**2))
     of_tau = taus[:, None] / (_TOPS * size + typical)
     prior = of_tau * (1 + of_tau**2) ** -1.5  # of ln τ

@@ -620,6 +620,11 @@ def test_a_value_far_beyond_the_others_repeats_and_is_in_no_mean(tmp_path):
     assert of.quantities[0].used == (False, False, True, True, True, True)
 
 
+def test_half_of_the_value_of_five_others_is_more_probably_wrong_than_not(tmp_path):
+    of = compared(class_of_files(tmp_path, [(2, 1), *[(1, 1)] * 5]))
+    assert [mark.word for mark in of.marks] == [REPEAT, *[GOOD] * 5]
+
+
 def test_a_wrong_value_of_what_may_be_zero_is_some_u_and_no_multiple_of_the_others():
     values = [0.01, -0.01, 0.0, 0.5]
     parts = [{"values": {"intercept": {"value": one, "u": 0.01, "unit": "Hz"}}} for one in values]
