@@ -612,10 +612,10 @@ def class_of_files(root, factors):
 
 
 def test_a_value_far_beyond_the_others_repeats_and_is_in_no_mean(tmp_path):
-    of = compared(class_of_files(tmp_path, [(3, 1), (0.3, 1), (1, 1), (1, 1), (1, 1), (0.65, 1)]))
+    of = compared(class_of_files(tmp_path, [(3, 1), (0.3, 1), (1, 1), (1, 1), (1, 1), (0.75, 1)]))
     assert [mark.word for mark in of.marks] == [REPEAT, REPEAT, GOOD, GOOD, GOOD, LOOK]
     assert [mark.why for mark in of.marks if mark.why] == [
-        (f"C₃/₂: {factor} times the median of the others, more than tops differ",) for factor in ("0.33", "3.3", "1.5")
+        (f"C₃/₂: {factor} times the median of the others, more than tops differ",) for factor in ("0.33", "3.3", "1.3")
     ]
     assert of.quantities[0].used == (False, False, True, True, True, True)
 
