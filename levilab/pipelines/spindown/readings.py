@@ -130,7 +130,7 @@ def _part(readings: SpinReadings, options: "InputOptions", path: "Path") -> Spin
     return readings
 
 
-def _ends(options: "InputOptions") -> tuple[float, float]:
+def _ends(options: "InputOptions | None") -> tuple[float, float]:
     """Return the first and the last time that `start` and `stop` ask for [s], infinite where they are not given."""
     start, stop = (getattr(options, name, None) for name in ("start_s", "stop_s"))
     return -math.inf if start is None else start, math.inf if stop is None else stop
@@ -349,9 +349,8 @@ def spin_readings(table: Table, options: "InputOptions | None" = None) -> SpinRe
 
 def _part_of_times(time: "NDArray[np.float64]", options: "InputOptions | None") -> slice:
     """Return the rows from the first to the last one between `start_s` and `stop_s`; none where they are too few."""
-    start, stop = (getattr(options, name, None) for name in ("start_s", "stop_s"))
-    low, high = -math.inf if start is None else start, math.inf if stop is None else stop
-    inside = np.flatnonzero((time >= low) & (time <= high))
+    start, stop = _ends(options)
+    inside = np.flatnonzero((time >= start) & (time <= stop))
     return slice(inside[0], inside[-1] + 1) if inside.size >= FEWEST else slice(0)
 
 
@@ -403,7 +402,8 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
         say = _say_unit(table, "t", {unit: length_of(lasts / factor * of) for unit, of in units})
         text = "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz in {length}, in air it takes minutes{say}"
         return [_doubt(Text(text, table.path.name, first, last, length_of(lasts), say))]
-    marks = next((n for n in range(2, _MOST_MARKS + 1) if _LOWEST_FALL_HZ < last / n < FALLS_BETWEEN_HZ[0]), None)
+    numbers = range(2, _MOST_MARKS + 1)  # with which the spin falls to the lower limit, and begins above it
+    marks = next((n for n in numbers if _LOWEST_FALL_HZ < last / n < FALLS_BETWEEN_HZ[0] < first / n), None)
     if first > (FASTEST_BY_HAND_HZ if marks else _FASTEST_HZ):
         n = marks or math.ceil(first / FASTEST_BY_HAND_HZ)
         doubt = Text(

@@ -125,6 +125,10 @@ def test_the_marks_on_a_rim_are_those_with_which_the_count_ends_at_the_lower_lim
     assert f'"f=2 [1/{marks}s]" divides the numbers by {marks}' in doubt
 
 
+def test_the_beginning_of_a_fall_from_the_fastest_drive_is_no_count_of_three_marks(tmp_path):
+    assert spin_readings(table_of(tmp_path, "t,f\n0,65.5\n5,64\n10,62.6\n")).warnings == ()
+
+
 def test_a_part_by_time_of_a_top_that_was_spun_again_must_fall_and_no_more(tmp_path):
     spins = [38, 36, 34, 32, 30, 44, 42, 40, 38, 36]
     path = tmp_path / "data.csv"
