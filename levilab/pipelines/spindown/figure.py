@@ -278,8 +278,9 @@ def _draw_differences(axes: Axes, analysis: SpinDownAnalysis, unit: _Unit) -> No
         band(axes, t, np.zeros(len(t)), 2 * u, LOOKS[best].colour, alpha=0.25, zorder=1.9)
     most = max(map(abs, limits_about(found, 0.02)))
     axes.locator_params(axis="y", nbins=6)
-    label = Text("ν − ν$_{\\rm {law}}$  [Hz]", law=short_law(best))
-    axes.set(xlabel="time  [s]", ylabel=label, ylim=(-most, most))
+    axes.tick_params(axis="y", labelsize=SMALL)  # of a sharp record they have four decimals
+    axes.set(xlabel="time  [s]", ylim=(-most, most))
+    axes.set_ylabel(Text("ν − ν$_{\\rm {law}}$  [Hz]", law=short_law(best)), labelpad=1)
     ends = []
     for name, difference in curves.items():
         axes.plot(t, difference, linewidth=1.3, zorder=2.6, **LOOKS[name].as_line)

@@ -12,6 +12,7 @@ from levilab.pipelines.spindown.figure import MOST_POINTS, spindown_figure
 from levilab.present.looks import LOOKS
 from levilab.present.style import as_svg
 from support.figures import faults
+from support.paths import SAMPLE_DATA
 from support.spin_downs import spin_down_csv
 
 COLOURS = {name: LOOKS[name].colour for name in LAWS}
@@ -45,6 +46,10 @@ def test_laws_without_a_straight_line_have_no_panel_for_one(tmp_path, figure):
     assert len(drawn.axes) == 3 + 2
     assert drawn.get_figheight() < figure.get_figheight()
     assert not faults(drawn)
+
+
+def test_the_four_decimals_of_a_sharp_record_leave_room_for_the_label():
+    assert not faults(spindown_figure(SPINDOWN.analyze([SAMPLE_DATA / "sway" / "phone.csv"], SpinDownOptions())))
 
 
 def panels(figure):
