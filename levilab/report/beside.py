@@ -380,7 +380,7 @@ def _mark(of: Class, k: int) -> Mark:
         elif truth is None and others is not None and abs(others) > FAR:
             odd.append(Text("{symbol}: {times:n} u from the others", symbol=one.symbol, times=with_sign(others, 1)))
     wrong = [*group.doubts, *wrong]
-    odd += [*filter(None, [_other_options(of, k)])]
+    odd += [*filter(None, [_other_options(of, k), _other_limits(of, k)])]
     wrong_time = any(one.wrong[k] > _WRONG for one in of.quantities)  # a wrong unit makes a run short, too
     short = "" if wrong_time else _too_short(of, k)
     if short or group.doubts:
@@ -434,6 +434,20 @@ def _other_options(of: Class, k: int) -> str:
         return ""
     own, others = (" ".join(options) or "no options" for options in (each[k], usual))
     return Text("analyzed with {own}, most groups with {others}", own=own, others=others)
+
+
+#: Of limits of another kind than most groups have.
+_OTHER_LIMITS = {
+    "upper": "upper limits, where most groups have lower ones: is each turn counted twice?",
+    "lower": "lower limits, where most groups have upper ones",
+}
+
+
+def _other_limits(of: Class, k: int) -> str:
+    """Return that a group has limits of another kind than most, where it has; else nothing."""
+    each = [getattr(run, "which", "") for run in of.found.runs]
+    ((usual, count),) = Counter(each).most_common(1)
+    return _OTHER_LIMITS[each[k]] if each[k] != usual and 2 * count > len(each) else ""
 
 
 def _other_seed(of: Class, k: int) -> str:

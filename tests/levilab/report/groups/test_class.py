@@ -323,6 +323,17 @@ def test_groups_that_held_different_spins_have_no_mean_drag(tmp_path):
     write_class([tmp_path / "class"], tmp_path / "class.xlsx")
 
 
+def test_a_group_whose_limits_are_twice_those_of_the_others_is_to_look(tmp_path):
+    for group, factor in enumerate((1, 1, 2)):
+        limits = np.random.default_rng(group).normal(21.9 * factor, 0.2, 8).round(2)
+        (tmp_path / f"G{group}.csv").write_text(
+            "\n".join(["Nr.;Fallfrequenz in Hz", *(f"{k};{one}" for k, one in enumerate(limits, 1))]), encoding="utf-8"
+        )
+    of = compared(tmp_path, "limit")
+    assert [mark.word for mark in of.marks] == [GOOD, GOOD, LOOK]
+    assert of.marks[2].why[0].startswith("upper limits, where most groups have lower ones")
+
+
 def test_lower_and_upper_limits_have_no_mean(tmp_path):
     for kind in ("lower", "upper"):
         shutil.copytree(SAMPLE_DATA / f"{kind}-limits", tmp_path / kind)
