@@ -320,7 +320,8 @@ def _quantity(
     used = tuple(bool(one) and not (doubt or far) for one, doubt, far in zip(good, doubts, of.off(FAR), strict=True))
     used = used if any(used) else of.used
     of = replace(of, wrong=_gross_errors(of, used))
-    used = tuple(use and not wrong > _WRONG for use, wrong in zip(used, of.wrong, strict=True))
+    right = tuple(use and not wrong > _WRONG for use, wrong in zip(used, of.wrong, strict=True))
+    used = right if any(right) else used
     known, widened = ([*filter(None, compress(each, used))] for each in (of.estimates, of.widened))
     if not known:
         return replace(of, used=used)

@@ -644,6 +644,15 @@ def test_a_wrong_value_of_what_may_be_zero_is_some_u_and_no_multiple_of_the_othe
     assert _beside_others(of, 3).endswith(": +35.4 u from the others")
 
 
+def test_groups_of_which_each_is_probably_wrong_are_compared_and_not_left_out():
+    values, u = [0.8892, 0.002807, 56.43, 0.8727, 28.40, -0.00134], [4.75e-3, 6.6e-7, 0.55, 0.0735, 0.223, 8.6e-5]
+    parts = [{"values": {"mean": {"value": x, "u": of, "unit": "Hz"}}} for x, of in zip(values, u, strict=True)]
+    of = _quantity("mean", ANALYSES["limit"], "", parts, [Truth()] * 6, runs=parts, doubts=[False] * 6)
+    assert min(of.wrong) > 0.5
+    assert of.together
+    assert of.used == (True,) * 6
+
+
 def test_groups_that_all_differ_by_more_than_tops_do_are_not_said_to_differ_as_tops(tmp_path):
     of = compared(class_of_files(tmp_path, [(1, 1), (3, 1)]))
     assert [mark.word for mark in of.marks] == [LOOK, LOOK]
