@@ -333,7 +333,7 @@ def spin_readings(table: Table, options: "InputOptions | None" = None) -> SpinRe
     _must_be_ordinary(table, time, frequency)
     notes = table.warnings
     if u is not None:
-        notes = (*_of_decimals(table, frequency, u), *notes)
+        notes = (*_of_decimals(table, frequency, u), *_of_steps(table, frequency, u), *notes)
         _must_be_possible(table, u, frequency)
     time = time - time[0] if time[0] > _SINCE_1970_S else time
     part = _part_of_times(time, options)
@@ -343,7 +343,7 @@ def spin_readings(table: Table, options: "InputOptions | None" = None) -> SpinRe
             check_readings(table.column("time_s")[part], frequency[part], None if u is None else u[part])
         except AnalysisError as error:
             raise _in_the_file(_rows(table, part), error) from error
-        doubts = _doubts(table, time[part], frequency[part])
+        doubts = _doubts(table, time[part], frequency[part]) or _of_seconds(table, time[part])
     return SpinReadings(time, frequency, u, (*doubts, *notes), doubtful=any(map(is_doubt, [*doubts, *notes])))
 
 
@@ -494,6 +494,30 @@ def _of_decimals(table: Table, frequency: "NDArray[np.float64]", u: "NDArray[np.
     refuse(table, np.full(u.shape, bool(whole and u.max() >= _MOST_U_HZ)), said, frequency, u)
     text = Text(_NAMED, table.path.name, Text(said, frequency[0], u[0]))
     return [of_file("decimals", text)] if whole and np.ptp(u) > _MOST_APART_HZ else []
+
+
+def _of_steps(table: Table, frequency: "NDArray[np.float64]", u: "NDArray[np.float64]") -> list[Note]:
+    """Return the doubt about uncertainties that are the steps from reading to reading, as a column Δf has them."""
+    steps = np.abs(np.diff(frequency))
+    if np.ptp(steps) == 0 or not any(np.allclose(one, steps, rtol=1e-3) for one in (u[1:], u[:-1])):
+        return []
+    said = "{name:s}: the uncertainties are the steps from reading to reading: leave their column out"
+    return [_doubt(Text(said, name=table.path.name))]
+
+
+def _of_seconds(table: Table, time: "NDArray[np.float64]") -> list[Note]:
+    """Return the doubt about decimals of minutes that may be seconds: read as these, the times are even, else not."""
+    whole, decimals = np.divmod(np.round(time * (100 / 60), 6), 100)
+    steps, of_seconds = np.diff(time), np.diff(60 * whole + decimals)
+    even = np.ptp(of_seconds) <= 0.01 * of_seconds.mean() and np.ptp(steps) > 0.1 * steps.mean()
+    if table.factors.get("time_s") != 60 or decimals.max() >= 60 or not even:
+        return []
+    said = (
+        "{name:s}: no time has decimals above .59, and as seconds they would lie {step:n} s apart: write {time:.2f} as "
+        "{minutes:.0f}:{seconds:02.0f}"
+    )
+    last = float(time[-1] / 60)
+    return [_doubt(Text(said, table.path.name, digits(of_seconds[0], 3), last, whole[-1], decimals[-1]))]
 
 
 def _must_be_possible(table: Table, u: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> None:

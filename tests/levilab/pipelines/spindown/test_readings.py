@@ -153,6 +153,26 @@ def test_half_of_a_unit_is_named_as_the_column_has_it(unit, factor, tmp_path):
     assert halved.column("spin_frequency_hz").round(3).tolist() == [38, 30, 22]
 
 
+@pytest.mark.parametrize(
+    ("step", "unit", "asks"), [(0.30, "min", True), (0.10, "min", True), (0.25, "min", False), (0.30, "s", False)]
+)
+def test_decimals_of_minutes_that_may_be_seconds_are_a_doubt(step, unit, asks, tmp_path):
+    hundredths = [100 * (k * round(100 * step) // 60) + k * round(100 * step) % 60 for k in range(20)]
+    times = hundredths if asks else [100 * k * step for k in range(20)]
+    rows = "".join(f"{t / 100:.2f};{38 - 0.5 * k}\n" for k, t in enumerate(times))
+    doubts = spin_readings(table_of(tmp_path, f"t [{unit}];f [Hz]\n{rows}")).warnings
+    assert any("decimals above .59" in one for one in doubts) == asks
+
+
+def test_steps_from_reading_to_reading_are_no_uncertainties(tmp_path):
+    spins = [38.0, 36.7, 35.5, 34.2, 33.1]
+    steps = np.abs(np.diff(spins, prepend=spins[0] + 1.2)).round(2)
+    rows = "".join(f"{10 * k},{spin},{step}\n" for k, (spin, step) in enumerate(zip(spins, steps, strict=True)))
+    readings = spin_readings(table_of(tmp_path, HEADER + rows))
+    assert readings.doubtful
+    assert "steps from reading to reading" in readings.warnings[0]
+
+
 @pytest.mark.parametrize(("title", "doubtful"), [("t", True), ("Uhrzeit", False), ("t [mm:ss]", False)])
 def test_times_that_may_be_of_a_clock_keep_a_run_out_of_means(title, doubtful, tmp_path):
     readings = spin_readings(table_of(tmp_path, f"{title},f\n14:05,38\n14:06,35.5\n14:07,33.2\n"))
