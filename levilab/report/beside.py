@@ -448,7 +448,7 @@ def _other_limits(of: Class, k: int) -> str:
     """Return that a group has limits of another kind than most, where it has; else nothing."""
     each = [getattr(run, "which", "") for run in of.found.runs]
     ((usual, count),) = Counter(each).most_common(1)
-    return _OTHER_LIMITS[each[k]] if each[k] != usual and 2 * count > len(each) else ""
+    return _OTHER_LIMITS.get(each[k], "") if each[k] != usual and 2 * count > len(each) else ""
 
 
 def _other_seed(of: Class, k: int) -> str:

@@ -19,7 +19,7 @@ from analysis.comparison import compare
 from levilab.crosscheck.truth import Truth
 from levilab.errors import UsageError
 from levilab.pipelines.catalogue import ANALYSES
-from levilab.pipelines.suits import save
+from levilab.pipelines.suits import analyze_suiting, save
 from levilab.report.beside import (
     DIFFER,
     GOOD,
@@ -720,6 +720,15 @@ def test_the_only_file_of_a_folder_is_of_the_folders_group(tmp_path):
     for path, name in ((tmp_path, "Anna"), (tmp_path / "Anna", "Anna"), (file, "spin.csv")):
         write_class([path], tmp_path / "class.html", show=(shown := []).append)
         assert [row.cells[0] for row in shown[0].rows] == [name]
+
+
+def test_long_and_short_records_of_a_spin_are_one_class(tmp_path):
+    for k, seconds in enumerate((3, 3, 30)):  # the longest has several windows
+        np.savetxt(
+            tmp_path / f"{k}.csv", np.arange(1, 38 * seconds) / 38.0, "%.7f", header="pulse time [s]", comments=""
+        )
+    (of,) = [class_of(row, found) for row, found in analyze_suiting([tmp_path], {})]
+    assert [mark.word for mark in of.marks[:2]] == [GOOD, GOOD]
 
 
 def test_recordings_of_falls_are_compared_by_their_drag_and_not_by_a_frequency(tmp_path):
