@@ -21,8 +21,9 @@ UNITS: Mapping[str, Mapping[str, float]] = {
         ), 1),
         "ms": 1e-3, "msec": 1e-3, "milliseconds": 1e-3, "millisekunden": 1e-3, "μs": 1e-6, "us": 1e-6, "ns": 1e-9,
         **dict.fromkeys(("min", "minute", "minutes", "minuten", "minuto", "minutos", "minut", "minuter"), 60),
+        "h": 3600,
         **dict.fromkeys(("d", "day", "days", "tag", "tage", "jours", "días", "dagar"), 86400),  # of a spreadsheet
-        "h": 3600, **dict.fromkeys(("mm:ss", "m:ss", "min:s", "min:sec", "hh:mm:ss", "h:mm:ss", "h:min:s"), 1),
+        **dict.fromkeys(("mm:ss", "m:ss", "min:s", "min:sec", "hh:mm:ss", "h:mm:ss", "h:min:s"), 1),
         **dict.fromkeys(("hh:mm", "h:mm", "h:min"), 1),  # of a clock, whose times are read to seconds
     },
     "frequency": {

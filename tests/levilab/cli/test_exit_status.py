@@ -214,7 +214,7 @@ def test_the_virtual_bench_is_no_advice_to_those_who_use_it(place):
     ("words", "says"),
     [
         (f"analyze spindown {SAMPLE} --reading-u 0,03", "'0,03': a number is expected; write a decimal point"),
-        ("simulate undriven --duration 5kg", "'5kg': a number in s, ms, μs, ns, min or h is expected"),
+        ("simulate undriven --duration 5kg", "'5kg': a number in s, ms, μs, ns, min, h or d is expected"),
         ("acquire spin --mock --seed abc", "'abc': a whole number is expected"),
         ("bench serve --speed fast", "'--speed': 'fast': a number is expected"),
     ],
