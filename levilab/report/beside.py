@@ -379,14 +379,13 @@ def _mark(of: Class, k: int) -> Mark:
         elif one.wrong[k] > _PERHAPS_WRONG:
             (wrong if one.wrong[k] > _WRONG else odd).append(_beside_others(one, k))
         elif truth is None and others is not None and abs(others) > FAR:
-            odd.append(Text("{symbol}: {times:n} u from the others", symbol=one.symbol, times=with_sign(others, 1)))
-    wrong = [*group.doubts, *wrong]
+            odd.append(_from_others(one, others))
     odd += [*filter(None, [_other_options(of, k), _other_limits(of, k)])]
     wrong_time = any(one.wrong[k] > _WRONG for one in of.quantities)  # a wrong unit makes a run short, too
     short = "" if wrong_time else _too_short(of, k)
     if short or group.doubts:
-        why = (*group.doubts, *[short] * bool(short), *wrong[len(group.doubts) :], *odd)
-        return Mark(REPEAT if wrong else LOOK, why, group.warnings)
+        why = (*group.doubts, *filter(None, [short]), *wrong, *odd)
+        return Mark(REPEAT if wrong or group.doubts else LOOK, why, group.warnings)
     odd += [*filter(None, [_other_seed(of, k)]), *group.warnings]
     return Mark(REPEAT if wrong else LOOK if odd else GOOD, (*wrong, *odd))
 
@@ -398,7 +397,10 @@ def _beside_others(one: Compared, k: int) -> str:
     if abs(median) > FAR * u:
         said = "{symbol}: {factor:n} times the median of the others, more than tops differ"
         return Text(said, symbol=one.symbol, factor=digits(mine.value / median))  # type: ignore[union-attr]
-    times = (mine.value - median) / math.hypot(mine.u, u)  # type: ignore[union-attr, arg-type]
+    return _from_others(one, (mine.value - median) / math.hypot(mine.u, u))  # type: ignore[union-attr, arg-type]
+
+
+def _from_others(one: Compared, times: float) -> str:
     return Text("{symbol}: {times:n} u from the others", symbol=one.symbol, times=with_sign(times, 1))
 
 

@@ -136,6 +136,11 @@ def _ends(options: "InputOptions | None") -> tuple[float, float]:
     return -math.inf if start is None else start, math.inf if stop is None else stop
 
 
+def _inside(values: "NDArray[np.float64]", ends: tuple[float, float]) -> "NDArray[np.intp]":
+    """Return the numbers of the values between two ends."""
+    return np.flatnonzero((values >= ends[0]) & (values <= ends[1]))
+
+
 def _between(
     readings: SpinReadings,
     values: "NDArray[np.float64]",
@@ -146,8 +151,7 @@ def _between(
     options: str,
 ) -> SpinReadings:
     """Return the readings whose values lie between two ends, in a unit, which options gave, with a note on the rest."""
-    low, high = ends
-    inside = np.flatnonzero((values >= low) & (values <= high))
+    (low, high), inside = ends, _inside(values, ends)
     said = "from {low:g} {unit:s} on" if high == math.inf else "up to {high:g} {unit:s}"
     said = said if math.inf in {-low, high} else "between {low:g} {unit:s} and {high:g} {unit:s}"
     where = Text(said, low=low, high=high, unit=unit)
@@ -349,8 +353,7 @@ def spin_readings(table: Table, options: "InputOptions | None" = None) -> SpinRe
 
 def _part_of_times(time: "NDArray[np.float64]", options: "InputOptions | None") -> slice:
     """Return the rows from the first to the last one between `start_s` and `stop_s`; none where they are too few."""
-    start, stop = _ends(options)
-    inside = np.flatnonzero((time >= start) & (time <= stop))
+    inside = _inside(time, _ends(options))
     return slice(inside[0], inside[-1] + 1) if inside.size >= FEWEST else slice(0)
 
 
