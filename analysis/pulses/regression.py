@@ -74,13 +74,26 @@ class Grid:
             rounding: [turns].
             seen: root mean square of the residuals [turns].
         """
-        place = np.arange(8)[:, None, None] / 8 + np.linspace(-1, 1, 9)[:, None] * powers[:, 1] + times / self.step
+        place = _places(powers[:, 1]) + times / self.step
         rounded = ((place - np.rint(place)) * rounding).reshape(-1, times.size)
-        shifts = rounded @ carried
-        left = np.sqrt(np.mean((rounded - shifts @ powers.T) ** 2, axis=1))
-        unseen, least = UNSEEN * rounding, float(left.min())
-        part = min(UNLIKE * seen / (least - unseen), 1.0) if least > unseen else 1.0
-        return part**2 * float(np.mean(shifts[left <= max(UNLIKE * seen + unseen, least), 1] ** 2))
+        return _hidden_variance(rounded, powers, carried, rounding, seen)
+
+
+def _places(u: Array) -> Array:
+    """Return places between two steps, and drifts up to one step, of a record from u = -1 to 1, shape (8, 9, n)."""
+    return np.arange(8)[:, None, None] / 8 + np.linspace(-1, 1, 9)[:, None] * u
+
+
+def _hidden_variance(errors: Array, powers: Array, carried: Array, rounding: float, seen: float) -> float:
+    """Return the variance of the second coefficient by errors, shape (m, n), of which residuals show no more than seen.
+
+    The other arguments as of `Grid.variance`.
+    """
+    shifts = errors @ carried
+    left = np.sqrt(np.mean((errors - shifts @ powers.T) ** 2, axis=1))
+    unseen, least = UNSEEN * rounding, float(left.min())
+    part = min(UNLIKE * seen / (least - unseen), 1.0) if least > unseen else 1.0
+    return part**2 * float(np.mean(shifts[left <= max(UNLIKE * seen + unseen, least), 1] ** 2))
 
 
 @dataclass(frozen=True)
@@ -195,6 +208,28 @@ class Fit:
     def times(self, factor: float) -> Fit:
         """Return the phase multiplied: half or twice the frequency."""
         return replace(self, coefficients=self.coefficients * factor)
+
+    def of_rounded_intervals(self, times: Array, step: float) -> Fit:
+        """Return the same where the times are sums of rounded intervals, whose errors add up from pulse to pulse.
+
+        Intervals that change by less than a step are all rounded alike: the residuals do not show it.
+
+        Args:
+            times: of the pulses, without a weight, shape (n,) [s].
+            step: of the intervals [s].
+        """
+        powers, turn = self._place(times)[:, None] ** np.arange(3), step * self.middle_frequency
+        jitter = np.random.default_rng(0).standard_normal(times.size - 1)
+        jitter *= float(np.std(np.diff(self.residuals))) / 2**0.5 / turn
+        intervals = 1 / self.frequency(times[1:]) / step
+        place = _places(powers[1:, 1]) + intervals + jitter
+        summed = np.cumsum((place - np.rint(place)) * turn, axis=-1).reshape(-1, times.size - 1)
+        seen, unit = float(np.sqrt(np.mean(self.residuals**2))), self.unit_covariance
+        errors = np.column_stack([np.zeros(len(summed)), summed])
+        more = _hidden_variance(errors, powers, powers @ unit, turn, seen) / float(unit[1, 1])
+        covariance = self.covariance.copy()
+        covariance[:3, :3] += more * unit
+        return replace(self, covariance=covariance, scatter=replace(self.scatter, least=self.scatter.scale + more))
 
     def phase_at(self, time: float, origin: float = 0.0) -> Estimate:
         """Return the phase at a time, from 0 to 1 [turns], of what passes at a phase of origin."""

@@ -63,7 +63,7 @@ class Train:
     doubled: int
 
 
-def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinFrequency:
+def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None, interval_step: float = 0.0) -> SpinFrequency:
     """Return frequency and slope of once-per-turn pulses.
 
     The turn number is regressed on time; missing, doubled and wrong pulses are allowed for, up to half of the turns.
@@ -73,6 +73,7 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinF
         pulse_times: shape (n,), increasing [s].
         degree: of the phase in time: 2 if the slope stays, 3 if nothing is known of its change; None: it changes as
             under a drag, or as a top's that swings, as probable as the pulses make it.
+        interval_step: where the times are sums of rounded intervals, the step to which these are rounded [s].
 
     Raises:
         TooFewPulses, NotFinite, TimesNotIncreasing, ShapesDiffer.
@@ -81,8 +82,9 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None) -> SpinF
     >>> round(found.frequency.value, 9), found.pulses, found.missing
     (25.0, 30, 0)
     """
-    train = fit_train(check_times(pulse_times), degree=degree)
-    fit = train.fit
+    times = check_times(pulse_times)
+    train = fit_train(times, degree=degree, step=interval_step)
+    fit = train.fit.of_rounded_intervals(times[train.used], interval_step) if interval_step else train.fit
     frequency, chirp, bend = fit.motion_at(fit.reference)
     assert frequency.value is not None
     return SpinFrequency(
@@ -124,7 +126,8 @@ def fit_train(times: Array, *, degree: int | None = None, step: float = 0.0) -> 
     Args:
         times: shape (n,), increasing [s].
         degree: as of `spin_of_times`.
-        step: of the clock that the times are of [s]; no jump of the time is shorter than a few of them.
+        step: of the clock that the times are of, or of the intervals whose sums they are [s]; no jump of the time is
+            shorter than a few of them.
 
     Raises:
         TooFewPulses: fewer than four belong.

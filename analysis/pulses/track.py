@@ -78,19 +78,21 @@ class Track:
         return findings
 
 
-def track_of_times(pulse_times: ArrayLike, *, window: float = WINDOW) -> Track:
+def track_of_times(pulse_times: ArrayLike, *, window: float = WINDOW, interval_step: float = 0.0) -> Track:
     """Follow the frequency through a long list of pulse times.
 
     Args:
         pulse_times: shape (n,), increasing [s].
         window: length of a window [s].
+        interval_step: as of `spin_of_times`.
 
     Raises:
         TooFewPulses: no window has enough of them.
         NotFinite, TimesNotIncreasing, ShapesDiffer, NotPositive.
     """
     t = check_times(pulse_times)
-    return _connect(_in_windows(t, window, lambda inside: spin_of_times(t[inside])), t.size, float(t[-1] - t[0]))
+    spins = _in_windows(t, window, lambda inside: spin_of_times(t[inside], interval_step=interval_step))
+    return _connect(spins, t.size, float(t[-1] - t[0]))
 
 
 def track_of_samples(samples: ArrayLike, times: ArrayLike, *, window: float = WINDOW, method: Choice = "auto") -> Track:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.budget import printed_step
 from levilab.formats.columns import SHORTHANDS, TableError, find_column, shorten
 from levilab.formats.dialect import Dialect
 from levilab.formats.titles import is_unit, plain_unit, read_title, unit_factor
@@ -68,9 +69,9 @@ def read_column(
     if len(numbers) < FEWEST_PULSES:
         what = "holds {n} numbers, at least {fewest} pulse times are needed"
         raise NoWaveform(path, what, len(numbers), FEWEST_PULSES)
-    turns = _turns(path, numbers, unit, titles)
-    if turns is not None:
-        return _added(path, turns, first + 1, warnings)
+    unit_of_intervals = _unit_of_intervals(path, numbers, unit, titles)
+    if unit_of_intervals is not None:
+        return _added(path, numbers, unit_of_intervals, first + 1, warnings)
     times = numbers * (unit_factor(unit, "time") or 1.0 if unit else 1.0)
     late = np.flatnonzero(np.diff(times) <= 0)
     if late.size > max(0.01 * len(times), 3):
@@ -116,8 +117,8 @@ def _are_turns(numbers: NDArray[np.float64], unit: str) -> bool:
     return shortest < float(np.median(numbers)) * (unit_factor(unit, "time") or 1.0) < longest
 
 
-def _turns(path: Path, numbers: NDArray[np.float64], unit: str, titles: list[str]) -> NDArray[np.float64] | None:
-    """Return the times from pulse to pulse [s] that numbers are; None where they are none, or none of a top.
+def _unit_of_intervals(path: Path, numbers: NDArray[np.float64], unit: str, titles: list[str]) -> float | None:
+    """Return the unit [s] in which numbers are times from pulse to pulse; None where they are none, or none of a top.
 
     Raises NoRate for what may be such times, or samples or limits, as neither title nor unit says it.
     """
@@ -131,11 +132,12 @@ def _turns(path: Path, numbers: NDArray[np.float64], unit: str, titles: list[str
             '`columns` = "f=1 [{unit:s}]", of samples say the `rate` in Hz, of spins add a column of their times'
         )
         raise NoRate(path, what, found)
-    return numbers * (unit_factor(found, "time") or 1.0)
+    return unit_factor(found, "time") or 1.0
 
 
-def _added(path: Path, turns: NDArray[np.float64], line: int, warnings: Sequence[str]) -> PulseTimes:
-    """Return the times of pulses by the times between them [s], the first of them in a line.  Raises TableError."""
+def _added(path: Path, numbers: NDArray[np.float64], unit: float, line: int, warnings: Sequence[str]) -> PulseTimes:
+    """Return the times of pulses by the times between them in a unit [s], the first in a line.  Raises TableError."""
+    turns, step = numbers * unit, (printed_step(numbers) or 0.0) * unit
     wrong = np.flatnonzero(turns <= 0)
     if wrong.size:
         k = int(wrong[0])
@@ -143,7 +145,7 @@ def _added(path: Path, turns: NDArray[np.float64], line: int, warnings: Sequence
         raise TableError(path, what, turns[k], line=line + k)
     said = "{name:s}: its numbers are times from pulse to pulse, of {slow:.4g} to {fast:.4g} Hz"
     note = of_file("turns", Text(said, path.name, 1 / turns.max(), 1 / turns.min()), "advice")
-    return PulseTimes(path, "list of times from pulse to pulse", np.cumsum(turns), (*warnings, note))
+    return PulseTimes(path, "list of times from pulse to pulse", np.cumsum(turns), (*warnings, note), step)
 
 
 def _unit(path: Path, titles: list[str]) -> str:

@@ -170,12 +170,14 @@ class PulseTimes:
     Attributes:
         times: shape (n,), increasing [s].
         path, format, warnings: as of a waveform.
+        interval_step: of printed intervals, which the times are sums of [s]; 0 where the times were printed.
     """
 
     path: Path
     format: str
     times: Array
     warnings: tuple[str, ...] = ()
+    interval_step: float = 0.0
 
 
 def about_rate(path: Path, known: float | None, rate: float | None) -> list[str]:

@@ -30,7 +30,7 @@ from analysis.pulses.errors import OnlyHum
 from analysis.rotation import FieldSpin, spin_of_field, track_of_field, transverse_moment
 from analysis.uncertainty import Estimate
 from levilab.errors import DataError
-from levilab.formats.waveforms.waveform import Waveform
+from levilab.formats.waveforms.waveform import PulseTimes, Waveform
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SpinOptions
@@ -272,7 +272,7 @@ def _spin_of(source: Source[Records], options: SpinOptions) -> SpinRun:
         if records.field:
             return _of_field(records.field, options)
         if records.pulses:
-            return _of_times(records.pulses.times)
+            return _of_times(records.pulses)
         if len(records.waveforms) == 1:
             return _of_waveform(records.waveforms[0], records.channel, options)
         return _of_several(records, options)
@@ -282,11 +282,12 @@ def _spin_of(source: Source[Records], options: SpinOptions) -> SpinRun:
         raise DataError(Sentences(said, *channels, between="; ")) from error
 
 
-def _of_times(times: Array) -> SpinRun:
+def _of_times(pulses: PulseTimes) -> SpinRun:
+    times, step = pulses.times, pulses.interval_step
     if times[-1] - times[0] <= LONGEST_WHOLE_S:
-        spin = spin_of_times(times)
+        spin = spin_of_times(times, interval_step=step)
         return replace(_of_one(spin), parts=parts_of(spin, spin))
-    return _of_track(track_of_times(times, window=WINDOW_S))
+    return _of_track(track_of_times(times, window=WINDOW_S, interval_step=step))
 
 
 def _of_waveform(waveform: Waveform, channel: str, options: SpinOptions) -> SpinRun:

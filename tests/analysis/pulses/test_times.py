@@ -45,6 +45,27 @@ def test_the_uncertainty_predicts_the_scatter():
     assert np.std(pulls) == pytest.approx(1, abs=0.12)  # 3 standard errors of a standard deviation, and u's own scatter
 
 
+@pytest.mark.parametrize(("step", "jitter", "duration"), [(1e-5, 2e-5, 2.0), (1e-5, 2e-5, 10.0), (1e-4, 1e-4, 10.0)])
+def test_rounding_of_intervals_adds_up_in_the_uncertainty(step, jitter, duration):
+    """Times that are sums of intervals wander; their residuals show a third to a tenth of it."""
+    random, pulls = np.random.default_rng(7), []
+    for _ in range(200):
+        frequency = random.uniform(27, 33)
+        times = pulse_times(frequency, duration=duration, phase=random.uniform())
+        times += jitter * random.standard_normal(times.size)
+        summed = np.cumsum(np.rint(np.diff(times) / step) * step)
+        found = spin_of_times(summed, interval_step=step)
+        truth = frequency - 0.1 * (found.reference_time + times[1] - summed[0])
+        pulls.append((found.frequency.value - truth) / found.frequency.u)
+    assert 0.85 < np.sqrt(np.mean(np.square(pulls))) < 1.7  # 1.0 to 1.5: the first is from rounding of a slow ramp
+
+
+def test_equal_intervals_are_known_to_their_step():
+    found = spin_of_times(0.033 * np.arange(1, 60), interval_step=1e-3)
+    u = 1e-3 / 24**0.5 / 0.033**2  # any place in the step and any slope within it: |place| + |slope| < half a step
+    assert found.frequency.u == pytest.approx(u, rel=0.2)  # 8 places and 9 slopes are tried: 0.92
+
+
 def test_what_moves_pulses_to_and_fro_averages_out_in_the_uncertainty():
     """Hum that is left in a trace at 30 Hz shifts pulses with a period of three turns."""
     random, pulls, swings = np.random.default_rng(7), [], []

@@ -350,6 +350,7 @@ def test_times_from_pulse_to_pulse_are_added(title, unit, write):
     record = read_record(write(f"{title}\n" + "".join(f"{turn / unit:.4f}\n" for turn in turns)))
     np.testing.assert_allclose(record.times, np.cumsum(turns), rtol=1e-7)
     assert "are times from pulse to pulse, of 19.94 to 40 Hz" in record.warnings[0]
+    assert record.interval_step == pytest.approx(1e-7)  # the last digit that is not 0 in all
 
 
 @pytest.mark.parametrize("title", ["", "T\n", "pulse times\n"])
