@@ -4,6 +4,7 @@ Texts reach typst as strings of a JSON file and never as markup, so nothing in t
 """
 
 import json
+import math
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -56,6 +57,8 @@ MOST_ENTRIES = 20
 SETTING = "setting.json"
 #: Sizes of the letters [pt]: as a rule, and where a last page that ends above its middle is saved by them.
 LARGEST, SMALLER, NEARLY_EMPTY = 10.0, 9.4, 0.5
+#: A figure that was made smaller for one page is larger by the first of these factors with which all of it still fits.
+ENLARGED = (1.5, 1.35, 1.2)
 #: Height over width from which a figure may leave its place in the text for the top of a page.
 TALL = 0.4
 #: What no PDF may contain: code points that are no characters, and those for private use, which no font has.
@@ -94,20 +97,27 @@ def as_pdf(document: Document) -> bytes:
             "pip install --force-reinstall typst, or name the report report.html"
         ) from error
 
-    files: Any = settle(files_of(document))  # a dictionary of files is missing in the types that typst declares
+    files: Any = settle(document)  # a dictionary of files is missing in the types that typst declares
     return typst.compile(files, format="pdf", font_paths=fonts(), ignore_system_fonts=True)
 
 
-def settle(files: dict[str, bytes]) -> dict[str, bytes]:
-    """Return the files with the places of the figures, and in smaller letters where these save a last page."""
-    settled, pages, end = _place_figures(files, LARGEST)
+def settle(document: Document) -> dict[str, bytes]:
+    """Return its files with the places and sizes of the figures, in smaller letters where these save a last page."""
+    files = files_of(document)
+    size = LARGEST
+    settled, pages, end = _place_figures(files, size)
     if pages > 1 and end < NEARLY_EMPTY:
         smaller, fewer, _ = _place_figures(files, SMALLER)
-        return smaller if fewer < pages else settled
+        if fewer < pages:
+            settled, pages, size = smaller, fewer, SMALLER
+    every = (inner for block in document.blocks for inner in all_in(block))
+    if any(isinstance(one, Picture) and math.isfinite(one.most_inch) for one in every):
+        larger = (_place_figures(files, size, factor) for factor in ENLARGED)
+        return next((enlarged for enlarged, more, _ in larger if more == pages), settled)
     return settled
 
 
-def _place_figures(files: dict[str, bytes], size: float) -> tuple[dict[str, bytes], int, float]:
+def _place_figures(files: dict[str, bytes], size: float, enlarged: float = 1.0) -> tuple[dict[str, bytes], int, float]:
     """Return the files, figures that do not fit where they are called at the top of the next page, and the last page.
 
     The document is set again after each of them, since one that moves makes room for the text behind it.  Where the
@@ -116,6 +126,7 @@ def _place_figures(files: dict[str, bytes], size: float) -> tuple[dict[str, byte
     Args:
         files: of the document.
         size: of its letters [pt].
+        enlarged: factor on the sizes of figures that were made smaller.
 
     Returns:
         The files, the number of pages, and where the last one ends [parts of its height].
@@ -124,7 +135,7 @@ def _place_figures(files: dict[str, bytes], size: float) -> tuple[dict[str, byte
 
     moved: list[str] = []
     while True:
-        given: Any = files | {SETTING: json.dumps({"size": size, "moved": moved}).encode()}
+        given: Any = files | {SETTING: json.dumps({"size": size, "moved": moved, "enlarged": enlarged}).encode()}
         found = typst.query(given, "<setting>", field="value", one=True, font_paths=fonts(), ignore_system_fonts=True)
         said = json.loads(found)
         away = [file for file, called, stands in said["figures"] if stands > called and file not in moved]
@@ -179,6 +190,7 @@ class _Drawing:
             "format": kind,
             "floats": shape > TALL and picture.most_inch > TALLEST,
             "width": min(100.0, 100 * min(TALLEST, picture.most_inch) / WIDE / shape),
+            "small": math.isfinite(picture.most_inch),
         }
 
 

@@ -45,7 +45,7 @@ def said_of(document, label):
     """What the typeset document says of itself for tests."""
     import typst
 
-    files = settle(files_of(document))
+    files = settle(document)
     return json.loads(
         typst.query(files, f"<{label}>", field="value", one=True, font_paths=fonts(), ignore_system_fonts=True)
     )
@@ -198,6 +198,15 @@ def test_a_tall_figure_without_words_of_its_own_has_no_heading_and_text_fills_th
     assert found["width"] < 100, "it fits on a page with its caption"
     (_, notes), (figure,) = said_of(document, "spots")
     assert (notes[0], figure[0]) == (1, 2)
+
+
+def test_the_figure_of_a_short_report_grows_into_the_room_that_its_page_has():
+    picture = Picture("p", "", "c", "a", drawn, most_inch=1.0)
+
+    def factor(lines):
+        return json.loads(settle(Document("t", "", (*(Paragraph("x"),) * lines, picture)))["setting.json"])["enlarged"]
+
+    assert [factor(lines) for lines in (10, 39, 40, 41)] == [1.5, 1.5, 1.35, 1.0]  # a line takes 1.8 % of the page
 
 
 def test_letters_are_smaller_where_that_saves_a_last_page():
