@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from levilab.simulator.scene import Scene
 
 #: Arguments of `analyze` that are data, and no options.
-_DATA = {"data", "kind", "time", "frequency", "light"}
+_DATA = {"data", "kind", "u", "time", "frequency", "light"}
 
 __all__ = [
     "LevilabError", "acquire", "analyze", "crosscheck", "export", "load", "open_sweep", "report", "runs", "scenes",
@@ -196,6 +196,7 @@ def analyze(
     | Mapping[str, ArrayLike]
     | Sequence[Run | str | PathLike[str] | pd.DataFrame] = (),
     kind: Literal["spindown", "spin", "field", "limit", "precession", "sway", "hold", "video"] | None = None,
+    u: ArrayLike | None = None,
     *,
     time: ArrayLike | None = None,
     frequency: ArrayLike | None = None,
@@ -240,7 +241,7 @@ def analyze(
     """Analyze runs, data files or DataFrames.  Nothing is written; `save(folder)` of the result does.
 
     >>> import levilab
-    >>> result = levilab.analyze("sample_data/spin-down-1")  # or a file, a DataFrame; arrays: levilab.analyze((t, f))
+    >>> result = levilab.analyze("sample_data/spin-down-1")  # or a file, a DataFrame; arrays: levilab.analyze(t, f, u)
     >>> result["c32"], result.best_model
     (0.0002369(4) (rad/s)^-1/2/s, 'disc')
     >>> figure = result.plot()  # in a notebook the last line of a cell shows it
@@ -252,7 +253,8 @@ def analyze(
             or arrays: (times [s], spin frequencies [Hz]) and, third, their standard uncertainties, one or an array; of
             the kinds "spin" (times, light), "field" (heights [m], flux densities [T]) and "precession" (drive,
             precession [Hz]), or limits alone [Hz].  Arrays of `uncertainties` have their u with them.
-        kind: the analysis; None for the one that is made for the data.
+        kind: the analysis; None for the one that is made for the data; or the second of two arrays.
+        u: standard uncertainty of the readings beside two arrays, one or an array.
         time: times of readings [s], which with frequency take the place of data.
         frequency: spin frequencies at these times [Hz].
         light: signal of a detector at these times, in the place of frequency; its kind is "spin".
@@ -309,7 +311,7 @@ def analyze(
 
     if light is not None:
         return analyze_data((time, light), kind or "spin", options)
-    return analyze_data(data if time is None and frequency is None else (time, frequency), kind, options)
+    return analyze_data(data if time is None and frequency is None else (time, frequency), kind, options, u)
 
 
 @bare

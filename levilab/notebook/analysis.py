@@ -36,7 +36,7 @@ from levilab.runs.run import Run
 from levilab.texts.note import reword
 
 
-def analyze_data(data: Any, kind: Any, given: Mapping[str, Any]) -> AnalysisResult:
+def analyze_data(data: Any, kind: Any, given: Mapping[str, Any], u: Any = None) -> AnalysisResult:
     """Analyze data by one analysis; what makes the numbers doubtful is a warning of Python, too.
 
     Args:
@@ -44,12 +44,13 @@ def analyze_data(data: Any, kind: Any, given: Mapping[str, Any]) -> AnalysisResu
             columns.
         kind: of the analysis; None for the one that is made for the data; or the second of two arrays.
         given: options by their names; None, or what an analysis has by itself, is not given.
+        u: third of three arrays.
 
     Raises:
         UsageError: an option or `kind` is wrong, or the data suit several analyses equally.
         DataError: the data suit none, or cannot be used.
     """
-    result = _analyze_any(data, kind, given)
+    result = _analyze_any(data, kind, given, u)
     for text in result.found.doubts:
         warnings.warn(unquote(text), DoubtWarning, stacklevel=_CALLER)
     return result
@@ -59,9 +60,8 @@ def analyze_data(data: Any, kind: Any, given: Mapping[str, Any]) -> AnalysisResu
 _CALLER = 4
 
 
-def _analyze_any(data: Any, kind: Any, given: Mapping[str, Any]) -> AnalysisResult:
-    if kind is not None and not isinstance(kind, str) and are_arrays(kind):  # analyze(t, f)
-        data, kind = (data, kind), None
+def _analyze_any(data: Any, kind: Any, given: Mapping[str, Any], u: Any) -> AnalysisResult:
+    data, kind = _join_arrays(data, kind, u)
     _check_kind(kind)
     options = read_options(given)
     if data is None or (isinstance(data, tuple) and any(item is None for item in data)):
@@ -91,6 +91,18 @@ def _analyze_any(data: Any, kind: Any, given: Mapping[str, Any]) -> AnalysisResu
     result = _of_frames(result, folder, called if len(items) == 1 else FRAME, in_words)
     weakref.finalize(result, shutil.rmtree, folder, ignore_errors=True)  # a long record is read when it is drawn
     return result
+
+
+def _join_arrays(data: Any, kind: Any, u: Any) -> tuple[Any, Any]:
+    """Return data and kind where arrays were given one by one, analyze(t, f, u).  Raises UsageError."""
+    if kind is not None and not isinstance(kind, str) and are_arrays(kind):  # analyze(t, f)
+        data, kind = (data, kind), None
+    if u is not None:
+        if not (isinstance(data, tuple) and len(data) == 2):
+            expected = "two arrays beside it, analyze(t, f, u), are expected; of files `reading_u` [Hz] is that of all"
+            raise UsageError("u", expected, value=u)
+        data = (*data, u)
+    return data, kind
 
 
 def _analyze_paths(paths: Sequence[Path], kind: str | None, options: Mapping[str, Any]) -> AnalysisResult:

@@ -19,7 +19,7 @@ _TAKES_ANY, _TAKES_MORE = 0x08, 0x04
 _ALIKE = 0.65
 #: What others call an option → names that it may have here.
 _OTHERS = {
-    **dict.fromkeys(("sigma", "yerr", "dy", "u"), ("reading_u",)),
+    **dict.fromkeys(("sigma", "yerr", "dy"), ("reading_u",)),
     **dict.fromkeys(("t", "x"), ("time", "x")),
     **dict.fromkeys(("f", "y", "freq", "frequency"), ("frequency", "spin_frequency_hz")),
     **dict.fromkeys(("model", "law"), ("laws", "best_model")),
@@ -96,8 +96,7 @@ def bare(function: F) -> F:
             if len(args) > code.co_argcount and not code.co_flags & _TAKES_MORE:
                 own = code.co_varnames[0] == "self"
                 expected = f"at most {code.co_argcount - own} without a name are expected: name the others"
-                array = ", or put arrays into one, analyze((t, f, u))" * (function.__name__ == "analyze")
-                raise UsageError(function.__name__, expected + array, value=f"{len(args) - own} values")
+                raise UsageError(function.__name__, expected, value=f"{len(args) - own} values")
             required = names[len(args) : code.co_argcount - len(function.__defaults__ or ())]
             if missing := [name for name in required if name not in named]:
                 raise UsageError(missing[0], f"{function.__name__} needs it", value="nothing")

@@ -405,7 +405,7 @@ def test_every_option_is_a_keyword_with_its_default():
     given = inspect.signature(levilab.analyze).parameters
     options = {one.name: one.default for row in ANALYSES.values() for one in fields(row.options)}
     options.pop("guess")  # whether titles are guessed is for those who name a single file
-    data = {"data", "kind", "time", "frequency", "light"}
+    data = {"data", "kind", "u", "time", "frequency", "light"}
     assert {name: one.default for name, one in given.items() if name not in data} == options
     assert all(f"'{name}'" in str(given["kind"].annotation).replace('"', "'") for name in ANALYSES)
     of_acquire = set(inspect.signature(levilab.acquire).parameters) - {"experiment"}
