@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from analysis.arrays import Array
 
-# Up to so many of the rarer sign the distribution is exact. Beyond, the normal one errs by less than 0.001 where
+# Up to this number of the rarer sign the distribution is exact. Beyond, the normal one errs by less than 0.001 where
 # neither sign is much rarer, as with residuals of a fit.
 EXACT_SIGNS = 200
 

@@ -118,7 +118,7 @@ def trial(kind: str, draw: np.random.Generator) -> Trial | None:
 
 
 def trials(kind: str, count: int, seed: list[int]) -> list[Trial]:
-    """Return so many random scenes that stay up."""
+    """Return random scenes that stay up."""
     draw = np.random.default_rng(seed)
     one_after_the_other = (trial(kind, draw) for _ in itertools.count())
     return list(itertools.islice((one for one in one_after_the_other if one is not None), count))

@@ -76,7 +76,7 @@ class Case:
     end: np.ndarray
 
     def error(self, scheme: Scheme, rate: float) -> float:
-        """Of the place at so many stages a second [m]."""
+        """Of the place at a number of stages a second [m]."""
         steps = max(1, round(DURATION * rate / scheme.stages))
         end = after(replace(self.problem, scheme=scheme), steps)
         return float(np.linalg.norm(end[R] - self.end[R]))

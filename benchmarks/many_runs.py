@@ -36,7 +36,7 @@ SAMPLES = Path(__file__).parent.parent / "sample_data"
 TEMPLATE = SAMPLES / "spin-down-1"
 FIRST = datetime(2026, 3, 1, 8, 0, tzinfo=UTC)
 BETWEEN = timedelta(minutes=15)
-#: One in so many runs is broken, in turn: its record cut off, no readings, too few of them, a time that goes back.
+#: One in this number of runs is broken, in turn: its record is cut off, readings are missing, too few, or go back.
 BROKEN = 100
 KINDS = ("record", "readings", "short", "order")
 #: Files of a run that all copies have alike.
@@ -52,7 +52,7 @@ def make_runs(root: Path, count: int, *, template: Path = TEMPLATE, seed: int = 
         count: how many.
         template: the run that they are copies of.
         seed: of constants and noise.
-        broken: one in so many runs is broken; 0: none is.
+        broken: one in this number of runs is broken; 0: none is.
 
     Returns:
         Their folders.

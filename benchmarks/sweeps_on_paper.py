@@ -27,7 +27,7 @@ MACHINES, CORES_A_MACHINE = 100, 32
 CHUNKS_S = (CHUNK_S, 30.0)
 #: What a scheduler keeps of a task [bytes], and a client of one under way: Dask's own objects, a few kB each.
 TASK_BYTES_IN_SCHEDULER = 5_000
-#: One file of a parallel file system's quota of so many; a group's usual one.
+#: Files in a group's usual quota of a parallel file system.
 FILES_QUOTA = 1_000_000
 #: What a process may take on the machine where the sweep is started [bytes].
 MEMORY = 16e9

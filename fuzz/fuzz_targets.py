@@ -151,7 +151,7 @@ class Client:
             self.reader.feed_eof()
 
 
-#: One client after the other is talked to so many times at most.
+#: Number of messages to one client after the other, at most.
 _MOST_PIECES = 60
 #: The instrument behind the servers.
 _BEHIND = "33500B"

@@ -17,7 +17,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 KEPT = HERE.parent / ".fuzz"
 
-#: One input may take so long [s] and need so much memory [MB]; it may have so many bytes.
+#: Time [s] and memory [MB] that one input may take, and bytes that it may have.
 SLOWEST, MOST_MEMORY, LONGEST = 25, 2500, 2000
 
 

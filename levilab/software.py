@@ -16,7 +16,7 @@ LIBRARIES = ("levilab", "numpy", "numba", "scipy", "pandas", "pyvisa", "pyvisa-p
 
 
 #: What uv writes into the environment of an installed tool, and the extras that README installs: uv installs the tool
-#: anew with those that are named.
+#: again with the named ones.
 _UV_RECEIPT, _USUAL_EXTRAS = "uv-receipt.toml", ("live", "pdf")
 
 

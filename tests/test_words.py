@@ -9,7 +9,7 @@ MANNERED = re.compile(
     r"(?<![a-z])(?:somebody|nobody|everybody|whoever|so[\s#:_]+long[\s#:_]+as|of[\s#:_]+old|all[\s#:_]+the[\s#:_]+same)"
     r"(?![a-z])|\b(?:is|was)[\s#:]+told\b|\bwhat[\s#:]+there[\s#:]+is\b"
     r"|(?<![a-z])(?:so[\s#:_]+manieth|what[\s#:_]+came[\s#:_]+of|in[\s#:_]+vain|unasked)(?![a-z])"
-    r"|(?<=#: )so (?:many|much|often|long)\b"
+    r"|\b(?:anew|so[\s#:_]+many|told[\s#:_]+apart|of[\s#:_]+that[\s#:_]+of)\b|(?<=#: )so (?:much|often|long)\b"
 )
 
 #: Where code and pages stand, beside the root itself.

@@ -278,7 +278,7 @@ class Projection:
         usable: whether the piece holds enough of the pulse and of its slope.
         height: in units of the mean pulse.
         shift: of the height times the shift [turns].
-        power: sum of squares of the pulse in the piece; height has a variance of that of the noise over this.
+        power: sum of squares of the pulse in the piece; the variance of height is the variance of the noise over this.
         information: the same of shift.
         rest: sum of squares that is left.
         freedom: samples less parameters.

@@ -147,7 +147,7 @@ class Trace:
 
     @property
     def bin_width(self) -> float:
-        """Length of a bin [s]; of uneven times that which one bin in a hundred exceeds."""
+        """Length of a bin [s]; of uneven times the length that one bin in a hundred exceeds."""
         apart = 1 / self.rate if self.times is None else float(np.quantile(np.diff(self.times), 0.99))
         return apart * (self.samples.size // self.bins.size)
 

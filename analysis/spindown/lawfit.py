@@ -145,7 +145,7 @@ class LawFit:
         slopes = np.eye(len(self.solution)) * frequency  # ν_r and K
         slopes[:p, :p] = self.law.natural(self.solution[:p], frequency, duration)[1]
         if self.has_tilt:
-            # δ, of δ²; of a δ near zero its u is no larger than the root of that of δ²
+            # δ, of δ²; near zero the u of δ is no larger than the root of the u of δ²
             slopes[p, p] = 1 / (2 * float(np.sqrt(max(self.solution[p], 1e-8))))
         return slopes
 

@@ -80,7 +80,7 @@ _GRID = np.linspace(0.0, 1.0, _NODES)
 #: still drops at a third of its usual rate.  The line that goes on from there keeps the count smooth in all parameters;
 #: in the half second it is 7 mHz off.
 _EDGE = 0.01
-# Counts at so many times are worked out at once: for few readings numpy's calls cost more than their numbers.
+# Counts at this number of times are worked out at once: for few readings numpy's calls cost more than their numbers.
 _AT_ONCE = 20_000
 #: Steps of A, a, K/ν_ref, κ, β and the share for slopes by differences.
 _STEPS = (1e-4, 1e-3, 1e-4, 1e-3, 1e-2, 1e-2)

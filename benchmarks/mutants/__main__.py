@@ -8,7 +8,7 @@ laboratories are carried out with each as well.
 
 First, once, the tests are run under coverage.py to learn which lines each reaches (half an hour; `--map` does nothing
 else).  All takes place in a copy of the tree, .mutants/tree, and can be interrupted: what is known is kept in
-.mutants/, and tried anew when a file that the mutation lies in, or a test that killed it, has changed.
+.mutants/, and tried again when a file that the mutation lies in, or a test that killed it, has changed.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ import trial
 
 OUTCOMES = trial.WORK / "outcomes.json"
 
-#: Tests run in two rounds of so many seconds of a processor at most: first those of the files whose names are nearest
-#: to that of the mutation's file, then the fastest of the others.  A mutation that they all pass has survived.
+#: Tests run in two rounds, each of this processor time at most [s]: first those of the files whose names are nearest to
+#: the name of the mutation's file, then the fastest of the others.  A mutation that they all pass has survived.
 NEAREST, FIRST_S, REST_S = 3, 5.0, 8.0
 #: Collecting a file of tests costs about so much [s].
 _FILE_S = 0.25
@@ -44,7 +44,7 @@ def main() -> int:
     parser.add_argument("--number", type=int, default=200, help="mutations at random")
     parser.add_argument("--seed", type=int, default=11, help="of the choice")
     parser.add_argument("--only", nargs="*", default=[], help="files, names, changes, folders of tests with it")
-    parser.add_argument("--again", nargs="*", default=[], help="states to try anew, as survived")
+    parser.add_argument("--again", nargs="*", default=[], help="states to try again, as survived")
     parser.add_argument("--tests", nargs="*", help="by these tests, new ones perhaps, not by those of the map")
     parser.add_argument("--known", action="store_true", help="do with the map as far as it is known")
     parser.add_argument("--map", action="store_true", help="learn which tests reach which lines, and end")

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 HERE = Path(__file__).parent
 
-#: Compiled: numba would compile it anew for each change (4 to 15 s), and coverage does not see inside.
+#: Compiled: numba would compile it again for each change (4 to 15 s), and coverage does not see inside.
 COMPILED = (
     "levilab/simulator/kernels/",
     "levilab/benchmark/simulator/motion.py",

@@ -30,10 +30,10 @@ HEAVY = """
     filelock platformdirs mpmath
 """
 
-#: A trial may use so many times the processor's time that its tests took without a change, and so much more [s]
-#: for imports, kernels that are compiled anew, and a busy machine.
+#: A trial may use this multiple of the processor's time that its tests took without a change, and this time more [s]
+#: for imports, kernels that are compiled again, and a busy machine.
 FACTOR, EXTRA_S = 5.0, 25.0
-#: … and so many times that by the clock, for tests that wait for ever use no time of a processor.
+#: … and this multiple of it by the clock, for tests that wait for ever use no time of a processor.
 CLOCK = 6.0
 
 
@@ -76,7 +76,7 @@ def load_libraries() -> None:
 
 
 def run(order: dict[str, Any], seconds: float) -> dict[str, Any]:
-    """Carry out an order (see `_obey`) in a process of its own that may use so many seconds of a processor.
+    """Carry out an order (see `_obey`) in a process of its own that may use this number of seconds of a processor.
 
     Returns:
         What `_obey` returns; {} if the process came to its end otherwise: its time was up, or it crashed.

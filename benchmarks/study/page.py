@@ -23,7 +23,7 @@ def page(found: dict[str, Any]) -> str:
 
 
 def wrapped(text: str) -> str:
-    """Break the lines of paragraphs and of items anew, since numbers change their length."""
+    """Break the lines of paragraphs and of items again, since numbers change their length."""
     parts = re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL)
     done = [part if part.startswith("```") else _prose(part) for part in parts]
     return re.sub(r"\n{3,}", "\n\n", "".join(done)).strip() + "\n"

@@ -503,7 +503,7 @@ def _doubt_about_times(plan: "Plan", column: Column, what: str) -> Doubt | None:
 
 
 def _is_in_unit(column: Column, loss: float) -> bool:
-    """Return whether a loss is possible in a stated unit of the times, or more usual in that which is assumed."""
+    """Return whether a loss is possible in a stated unit of the times, or more usual in an assumed one."""
     return is_possible_loss(loss / column.factor) if column.written else is_likely_unit(column.unit, loss)
 
 

@@ -277,8 +277,8 @@ def _by_itself(
 
 #: Of several results these first ones have their budget on paper, the others a line.
 _PRINTED = 2
-#: From so many runs on their budgets are not printed on paper, but for the first one where no mean has one; and so many
-#: are in a report.
+#: Number of runs from which on their budgets are not printed on paper, but for the first one where no mean has one; and
+#: the most that a report has.
 _MANY, _MOST_RUNS = 3, 12
 
 

@@ -135,7 +135,7 @@ class Columns:
 
 
 def columns(time: Array, values: Array, pieces: int) -> Columns:
-    """Cut a curve into so many pieces of equally many points.
+    """Cut a curve into pieces of equally many points.
 
     >>> found = columns(np.arange(6.0), np.array([0.0, 1, 2, 3, 4, 6]), 2)
     >>> found.low.tolist(), found.mean.tolist(), found.high.tolist()
@@ -151,7 +151,7 @@ def columns(time: Array, values: Array, pieces: int) -> Columns:
 
 
 def curve(axes: Axes, time: Array, values: Array, look: Look, *, pieces: int = 600, label: str | None = None) -> bool:
-    """Draw a line; one with more points than can be told apart as its envelope and its mean.
+    """Draw a line; one with more points than can be distinguished as its envelope and its mean.
 
     Returns:
         whether it is an envelope.

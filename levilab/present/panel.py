@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from levilab.telemetry.messages import State
 
-#: Answers of an instrument that the trend is of; so many are needed for a rate.
+#: Answers of an instrument that the trend is of, and the fewest that give a rate.
 _KEPT, _FEWEST = 24, 3
 #: Heights of a spark line, which spans at least this share of the value: noise stays flat.
 _SPARKS = "▁▂▃▄▅▆▇█"
@@ -63,7 +63,7 @@ class Trend:
     _latest: float | None = None
 
     def take(self, state: State) -> None:
-        """Take in what the bench says; another channel, or none, or a drive that was switched begins anew."""
+        """Take in what the bench says; another channel, or none, or a drive that was switched begins again."""
         channel = next((name for name in _SHOWN if name in state.last), "")
         driven = state.drive is not None and state.drive.output
         latest = state.last.get(channel)

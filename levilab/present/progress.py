@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from levilab.telemetry.messages import State
 
-#: The bench is drawn anew so often [s].
+#: Time from one drawing of the bench to the next [s].
 _DRAWN_EVERY_S = 0.25
 #: Style of a piece → rich's.
 _STYLES = {"plain": "", "strong": "bold", "on": "green", "off": "dim", "alarm": "bold red"}
@@ -92,7 +92,7 @@ class LineDisplay(Display):
 class BarDisplay(Display):
     """The readings as lines, and below them the bench as it is: last value, trend, instruments, time left.
 
-    It has no thread: it is drawn anew when the bench has something to show, at most four times a second.  A
+    It has no thread: it is drawn again when the bench has something to show, at most four times a second.  A
     terminal that is gone, as with a window that was closed, ends no measurement.
 
     Args:

@@ -121,7 +121,7 @@ def new_table(title: str | None, *columns: str, numbers: Sequence[str] = ()) -> 
     return table
 
 
-#: From so many rows on they are laid out here: rich takes 0.1 ms for each cell.
+#: From this number of rows on they are laid out here: rich takes 0.1 ms for each cell.
 _MANY_ROWS = 200
 
 

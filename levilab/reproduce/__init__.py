@@ -1,1 +1,1 @@
-"""The thesis's tables and figures made anew, and those of two papers: the published value beside ours."""
+"""The thesis's tables and figures made again, and those of two papers: the published value beside ours."""

@@ -136,7 +136,7 @@ def of_azimuth(rate: Array, tilt: Array, lines: AxisLines) -> list[Finding]:
             "",
             f"{len(named)} steady lines, each with a name, hold {100 * power / all_power:.0f} % of its power; of all "
             f"of it {parts} of them. Whether what the lines do not hold is further sidebands or lines that wander is "
-            "not told apart",
+            "not distinguished",
             holds=power > 0.8 * all_power and near[NEAR_LINES_HZ[-1]] > 0.99,
         ),
     ]

@@ -29,7 +29,7 @@ from levilab.simulator.scene import preset
 from levilab.simulator.trajectory import Trajectory
 from levilab.stability.thesis import HIGHEST_HZ, LOOSE_HZ, SIMULATED_HZ, WITH_DRAG_HZ
 
-#: A curve of more points is drawn as the band between its least and greatest values in so many pieces.
+#: A curve of more points is drawn as the band between its least and greatest values in this number of pieces.
 PIECES = 900
 #: Lost tops and tops that are up.
 FATES = ListedColormap([LOOKS["lost"].colour, LOOKS["up"].colour])

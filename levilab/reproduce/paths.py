@@ -218,6 +218,6 @@ def make() -> Found:
             partial(tilted_figure, both),
         ),
     )
-    said = "Figures without numbers: what they show is said in a sentence and tried; the motions are simulated anew."
+    said = "Figures without numbers: what they show is said in a sentence and tried; the motions are simulated again."
     findings = (*about_paths, *modes(), about_fall, sudden_fall(), *about_tilt, shorter_run())
     return Found(findings, pictures, said)

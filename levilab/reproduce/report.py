@@ -38,14 +38,14 @@ def document_of(found: Reproduction) -> Document:
         summary.insert(1, Warnings((unexpected,)))
     return Document(
         title="The Levitron thesis, reproduced",
-        lead="Tables and figures of the master's thesis, and of two papers, made anew with levilab: the published "
+        lead="Tables and figures of the master's thesis, and of two papers, made again with levilab: the published "
         "value beside ours",
         blocks=(
             Section("Summary", tuple(summary), anchor="summary"),
             *(_section(chapter, of_chapter) for chapter, of_chapter in found.chapters),
             _how(found),
         ),
-        banner=Banner("SYNTHETIC.", "Motions are simulated, and readings made up; nothing here was measured anew."),
+        banner=Banner("SYNTHETIC.", "Motions are simulated, readings are drawn at random: nothing here was measured."),
         contents=True,
     )
 

@@ -67,7 +67,7 @@ def choose(only: str | None) -> list[Chapter]:
 
 
 def reproduce(chapters: Iterable[Chapter], progress: Callable[[float, str], None] | None = None) -> Reproduction:
-    """Make chapters anew.  progress: called with the share that is done, and with what is next."""
+    """Make chapters.  progress: called with the share that is done, and with what is next."""
     wanted, done = list(chapters), []
     for k, chapter in enumerate(wanted):
         if progress is not None:

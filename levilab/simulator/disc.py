@@ -47,7 +47,7 @@ def rule_for(radius: Any, height: Any, distance: Any) -> Rule:
     return Rule(
         _number(1000, half * half * half * half, MOST[0]),
         _number(15, along * along, MOST[1]),
-        # a harmonic of the angle is felt by as much of it as the disc leans and lies off the base's axis
+        # the disc feels a harmonic of the angle in proportion to its lean and its distance from the base's axis
         max(_number(100, across / 8, MOST[2]), 6),
     )
 

@@ -29,9 +29,9 @@ from levilab.simulator.single import MIN_STEPS_FOR_DOUBLING, check, simulate, si
 from levilab.simulator.stops import MOST_KINKS, MOST_STEPS
 from levilab.simulator.varied import Batch, batches, broadcast, scene_at
 
-#: The step of all tops is chosen on a few, simulated one by one: the corners of a map and so many evenly through it.
+#: The step of all tops is chosen on a few, simulated one by one: the corners of a map and these between them.
 PILOTS = 6
-#: If all of those are lost where those that stay up are to decide, so many more are tried, in groups.
+#: If all of those are lost where those that stay up are to decide, this number of others is tried, in groups.
 MORE_PILOTS, PILOTS_IN_A_GROUP = 60, 12
 #: How long these are simulated [s]; errors grow with the time, so they get this share of the tolerance.
 PILOT_DURATION = 3.0

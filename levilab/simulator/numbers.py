@@ -2,7 +2,7 @@
 
 A formula is written once, for one top.  With `Numbers` in place of some of its floats it works on all tops at once,
 element by element.  Where it branches, the tops must agree: if they do not, `Mixed` says which of them take the branch,
-and `split` calls the formula anew with each of the two groups.  So tops are grouped by the kind of their model without
+and `split` calls the formula again with each of the two groups.  So tops are grouped by the kind of their model without
 a list of what makes a kind.
 """
 

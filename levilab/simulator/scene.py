@@ -71,7 +71,7 @@ class Scene(Part):
         return self.top.moment_a_m2 * (1 + self.top.temperature_coefficient_per_k * self.temperature_rise_k)
 
     def changed(self, values: Mapping[str, Any]) -> Scene:
-        """Return the scene with other values at dotted keys, checked anew.  Raises SceneError.
+        """Return the scene with other values at dotted keys, checked.  Raises SceneError.
 
         >>> Scene().changed({"top.mass_kg": 0.025, "start.position_m.2": 0.072}).start.position_m
         (0.001, 0.0, 0.072)

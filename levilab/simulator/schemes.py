@@ -53,7 +53,7 @@ def _nystrom(name: str, order: int, drifts: list[float], kicks: list[float]) -> 
 
 def _compose(name: str, order: int, weights: list[float]) -> Scheme:
     """Strang steps of the given lengths one after the other; the middle one makes the sum 1."""
-    middle = 1.0 - 2 * sum(weights)  # no whole number: kernels would be compiled for those anew
+    middle = 1.0 - 2 * sum(weights)  # no whole number: kernels would be compiled again for those
     b = np.array([*weights, middle, *weights[::-1]])
     a = np.concatenate([b[:1], b[1:] + b[:-1], b[-1:]]) / 2
     return Scheme(name, order, tuple(a.tolist()), tuple(b.tolist()), any_split=True)

@@ -43,8 +43,8 @@ from levilab.simulator.trajectory import Accuracy, Event, Trajectory
 #: No step is small enough for a chaotic motion: at this part of the longest step the search ends.
 SMALLEST_STEP_SHARE = 1 / 256
 
-#: After so many shorter steps in succession that did not halve the error, the motion is taken for chaotic: a single one
-#: may be chance in the estimates.
+#: After this number of shorter steps in succession that did not halve the error, the motion is taken for chaotic: a
+#: single one may be chance in the estimates.
 MAX_FAILED_REFINEMENTS = 2
 
 #: The longest step over the steps of a result: room for a second run with longer steps, which is the cheaper one.
@@ -63,8 +63,8 @@ LONGEST_SHARE_OF_THREE = 1 / 4
 #: The longest simulation, thirty years [s].
 LONGEST_S = 1e9
 
-#: With so many steps between two kinks or more, their number can be halved and rounded up: the step is then about twice
-#: as long.
+#: From this number of steps between two kinks on, it can be halved and rounded up: the step is then about twice as
+#: long.
 MIN_STEPS_FOR_DOUBLING = 16
 
 Watch = Mapping[str, Callable[[Trajectory], Array]]

@@ -16,7 +16,7 @@ from levilab.simulator.scene import Drive
 #: No times at all: the kinks of a drive that has none.
 NO_TIMES: Array = np.empty(0)
 
-#: At most so many steps between stops: they are repeated one by one to find the moment of an escape.
+#: Steps between stops, at most: they are repeated one by one to find the moment of an escape.
 STEPS_BETWEEN_STOPS = 1000
 
 
@@ -44,7 +44,7 @@ class Stops:
     memory: Array | None = None
 
     def pieces(self, steps: int) -> Iterator[tuple[int, int]]:
-        """Yield the first and last interval, exclusive, of successive pieces with about so many steps each."""
+        """Yield the first and last interval, exclusive, of successive pieces of about this number of steps each."""
         done = np.concatenate([[0], np.cumsum(self.counts)])
         first = 0
         while first < self.counts.size:

@@ -24,7 +24,7 @@ def stability_section(path: Path) -> Section:
         scene = scene_of(found["scene"])
         blocks = tuple(_blocks(found, scene))
     except (OSError, ValueError, KeyError, TypeError, AttributeError, LevilabError) as error:
-        raise DataError(f"{path}: is no whole result of levilab stability ({error}); print it anew") from error
+        raise DataError(f"{path}: is no whole result of levilab stability ({error}); print it again") from error
     title = Text("Where the top floats: {name:s}", name=scene.name or "—")
     return Section(title, blocks, "stability", path.name, new_page=True)
 

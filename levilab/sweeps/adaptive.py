@@ -174,7 +174,7 @@ class _Run:
         while done < points.size:
             one = next(results, None)
             if one is None:
-                raise WorkersLost("the workers gave fewer results than they had tasks: start them anew, and resume")
+                raise WorkersLost("the workers gave fewer results than they had tasks: start them again, and resume")
             self.keep(one)
             done += one.task.part.size
             self.share = max(begun + (until - begun) * done / points.size, begun)

@@ -42,11 +42,11 @@ if TYPE_CHECKING:
 
 #: Columns that are drawn; a store with more has its figures beside it.
 MOST_FIGURES = 6
-#: A table of points has at most so many rows.
+#: Rows of a table of points, at most.
 MOST_ROWS = 500
 #: A store of more points is read from itself, by programs that read Zarr.
 MOST_IN_A_TABLE = 100_000
-#: A map with more points is not drawn: it would have to be in memory, and a picture cannot show so many.
+#: A map with more points is not drawn: it would have to be in memory, and a picture cannot show them.
 MOST_POINTS = 20_000_000
 
 

@@ -181,7 +181,7 @@ class Store:
         except DataError:
             raise
         except KeyError as error:
-            raise DataError(f"{path}: no whole store of a sweep, {error} is missing; compute the map anew") from error
+            raise DataError(f"{path}: no whole store of a sweep, {error} is missing; compute the map again") from error
         except Exception as error:  # what is damaged shows in errors of many kinds
             raise DataError(
                 f"{path}: no store of a sweep ({error}); give a folder that `levilab sweep` wrote"
@@ -195,7 +195,7 @@ class Store:
         plan = Plan.from_table(table, {axis["key"]: _coordinate(group, axis["key"]) for axis in table["axes"]})
         for column in columns_of(plan.observables):
             if group[column.name].shape != plan.shape or group[column.name].chunks != plan.chunk:
-                raise DataError(f"{path}: its {column.name} has not the shape of its plan; compute the map anew")
+                raise DataError(f"{path}: its {column.name} has not the shape of its plan; compute the map again")
         return cls(plan, group, path, np.asarray(group[DONE][:]))
 
     @contextlib.contextmanager
@@ -239,7 +239,7 @@ class Store:
         if self.path is not None and not self.path.exists():
             text = f"{self.path}: it was moved or removed meanwhile; where it is now, go on with `resume`"
             raise CannotWrite(text)
-        if name not in self._arrays:  # the group reads the description of an array anew each time
+        if name not in self._arrays:  # the group reads the description of an array each time
             self._arrays[name] = self.group[name]
         return self._arrays[name]
 
@@ -279,7 +279,7 @@ class Store:
             return np.asarray(self.group[name][box])
         except Exception as error:  # libraries that decompress have errors of many kinds
             raise DataError(
-                f"{self.path}: a file of {name} is damaged or missing ({error}); take a copy, or compute it anew"
+                f"{self.path}: a file of {name} is damaged or missing ({error}); take a copy, or compute it again"
             ) from error
 
 

@@ -23,7 +23,7 @@ from levilab.world.tumble import tumble
 T = TypeVar("T")
 
 #: The motion is simulated in pieces of this length [s], to this error of place [m] and axis [rad] at the end of each,
-#: with so many states per second: between two of them a tape turns evenly to 1e-4 of a turn.
+#: with this number of states per second: between two of them a tape turns evenly to 1e-4 of a turn.
 PIECE_S, TOLERANCE, RATE = 1.0, 1e-7, 400.0
 
 #: Pieces whose samples are kept, 15 kB each: of the 600 s that an oscilloscope looks back, and more.

@@ -18,7 +18,7 @@ from instruments.virtual.core.message import LONGEST_LINE
 from instruments.virtual.core.parser import LONGEST_ANSWER
 from levilab.world.bench import VIRTUAL_MODELS
 
-#: One message may make a model look at so many samples: three channels for three hours at 20 kHz (see `counting`).
+#: Samples that one message may make a model look at: three channels for three hours at 20 kHz (see `counting`).
 MOST_LOOKS = 3 * 12_100 * 20_000
 #: Numbers that an instrument never gives back bigger [s].
 LATEST = 1e38

@@ -94,7 +94,7 @@ class Score:
     Attributes:
         name: of the method, or of the hard case.
         snr_db: of the traces.
-        trials: so many.
+        trials: their number.
         failures: refused, or off by more than ten standard deviations: the bound's where it is the closed form;
             elsewhere the estimate's own, or the scatter of the trials, whichever is smaller.
         rmse_hz, rmse_over_bound: of those that did not fail; the bound is the closed form, or of hard cases the median
@@ -124,7 +124,7 @@ class Score:
 
     @property
     def coverage_error(self) -> float:
-        """Standard error of a coverage of 0.68 from so many trials."""
+        """Standard error of a coverage of 0.68 from this number of trials."""
         return math.sqrt(0.6827 * 0.3173 / self.trials)
 
 

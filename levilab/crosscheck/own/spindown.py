@@ -25,7 +25,7 @@ from levilab.texts.text import Text, how_many
 _COST_S, _COST_OF_READING_S = 0.006, 2e-5
 #: What fitting the tilt adds to that, for any run and for a reading.
 _COST_OF_TILT_S, _TILTED_READING_S = 0.015, 1e-4
-#: Runs that scatter by so many times what their readings leave give u from their scatter alone.
+#: Runs that scatter by this multiple of the scatter that their readings leave give u from their scatter alone.
 _SCATTERS = 1.5
 
 

@@ -7,7 +7,7 @@ import {colours, fixed, lapse, phrase} from "./words.js";
 const SHOWN_S = 180, LEAST_S = 60;
 /** A value that stays is noted again after this time [s]. */
 const NOTED_S = 1;
-/** The least height of the plot, and of that of the difference about zero [Hz]. */
+/** The least heights of the plot and of the plot of the difference about zero [Hz]. */
 const LEAST_HZ = 2, LEAST_OFF_HZ = 0.2;
 /** The frequencies that are shown while there is neither a top nor a drive [Hz]. */
 const USUAL_HZ = [20, 35];

@@ -35,7 +35,7 @@ export const fixed = (value, decimals) =>
 export const short = (value, digits = 4) =>
   Number.isFinite(value) ? local(String(Number(value.toPrecision(digits)))).replace("-", "−") : "–";
 
-/** Seconds as 34 s, 2:05 min or 1:02:05; in minutes from so many seconds on. */
+/** Seconds as 34 s, 2:05 min or 1:02:05; in minutes from `least` seconds on. */
 export function lapse(seconds, least = 100) {
   if (!Number.isFinite(seconds)) return "";
   const whole = Math.round(Math.abs(seconds)), sign = seconds < -0.5 ? "−" : "";

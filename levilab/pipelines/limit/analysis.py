@@ -176,7 +176,7 @@ class Limits:
         ends: kind of event → how often a top was lost so.
         runs: of a group, the numbers of the inputs, from 0.
         causes: cause of a loss, told by the phase before it → number of tops; of runs that recorded it.
-        told_apart: whether another group differs from this one only in what is SYNTHETIC, so that the text says it.
+        says_synthetic: whether another group differs from this one only in what is SYNTHETIC, so that the text says it.
     """
 
     which: Which
@@ -187,7 +187,7 @@ class Limits:
     ends: Mapping[str, int]
     runs: tuple[int, ...] = ()
     causes: Mapping[str, int] = field(default_factory=dict)
-    told_apart: bool = False
+    says_synthetic: bool = False
 
     @property
     def theory(self) -> tuple[Comparison, ...]:
@@ -204,7 +204,7 @@ class Limits:
     def conditions_text(self) -> str:
         """The conditions in words."""
         made_up = "SYNTHETIC" if self.conditions.synthetic else "not known to be SYNTHETIC"
-        return f"{self.conditions.text}, {made_up}" if self.told_apart else self.conditions.text
+        return f"{self.conditions.text}, {made_up}" if self.says_synthetic else self.conditions.text
 
     @property
     def text(self) -> str:
@@ -306,7 +306,7 @@ def tell_apart(groups: Iterable[Limits]) -> tuple[Limits, ...]:
     """Return the groups; those that differ only in what is SYNTHETIC say it in their text."""
     keyed = [((replace(group.conditions, synthetic=None), group.device), group) for group in groups]
     alike = Counter(key for key, _ in keyed)
-    return tuple(replace(group, told_apart=alike[key] > 1) for key, group in keyed)
+    return tuple(replace(group, says_synthetic=alike[key] > 1) for key, group in keyed)
 
 
 def synthetic_source(source: Source[LimitReadings]) -> bool | None:

@@ -26,8 +26,8 @@ _THEORY = {
     RESONANCE: (PURPLE, ":"),
     ISLANDS: (PURPLE, "-."),
 }
-#: A line of theory so many times farther from the mean than the farthest limit would squeeze the limits: it is named at
-#: the edge of the panel.
+#: A line of theory farther from the mean than this multiple of the farthest limit's distance would squeeze the limits:
+#: it is named at the edge of the panel.
 _NEAR = 2.5
 #: Above a panel, a panel, below it for the axis, and for a line of the legend there; what stands above all [inch].
 _ABOVE, _PANEL, _BELOW, _LINE, _HEAD = 0.5, 2.2, 0.5, 0.155, 0.42
@@ -117,7 +117,7 @@ def _draw_limits(axes: Axes, height: float, analysis: LimitAnalysis, group: Limi
     title = ("Lower limit: the spin at which a free top falls", _upper_title(group))[group.which == "upper"]
     made_up = {bool(source.synthetic) for source in analysis.sources}
     own = all(analysis.sources[number].synthetic for number in group.runs)
-    mark = "(SYNTHETIC)" if len(made_up) > 1 and own and not group.told_apart else ""
+    mark = "(SYNTHETIC)" if len(made_up) > 1 and own and not group.says_synthetic else ""
     conditions = Text("{conditions:n}", conditions=group.conditions_text)
     axes.set_title(Sentences(Sentences(title, mark), conditions, between="\n"), loc="left", fontsize=8)
     axes.legend(

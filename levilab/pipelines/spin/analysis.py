@@ -245,7 +245,7 @@ class SpinAnalysis(Analyzed[Records, SpinRun, None, SpinOptions]):
 
 #: Number of samples that show the steps of a converter; closer numbers than this part of their range are rounding.
 _MOST_FOR_STEP, _ROUNDING = 20_000, 1e-7
-#: The text describes so many inputs at most, and the figure draws so many.
+#: Inputs that the text describes at most, and that the figure draws.
 MOST_SENTENCES, MOST_DRAWN = 4, 3
 
 

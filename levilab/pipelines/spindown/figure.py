@@ -39,12 +39,12 @@ from levilab.present.style import without_formula
 from levilab.present.units import unit as unit_row
 from levilab.texts.text import Text
 
-#: More points than a panel can show are thinned out evenly; up to so many have bars each; so many means of more.
+#: Points beyond which some are left out evenly, beyond which they have no bars, and means that stand for more of them.
 MOST_POINTS, MOST_BARS, MEANS = 600, 200, 40
 #: A bar longer than the marker's radius, as part of the panel's height, is seen; outliers with their value written.
 _SEEN, _MOST_NAMED = 1 / 120, 6
-#: Of the residuals: the common scale shows at least so many units, a law whose residuals reach this much further than
-#: it does has a scale of its own; a scale is so many times as long as the residuals reach, for the markers.
+#: Of the residuals: units that the common scale shows at least; the factor by which residuals reach beyond it where
+#: they have a scale of their own; length of a scale over the reach of the residuals, for the markers.
 _LEAST_SCALE, _BEYOND, _ROOM = 3.2, 1.1, 1.12
 #: Places [inch]: left edge and width of the panels; height of the figure, and of the short one; top of the lines.
 _LEFT, _FULL, _HEIGHT, _SHORT_HEIGHT, _LINES_TOP = 0.66, 6.26, 9.15, 4.1, 7.2

@@ -1,4 +1,4 @@
-"""The compiled code of the simulator and nothing else, so that no other change compiles it anew."""
+"""The compiled code of the simulator and nothing else, so that no other change compiles it again."""
 
 from importlib.util import find_spec
 

@@ -2,7 +2,7 @@
 
 Numba keeps compiled code on disk and looks at one source file to see whether it is still good.  Ours are put
 together from several files, so they are kept in a folder that is named by the source of all of them, wherever that
-lies: a second environment, or the same version installed anew, compiles nothing.
+lies: a second environment, or the same version installed again, compiles nothing.
 """
 
 import contextlib

@@ -29,7 +29,7 @@ class Piece(NamedTuple):
         begin, end: [s]; the last piece ends at the end of the run.
         h: length of a step [s].
         steps: how many, a whole number as a float.
-        every: steps from sample to sample, the first one so many after the begin; NEVER: there is none.
+        every: steps from sample to sample, the first one this number after the begin; NEVER: there is none.
         last: whether the run ends with it.
     """
 

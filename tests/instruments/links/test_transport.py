@@ -12,7 +12,7 @@ IDENTITY = b"levilab,port,0,0\r\n"
 
 
 class Port:
-    """Answers from a table; ``broken`` breaks the wire until it is opened anew, ``away`` keeps it from opening."""
+    """Answers from a table; ``broken`` breaks the wire until it is opened again, ``away`` keeps it from opening."""
 
     text = "plain text"
     silence = SilentLine

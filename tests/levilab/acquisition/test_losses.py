@@ -1,4 +1,4 @@
-"""An instrument that fails in the middle of a run: events, reached again, set up anew; a gap, and no made-up value."""
+"""An instrument that fails in the middle of a run: events, reached again, set up again; a gap, and no made-up value."""
 
 from dataclasses import replace
 

@@ -28,7 +28,7 @@ from levilab.world.spin_world import SpinScene, SpinWorld
 
 
 def made_up(off=0.0, scale=1.0):
-    """Estimates of 5 that are off by so many u, and whose scatter is so many times u."""
+    """Estimates of 5 that are off by a number of u, and whose scatter is a multiple of u."""
 
     def trial(seed, folder):
         if seed % 50 == 49:

@@ -11,7 +11,7 @@ from levilab.errors import UsageError
 from levilab.pipelines.options import DEFAULTS, OPTIONS, read_options, typed_name
 
 #: What is analyzed, beside the options.
-READINGS = {"data", "kind", "time", "frequency", "light"}
+READINGS = {"data", "kind", "u", "time", "frequency", "light"}
 
 
 def test_the_notebook_has_each_option_with_its_default_and_a_sentence():

@@ -235,8 +235,8 @@ def test_the_report_does_not_fit_what_has_a_result(run, tmp_path, monkeypatch):
     save(ANALYSES["spindown"], analysis)
     monkeypatch.setattr("levilab.pipelines.spindown.analysis.fit_spin_down", pytest.fail)
     recalled = render(ANALYSES["spindown"].recall([run], SpinDownOptions(tilt="none")))
-    anew = render(analysis)
-    differ = [pair for pair in zip(recalled.split("\n"), anew.split("\n"), strict=True) if pair[0] != pair[1]]
+    again = render(analysis)
+    differ = [pair for pair in zip(recalled.split("\n"), again.split("\n"), strict=True) if pair[0] != pair[1]]
     assert all("Analysis" in here for here, _ in differ)
 
 

@@ -308,7 +308,7 @@ def test_a_counter_that_joins_answers_in_another_way_counts_as_well(driver, virt
 
 
 def interrupted(clock, monkeypatch, act, after):
-    """Ctrl-C in the middle of a wait, after so many others."""
+    """Ctrl-C in the middle of a wait, after many others."""
     sleep, waits = clock.sleep, iter(range(after))
 
     def ctrl_c(duration):

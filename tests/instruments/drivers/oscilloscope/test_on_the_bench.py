@@ -189,7 +189,7 @@ def test_a_key_of_the_front_panel_raises_instead_of_giving_a_trace(driver, make,
         def start_and_be_changed():
             start()
             device.settings[setting] = value
-            device.on_change(setting)  # what was begun begins anew
+            device.on_change(setting)  # what was begun begins again
 
         scope._start = start_and_be_changed
         with pytest.raises(SettingsLost) as lost:

@@ -127,7 +127,7 @@ def marks_of_budgets(analysis):
     return [mark_of(analysis.inputs_of(budget.group)) for budget in analysis.budget]
 
 
-def test_groups_of_the_same_mean_are_told_apart(sample_data, tmp_path):
+def test_groups_of_the_same_mean_are_says_synthetic(sample_data, tmp_path):
     limits = ["67.5,0.25", "68.5,0.25", "68,0.25", "69,0.25"]
     for name, changes, rows in (("a", {}, limits), ("b", {"drive_amplitude_vpp": 20.0}, reversed(limits))):
         folder = shutil.copytree(sample_data / "upper-limits", tmp_path / name)
@@ -175,7 +175,7 @@ def test_measured_and_made_up_runs_are_never_one_mean(sample_data, tmp_path):
     (alone,) = ANALYSES["limit"].analyze([tmp_path / "a", tmp_path / "c"]).groups
     assert alone.statistics == measured.statistics
     assert alone.conditions.synthetic is False
-    assert "SYNTHETIC" not in alone.text  # nothing to be told apart from
+    assert "SYNTHETIC" not in alone.text  # nothing to be distinguished from
 
 
 @pytest.mark.usefixtures("undrawn_figures")
@@ -191,7 +191,7 @@ def test_what_is_made_up_is_said_of_each_run_and_group(sample_data, tmp_path, mo
     if "and a run" in name:
         paths.append(shutil.copytree(sample_data / "lower-limits", tmp_path / "lower-limits"))
     analysis = ANALYSES["limit"].analyze(paths)
-    assert "SYNTHETIC" not in analysis.text  # nothing to be told apart from
+    assert "SYNTHETIC" not in analysis.text  # nothing to be distinguished from
     (file, *_) = save(ANALYSES["limit"], analysis)
     document = json.loads(file.read_text(encoding="utf-8"))
     (group,) = document["groups"]

@@ -144,9 +144,9 @@ def test_resume_of_a_complete_table_analyzes_only_new_runs(runs, name):
     grown = tabulate(runs, name, resume=True, show=lambda tally: seen.append(tally.done))
     assert seen == [*range(COUNT // 2, COUNT + 1)]  # those that failed are tried again
     if name.endswith(".csv"):
-        assert grown.read_bytes() == tabulate(runs, "anew.csv").read_bytes()
+        assert grown.read_bytes() == tabulate(runs, "again.csv").read_bytes()
     else:
-        assert pq.read_table(grown).equals(pq.read_table(tabulate(runs, "anew.parquet")))
+        assert pq.read_table(grown).equals(pq.read_table(tabulate(runs, "again.parquet")))
 
 
 def test_of_a_whole_table_only_what_changed_is_done_again(runs):
@@ -159,7 +159,7 @@ def test_of_a_whole_table_only_what_changed_is_done_again(runs):
     rows = rows_of(tabulate(runs, resume=True, show=seen.append))
     assert seen[-1].kept == COUNT // 2 - 1
     assert not rows[1]["problem"]
-    assert rows_of(tabulate(runs, "anew.csv")) == rows
+    assert rows_of(tabulate(runs, "again.csv")) == rows
 
 
 @pytest.mark.parametrize("name", ["all.csv", "all.parquet"])

@@ -1,4 +1,4 @@
-"""The room of the compiled code: what is in it, and that it is compiled anew for changes in it alone."""
+"""The room of the compiled code: what is in it, and that it is compiled again for changes in it alone."""
 
 import ast
 import gc
@@ -31,7 +31,7 @@ def key(simulator):
     return compiled.cache_key(simulator / "kernels")
 
 
-def test_a_change_outside_of_the_room_compiles_nothing_anew(copy):
+def test_a_change_outside_of_the_room_compiles_nothing_again(copy):
     before = key(copy)
     for source in (*copy.glob("*.py"), *copy.glob("scenes/*")):
         source.write_text(source.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
@@ -40,7 +40,7 @@ def test_a_change_outside_of_the_room_compiles_nothing_anew(copy):
 
 
 @pytest.mark.parametrize("name", sorted(source.name for source in KERNELS.glob("*.py")))
-def test_a_change_of_any_file_of_the_room_compiles_anew(copy, name):
+def test_a_change_of_any_file_of_the_room_compiles_again(copy, name):
     before, source = key(copy), copy / "kernels" / name
     source.write_text(source.read_text(encoding="utf-8") + "\n# changed\n", encoding="utf-8")
     assert key(copy) != before
@@ -64,8 +64,8 @@ def test_the_code_on_the_disk_lies_under_the_key_of_the_room(monkeypatch, tmp_pa
     assert folder.is_dir()
 
 
-def test_a_copy_of_the_sources_compiles_nothing_anew(monkeypatch, tmp_path):
-    # a second environment, or the same version installed anew: another place, another time of its files
+def test_a_copy_of_the_sources_compiles_nothing_again(monkeypatch, tmp_path):
+    # a second environment, or the same version installed again: another place, another time of its files
     monkeypatch.setattr(numba.core.config, "CACHE_DIR", "")
     monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
     stats = []
@@ -139,7 +139,7 @@ def test_the_collector_pauses_while_numba_compiles_and_is_then_as_before(on):
 
 @pytest.mark.parametrize("source", sorted(KERNELS.glob("*.py")), ids=lambda path: path.name)
 def test_the_room_imports_nothing_from_outside_but_what_compiles(source):
-    # a module outside that a kernel is made of could change without its being compiled anew
+    # a module outside that a kernel is made of could change without its being compiled again
     for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
         names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
         names += [node.module] if isinstance(node, ast.ImportFrom) else []
