@@ -302,10 +302,16 @@ def banner_of(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner 
     if not made_up:
         return None
     if total == 1:
-        return Banner("SYNTHETIC.", "This run did not come from a real bench. How it was made stands in its run.json.")
-    how = "How each was made stands in its run.json."
+        run = "This run did not come from a real bench. How it was made stands in its run.json."
+        return Banner(
+            "SYNTHETIC.", "This file did not come from a real bench: its first line says so." if files else run
+        )
+    how = "How each was made stands in its run.json." if files < total else ""
     if len(made_up) == total:
-        return Banner("SYNTHETIC.", Sentences(Text("None of these {total} runs came from a real bench.", total), how))
+        said = Text("None of these {total} runs came from a real bench.", total)
+        if files:
+            said = Text("{inputs}: none came from a real bench.", inputs=count_inputs(sources))
+        return Banner("SYNTHETIC.", Sentences(said, how))
     said = Text(
         "{some} of {total} runs did not come from a real bench ({names}).", len(made_up), total, list_in_words(made_up)
     )
@@ -316,7 +322,7 @@ def banner_of(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner 
             some=len(made_up),
             names=list_in_words(made_up),
         )
-        return Banner("SYNTHETIC IN PART.", Sentences(said, "A data file does not say where it is from.", how))
+        return Banner("SYNTHETIC IN PART.", Sentences(said, "A data file seldom says where it is from.", how))
     if not mixed:
         return Banner("REAL AND SYNTHETIC RUNS.", Sentences(said, how))
     consequence = (

@@ -1,8 +1,10 @@
 """An input of an analysis: what an analysis needs, and a run or file with its readings."""
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime
+from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Generic, Self, TypeVar
 
@@ -12,6 +14,8 @@ from levilab.present.clock import local
 from levilab.present.numbers import list_in_words
 from levilab.runs.run import READINGS, Run
 
+#: How a data file says that nothing in it was measured.
+MARK = b"# SYNTHETIC"
 #: Relative: a file rounds to 1 mHz and 10 ms, but no two runs agree so far in all readings.
 SAME = 5e-5
 
@@ -123,10 +127,14 @@ class Source(Generic[R]):
         """What the person at the bench wrote down; empty for a data file."""
         return in_one_line(self.run.record.note) if self.run else ""
 
-    @property
+    @cached_property
     def synthetic(self) -> bool:
-        """Whether any of it is known to be synthetic."""
-        return bool(self.run and self.run.record.synthetic)
+        """Whether it is known to be synthetic: of a run by its record, of a file by its first line."""
+        if self.run:
+            return bool(self.run.record.synthetic)
+        with suppress(OSError), self.data.open("rb") as file:
+            return file.read(len(MARK)) == MARK
+        return False
 
     def settings(self, name: str) -> dict[str, Any]:
         """Return a table of the run's configuration, as of its experiment; empty where none is recorded."""

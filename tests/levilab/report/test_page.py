@@ -207,6 +207,14 @@ def test_one_synthetic_run_says_once_how_it_was_made(run):
     assert "SYNTHETIC. This run did not come from a real bench." in text
 
 
+def test_a_file_whose_first_line_says_that_it_is_synthetic_has_the_mark(tmp_path, sample_data):
+    file = tmp_path / "marked.csv"
+    file.write_bytes(b"# SYNTHETIC, by hand\n" + spin_down_csv(tmp_path / "plain.csv").read_bytes())
+    assert "SYNTHETIC. This file did not come from a real bench: its first line says so." in text_of(file)
+    both = text_of(sample_data / "spin-down-1", file)
+    assert "1 run and 1 data file: none came from a real bench. How each was made stands in its run.json." in both
+
+
 def test_a_mixture_of_real_and_synthetic_runs_is_no_measurement_and_says_so(tmp_path, sample_data):
     text = text_of(sample_data / "spin-down-1", spin_down_csv(tmp_path / "real.csv"))
     assert "REAL AND SYNTHETIC RUNS MIXED. 1 of 2 runs did not come from a real bench (spin-down-1)." in text
