@@ -83,13 +83,13 @@ def check_ending(path: Path, endings: Iterable[str], name: str = "out") -> None:
     """Raise UsageError for a file that an argument of this name has, and whose name has none of the endings."""
     known = [*endings]
     if path.suffix.lower() not in known:
-        raise UsageError(name, Text("a name that ends in {named} is expected", named=either(known)), value=path)
+        raise UsageError(name, "a name that ends in {named} is expected", either(known), value=path)
 
 
 def check_language(code: str, name: str = "language") -> None:
     """Raise UsageError for a language that levilab does not speak, and that an argument of this name has."""
     if code not in languages():
-        raise UsageError(name, Text("one of {known:s} is expected", known=", ".join(languages())), value=code)
+        raise UsageError(name, "one of {known:s} is expected", ", ".join(languages()), value=code)
 
 
 class DataError(LevilabError):

@@ -157,7 +157,7 @@ def _refusal(
     name = str(first["loc"][0]) if first["loc"] else ""
     text = own_words(first)
     if name not in given:
-        return UsageError("settings", Text("{name:s}: {fault}", name=experiment, fault=text or first["msg"]))
+        return UsageError("settings", "{name:s}: {fault}", experiment, text or first["msg"])
     values = describe_values(name, schema_of(now, limits)[name])
     what = text or Text("{values} is expected{hint}", values=values, hint=hint_about(given[name]))
     return UsageError("settings", _with_where(what, experiment), value=f"{experiment}.{name}={given[name]}")

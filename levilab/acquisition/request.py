@@ -156,10 +156,10 @@ def chosen_settings(experiment: str, options: AcquisitionOptions) -> BenchConfig
 def _check_options(options: AcquisitionOptions, run: Run | None, *, virtual: bool) -> None:
     for name in ("seed", "scene"):
         if getattr(options, name) is not None and (run or not options.mock):
-            raise UsageError(name, Text("goes with `mock`, and not with `resume`: a run keeps its {name}", name=name))
+            raise UsageError(name, "goes with `mock`, and not with `resume`: a run keeps its {name}", name)
     for name in ("settings", "group", "temperature", "washers"):
         if getattr(options, name) not in {None, ()} and run:
-            raise UsageError(name, Text("goes with a new run: a resumed run keeps its {name}", name=name))
+            raise UsageError(name, "goes with a new run: a resumed run keeps its {name}", name)
     if options.realtime and not virtual:
         raise UsageError("realtime", "goes with `mock`: a real bench always keeps to the wall clock")
 
@@ -170,11 +170,8 @@ def _group(typed: str | None) -> str:
         return ""
     group = " ".join(typed.split())
     if not 0 < len(group) <= LONGEST_GROUP or not group.isprintable():
-        raise UsageError(
-            "group",
-            Text("a name of 1 to {most} letters is expected, as Group 7", most=LONGEST_GROUP),
-            value=typed or None,
-        )
+        said = "a name of 1 to {most} letters is expected, as Group 7"
+        raise UsageError("group", said, LONGEST_GROUP, value=typed or None)
     return group
 
 
@@ -203,7 +200,7 @@ def named_instruments(options: AcquisitionOptions, run: Run | None = None) -> di
     begun = run.record.configuration.get("named", {}) if run else {}
     if run and not (isinstance(begun, dict) and all(kind in NAMING and isinstance(begun[kind], str) for kind in begun)):
         raise DataError(
-            Text("{folder}/run.json: configuration.named: kind and model or address are expected", folder=run.folder)
+            "{folder}/run.json: configuration.named: kind and model or address are expected", folder=run.folder
         )
     given = {kind: getattr(options, option) for kind, option in NAMING.items()}
     return {**begun, **{kind: text for kind, text in given.items() if text is not None}}
@@ -239,11 +236,8 @@ def _refuse_unused(options: AcquisitionOptions, config: BenchConfig, experiment:
     for kind, option in NAMING.items():
         if (text := getattr(options, option)) is not None and kind not in used:
             why = ": the counter counts; leave out one of the two" if options.counter and options.scope else ""
-            raise UsageError(
-                option,
-                Text("is not used by these settings of levilab acquire {experiment:s}{why}", experiment, why),
-                value=text,
-            )
+            said = "is not used by these settings of levilab acquire {experiment:s}{why}"
+            raise UsageError(option, said, experiment, why, value=text)
 
 
 def _with_given(config: BenchConfig, experiment: str, given: Sequence[str]) -> BenchConfig:
@@ -410,7 +404,7 @@ def request_at(wiring: Wiring, scene: Scene, experiment: str, options: Acquisiti
         UsageError: there is no such experiment, or no such setting.
     """
     if experiment not in EXPERIMENTS:
-        raise UsageError("experiment", Text("one of {known} is expected", ", ".join(EXPERIMENTS)), value=experiment)
+        raise UsageError("experiment", "one of {known} is expected", ", ".join(EXPERIMENTS), value=experiment)
     config = chosen_settings(experiment, options)
     config = config.model_copy(update={"visa_library": "@levilab", "limits": wiring.limits, **VIRTUAL})
     config = _for_scene(config, experiment, scene)
@@ -464,11 +458,9 @@ def _scene(name: str | None, run: Run | None) -> Scene | None:
     scene = scene_of(begun) if begun is not None else read_scene(str(name))
     if scene.top.aligned:
         raise SceneError(
-            Text(
-                "scene {name}: no drive can hold a top whose moment lies along its axis "
-                "(top.moment_tilt.0 = 0): take spindown, or give it a part across, such as "
-                "top.moment_tilt = [0.03, 0.97]",
-                name=scene.name,
-            )
+            "scene {name}: no drive can hold a top whose moment lies along its axis "
+            "(top.moment_tilt.0 = 0): take spindown, or give it a part across, such as "
+            "top.moment_tilt = [0.03, 0.97]",
+            name=scene.name,
         )
     return scene

@@ -106,7 +106,7 @@ class Opened:
         """
         name = plain_name(name)
         if name.casefold().endswith(ENDING):
-            raise CannotTake(Text("{name} says how a data file is read: drop the data file, and correct it here", name))
+            raise CannotTake("{name} says how a data file is read: drop the data file, and correct it here", name)
         size, digest, part = 0, hashlib.sha256(), self.folder / f".incoming-{secrets.token_hex(8)}"
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
@@ -116,7 +116,7 @@ class Opened:
                     size += len(piece)
                     if size > MOST_BYTES:
                         raise CannotTake(
-                            Text("{name}: is larger than {most} MB: levilab open reads it", name, MOST_BYTES >> 20)
+                            "{name}: is larger than {most} MB: levilab open reads it", name, MOST_BYTES >> 20
                         )
                     digest.update(piece)
                     file.write(piece)
@@ -125,7 +125,7 @@ class Opened:
                 part.rename(place)
         except OSError as error:
             raise CannotTake(
-                Text("{name}: cannot be kept in {folder} ({why})", name, str(self.folder), error.strerror)
+                "{name}: cannot be kept in {folder} ({why})", name, str(self.folder), error.strerror
             ) from error
         finally:  # the file is closed by now: Windows removes none that is open
             with contextlib.suppress(OSError):

@@ -226,7 +226,7 @@ def _listening(host: str, port: int) -> socket.socket:
         why = "is in use, perhaps by another live view"
         why = why if taken else Text("cannot be listened at ({why})", why=str(error.strerror))
         advice = "port {port} {why}: close that, or choose another `port`, as 0 for any"
-        raise CannotShow(Text(advice, port=port, why=why)) from error
+        raise CannotShow(advice, port=port, why=why) from error
     return opened
 
 

@@ -69,7 +69,7 @@ def no_such_path(path: Path) -> DataError:
     """Return the error for a path that does not exist, with a name beside it that is nearly the same."""
     for pattern, said in _NO_PATHS:
         if re.fullmatch(pattern, str(path)):
-            return DataError(Text(said, part=path))
+            return DataError(said, part=path)
     folder = next(place for place in (path.parent, *path.parent.parents) if place.is_dir())
     wanted = path.relative_to(folder).parts[0] if folder != path.parent else path.name
     near = difflib.get_close_matches(wanted, sorted(one.name for one in folder.iterdir()), n=1, cutoff=0.8)
@@ -79,7 +79,7 @@ def no_such_path(path: Path) -> DataError:
     there = Text("its {ending:s} files are {files:s}", ending, files) if files else check
     advice = Text("did you mean {path}?", path=folder / near[0]) if near else there
     said = "{path}: there is no such file or folder in {folder}: {advice}"
-    return DataError(Text(said, path=path, folder=folder.resolve(), advice=advice))
+    return DataError(said, path=path, folder=folder.resolve(), advice=advice)
 
 
 def existing(paths: list[Path] | None) -> list[Path]:
@@ -90,11 +90,9 @@ def existing(paths: list[Path] | None) -> list[Path]:
     """
     if not paths and not RUNS.exists():
         raise DataError(
-            Text(
-                "there is no folder {folder:s} here, and no other path is given: name a run or a data file, or make a "
-                "run with levilab acquire spin `mock`",
-                folder=RUNS,
-            )
+            "there is no folder {folder:s} here, and no other path is given: name a run or a data file, or make a "
+            "run with levilab acquire spin `mock`",
+            folder=RUNS,
         )
     for path in paths or []:
         if not locate(find_run(path))[0].exists():
@@ -108,21 +106,21 @@ def run_to_resume(name: Path, root: Path) -> Path:
     if folder.exists():
         return folder
     if name.name != str(name):
-        raise DataError(Text("{name:s}: there is no such run; levilab runs lists those of a folder", name=name))
+        raise DataError("{name:s}: there is no such run; levilab runs lists those of a folder", name=name)
     if not root.is_dir():
         nowhere = "no run {name:s}, there is no folder {root:s} here: go to the folder that holds {root:s}"
-        raise DataError(Text(nowhere, name=name, root=root))
+        raise DataError(nowhere, name=name, root=root)
     if runs_named(name.name, root):
         several = "more than one run in {root:s} is called {name:s}: say its whole name; levilab runs lists them"
-        raise DataError(Text(several, root=root, name=name))
-    raise DataError(Text("no run {name:s} in {root:s}: levilab runs lists those that are there", name=name, root=root))
+        raise DataError(several, root=root, name=name)
+    raise DataError("no run {name:s} in {root:s}: levilab runs lists those that are there", name=name, root=root)
 
 
 def run_or_folder(name: Path, root: Path = RUNS) -> Path:
     """Return the folder of a run, or one with runs, by its path or its name.  Raises DataError."""
     folder = find_run(name, root)
     if folder.is_file():
-        raise DataError(Text("{name}: is a file: levilab open {typed:s} shows it", name=name, typed=as_typed(name)))
+        raise DataError("{name}: is a file: levilab open {typed:s} shows it", name=name, typed=as_typed(name))
     if not folder.is_dir():
         raise DataError("{name}: there is no such run or folder; levilab runs lists the runs", name=name)
     return folder
@@ -133,6 +131,6 @@ def must_be_searchable(root: Path) -> None:
     if root.is_file():
         raise DataError("{root}: is a file; name the folder that holds the runs", root=root)
     if not root.is_dir():
-        raise DataError(Text("{root:s}: there is no such folder; levilab acquire writes runs into runs/", root=root))
+        raise DataError("{root:s}: there is no such folder; levilab acquire writes runs into runs/", root=root)
     if not os.access(root, os.R_OK | os.X_OK):
         raise DataError("{root}: may not be searched by you; change its permissions or name another folder", root=root)

@@ -324,7 +324,7 @@ def preset(name: str) -> Scene:
         if near
         else "there is no scene {name:s}: known are {known:s}; or give the path of a TOML file"
     )
-    raise UnknownScene(Text(said, name=repr(name), near=near, known=", ".join(presets())))
+    raise UnknownScene(said, name=repr(name), near=near, known=", ".join(presets()))
 
 
 def changes(scene: Scene) -> dict[str, Any] | None:

@@ -16,7 +16,6 @@ from levilab.errors import LevilabError
 from levilab.present.progress import Display
 from levilab.runs.run import LONGEST_GROUP
 from levilab.settings import Settings, in_one_line
-from levilab.texts.text import Text
 
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
@@ -153,7 +152,7 @@ def command_of(table: Any) -> Command:
     try:
         return _COMMANDS.validate_python(table)
     except ValidationError as error:
-        raise CommandRefused(Text("not carried out: {why}", why=in_one_line(error))) from error
+        raise CommandRefused("not carried out: {why}", why=in_one_line(error)) from error
 
 
 EventKind = Literal["ready", "done", "refused", "message", "recording", "recorded", "ended"]

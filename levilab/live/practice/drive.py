@@ -172,13 +172,11 @@ class PracticeDrive:
             unit = "Vpp" if found.name == "drive_amplitude_vpp" else "Hz"
             allowed = "at most" if found.is_highest else "at least"
             raise CommandRefused(
-                Text(
-                    "{value:g} {unit}: the coil of this bench stands {allowed} {limit:g} {unit}",
-                    value=found.value,
-                    unit=unit,
-                    allowed=allowed,
-                    limit=found.limit,
-                )
+                "{value:g} {unit}: the coil of this bench stands {allowed} {limit:g} {unit}",
+                value=found.value,
+                unit=unit,
+                allowed=allowed,
+                limit=found.limit,
             )
 
     def _switch_on(self, frequency: float) -> None:

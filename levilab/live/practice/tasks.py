@@ -180,7 +180,7 @@ class Tasks:
     def begin(self, name: str) -> None:
         """Begin a task in the place of the one under way; empty: none.  Raises CommandRefused."""
         if name and name not in TASKS:
-            raise CommandRefused(Text("{name}: one of {known} is expected", f"task = {name}", ", ".join(TASKS)))
+            raise CommandRefused("{name}: one of {known} is expected", f"task = {name}", ", ".join(TASKS))
         self.name, self.share, self._since, self._chance = name, 0.0, None, float(self._random.uniform())
         self.is_measured = False
 

@@ -8,7 +8,6 @@ from typing import Any
 from levilab.live.practice.commands import CommandRefused
 from levilab.simulator.laws import LAWS
 from levilab.simulator.scene import Scene
-from levilab.texts.text import Text
 
 
 @dataclass(frozen=True)
@@ -90,17 +89,15 @@ def keys_of(scene: Scene, values: Mapping[str, float]) -> dict[str, Any]:
     for name, value in values.items():
         row = WHAT_IF.get(name)
         if row is None:
-            raise CommandRefused(Text("{name}: one of {known} is expected", name=name, known=", ".join(WHAT_IF)))
+            raise CommandRefused("{name}: one of {known} is expected", name=name, known=", ".join(WHAT_IF))
         if not row.low <= value <= row.high:
             raise CommandRefused(
-                Text(
-                    "{title}: from {low:g} to {high:g} {unit} is expected, not {value:g}",
-                    title=row.title,
-                    low=row.low,
-                    high=row.high,
-                    unit=row.unit,
-                    value=value,
-                )
+                "{title}: from {low:g} to {high:g} {unit} is expected, not {value:g}",
+                title=row.title,
+                low=row.low,
+                high=row.high,
+                unit=row.unit,
+                value=value,
             )
         keys |= row.keys(scene, value)
     return keys

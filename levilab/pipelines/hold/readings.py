@@ -14,7 +14,7 @@ from levilab.pipelines.inputs.source import Readings
 from levilab.pipelines.options import InputOptions
 from levilab.runs.events import RunEvent
 from levilab.runs.run import Run
-from levilab.texts.text import Text, how_many
+from levilab.texts.text import how_many
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class HoldReadings(Readings):
 def read_hold_file(path: Path, _: InputOptions) -> HoldReadings:
     """Raise DoesNotSuit: a file has no gain."""
     said = "{path:s}: a run folder of `levilab acquire hold` is expected: the gain stands in its events"
-    raise DoesNotSuit(Text(said, path=path))
+    raise DoesNotSuit(said, path=path)
 
 
 def read_hold_run(run: Run, _: InputOptions) -> HoldReadings:
@@ -54,16 +54,14 @@ def read_hold_run(run: Run, _: InputOptions) -> HoldReadings:
     if len(time) < FEWEST:
         raise TableError(
             table.path,
-            Text(
-                "holds {readings}, at least {fewest} are needed: hold the spin longer",
-                readings=how_many(len(time), "reading"),
-                fewest=FEWEST,
-            ),
+            "holds {readings}, at least {fewest} are needed: hold the spin longer",
+            how_many(len(time), "reading"),
+            FEWEST,
         )
     full = run.record.number("hold", "drive_amplitude_vpp")
     if full is None or not full > 0:
         said = "{path:s}/run.json: configuration.hold.drive_amplitude_vpp, above 0, is expected"
-        raise DataError(Text(said, path=run.folder))
+        raise DataError(said, path=run.folder)
     return HoldReadings(time, spin, u, volts / (full / 2), _gains(run), table.warnings)
 
 

@@ -176,7 +176,7 @@ def _of_run(run: Run, needs: Needs[R], options: InputOptions) -> Source[R]:
     if not needs.take(run):
         kind = run.record.experiment
         other = "{path:s}: holds a {kind}, {analysis:s} needs a {needed}"
-        raise DoesNotSuit(Text(other, path=run.folder, kind=f"{kind} run", analysis=needs.name, needed=needs.runs))
+        raise DoesNotSuit(other, path=run.folder, kind=f"{kind} run", analysis=needs.name, needed=needs.runs)
     data = run.folder / needs.data
     if not data.exists():  # as after a kill before the first record
         what = "{path:s}: holds no {name:s}, so nothing was recorded; analyze another run"

@@ -96,7 +96,7 @@ def read_spin_file(path: Path, options: InputOptions) -> Records:
     field = read_field_record(path, options)
     if field and len(field) < FEWEST:
         few = "{path:s}: holds {n} samples of a field, at least {fewest} are needed: record longer"
-        raise DoesNotSuit(Text(few, path=path, n=len(field), fewest=FEWEST))
+        raise DoesNotSuit(few, path=path, n=len(field), fewest=FEWEST)
     if field:
         return Records(path, (), "", None, field.warnings, field)
     record = read_record(path, columns=options.columns, rate=options.rate, guess=options.guess)
@@ -126,18 +126,16 @@ def read_spin_run(run: Run, options: InputOptions) -> Records:
     """
     found = run_waveforms(run)
     if not found:
-        raise DoesNotSuit(Text("{path:s}: keeps no record of an oscilloscope", path=run.folder))
+        raise DoesNotSuit("{path:s}: keeps no record of an oscilloscope", path=run.folder)
     names = Counter(waveform.signals[0].name for waveform in found)
     chosen = options.channel or _shows_a_spin(run, names)
     of_channel = tuple(w for w in found if w.signals[0].name.casefold() == chosen.casefold())
     if not of_channel:
         raise DataError(
-            Text(
-                "{path:s}: has no record of {chosen:s}, but of {names:s}: name one with `channel`",
-                path=run.folder,
-                chosen=repr(chosen),
-                names=(*names,),
-            )
+            "{path:s}: has no record of {chosen:s}, but of {names:s}: name one with `channel`",
+            path=run.folder,
+            chosen=repr(chosen),
+            names=(*names,),
         )
     left_out = undescribed_codes(run.folder)
     warnings: list[str] = [Note("undescribed", Text(_UNDESCRIBED, path, INDEX)) for path in left_out]
@@ -156,11 +154,9 @@ def _shows_a_spin(run: Run, names: Counter[str]) -> str:
     if spins:
         return spins[0]
     raise DoesNotSuit(
-        Text(
-            "{path:s}: keeps records of {names:s}, none of which shows the spin: levilab analyze precession reads such "
-            "a run; `channel` = {first:s} takes the frequency of its pulses",
-            path=run.folder,
-            names=(*names,),
-            first=next(iter(names)),
-        )
+        "{path:s}: keeps records of {names:s}, none of which shows the spin: levilab analyze precession reads such "
+        "a run; `channel` = {first:s} takes the frequency of its pulses",
+        path=run.folder,
+        names=(*names,),
+        first=next(iter(names)),
     )

@@ -283,7 +283,7 @@ def _of_track(
             "{path:s}: the spin in it goes from {start:.6g} Hz to {end:.6g} Hz in {n} windows of {window:.3g} s, a "
             "falling spin is expected: is the drive still on?"
         )
-        raise DoesNotSuit(Text(rises, path=path, start=start, end=end, n=last - first, window=window))
+        raise DoesNotSuit(rises, path=path, start=start, end=end, n=last - first, window=window)
     text = "{name:s}: {what}: each reading is the frequency in a window of {window:.3g} s"
     how_read = [of_file("windows", Text(text, name=path.name, what=what, window=window), "advice")]
     if last - first < len(track.time):

@@ -108,11 +108,9 @@ def analyze_source(source: Source[SwayReadings], options: SwayOptions) -> SwayRu
         spin = np.full(len(readings), options.spin_hz)
     else:
         raise DataError(
-            Text(
-                "{path:s}: the spin is not known: a column spin_frequency_hz, or the option `spin` where it is nearly "
-                "constant, is expected",
-                path=source.data,
-            )
+            "{path:s}: the spin is not known: a column spin_frequency_hz, or the option `spin` where it is nearly "
+            "constant, is expected",
+            path=source.data,
         )
     known, unknown = known_of(source, options)
     places, sensor = readings.x + 1j * readings.y, readings.sensor

@@ -21,7 +21,6 @@ from levilab.pipelines.options import FieldOptions, SwayOptions
 from levilab.pipelines.sway.readings import SwayReadings
 from levilab.simulator.keys import SceneError
 from levilab.simulator.scene import scene_of
-from levilab.texts.text import Text
 
 #: The thesis's base and top, taken where nothing is known, with a warning; of both sizes by a calliper.
 _RING, _SIZE_U_M = Ring(1.40e-3, 0.0, 0.0, 0.030, 0.055), 1e-4
@@ -56,7 +55,7 @@ def _base(device: Device, scan: Path | None) -> tuple[Ring | None, np.ndarray]:
         found = FIELD.analyze([scan], FieldOptions(device=device if device.base.inner_radius_m else None)).runs
         if len(found) > 1:
             several = "{path:s}: holds {n} scans of the base, one is expected: name its run or file"
-            raise DataError(Text(several, path=scan, n=len(found)))
+            raise DataError(several, path=scan, n=len(found))
         sizes = [2, 4, 5]
         return found[0].scan.ring, found[0].scan.covariance[np.ix_(sizes, sizes)]
     base = device.base
@@ -71,7 +70,7 @@ def _of_scene(source: Source[SwayReadings], table: dict[str, Any]) -> Known:
     try:
         scene = scene_of(table)
     except (SceneError, AnalysisError) as error:
-        raise DataError(Text("{path:s}/run.json: configuration.scene: {why}", path=source.path, why=error)) from error
+        raise DataError("{path:s}/run.json: configuration.scene: {why}", path=source.path, why=error) from error
     top, base = scene.top, scene.base
     body = SymmetricTop(
         top.mass_kg, top.inertia_transverse_kg_m2, top.inertia_axial_kg_m2, top.moment_a_m2, scene.gravity_m_s2

@@ -112,7 +112,7 @@ def _head_of(path: Path) -> bytes:
     with file_errors(path), path.open("rb") as stream:
         head = stream.read(_HEAD)
     if kind_of_bytes(head, path.suffix) is not AUDIO:
-        raise DoesNotSuit(Text("{path:s}: holds no film that can be read: give the file that the camera wrote", path))
+        raise DoesNotSuit("{path:s}: holds no film that can be read: give the file that the camera wrote", path)
     try:
         check_reader(path)
     except NoFilm as error:
@@ -128,7 +128,7 @@ def read_film(path: Path, options: VideoOptions) -> FilmReadings:
         "`rim`, the diameter of the top's rim; `base`, the outer diameter of the base; or `scale`, metres in a pixel"
     )
     if not given:
-        raise DoesNotSuit(Text("{path:s}: one scale is expected, none is given: {wanted}", path=path, wanted=wanted))
+        raise DoesNotSuit("{path:s}: one scale is expected, none is given: {wanted}", path=path, wanted=wanted)
     if len(given) > 1:
         several = "one scale is expected, {given} are given: {wanted}"
         raise UsageError("scale", Text(several, given=enumeration(given), wanted=wanted))
@@ -270,7 +270,7 @@ def analyze_source(source: Source[FilmReadings], options: VideoOptions) -> Video
 
 def no_run(run: Run, _: InputOptions) -> FilmReadings:
     """Raise DoesNotSuit: a run holds no film."""
-    raise DoesNotSuit(Text("{path:s}: is a run, a film is expected", path=run.folder))
+    raise DoesNotSuit("{path:s}: is a run, a film is expected", path=run.folder)
 
 
 def _video(film: Film, options: VideoOptions, followed: Followed) -> Video:
@@ -426,7 +426,7 @@ def _scale(film: Film, options: VideoOptions, followed: Followed) -> Estimate:
     if options.rim_m is not None:
         diameter, radius, nearer = options.rim_m, float(np.median(followed.radius)), 1.0
     elif followed.base is None:
-        raise DataError(Text("{path:s}: no round base is seen round the top: give `rim`, or `scale`", path=film.path))
+        raise DataError("{path:s}: no round base is seen round the top: give `rim`, or `scale`", path=film.path)
     else:
         assert options.base_m is not None
         diameter, radius = options.base_m, followed.base.radius

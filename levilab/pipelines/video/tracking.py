@@ -16,7 +16,6 @@ from analysis.film.side import Side, find_side, fit_side
 from analysis.film.view import compare_views
 from levilab.errors import DataError
 from levilab.formats.film import Film, Picture, pictures
-from levilab.texts.text import Text
 
 #: The top is looked for in the beginning of the film, in pictures at least so far apart [s].
 _FIRST_S, _APART_S = 0.6, 1 / 90
@@ -105,7 +104,7 @@ def follow(
     watch = _Watch(background, top, factor)
     if watch.share_of_background < _LEAST_BACKGROUND:
         fills = "{path:s}: the top fills the picture: film it from farther away, with the base round it"
-        raise DataError(Text(fills, path=film.path))
+        raise DataError(fills, path=film.path)
     track = _Track(top.scaled(factor), with_dot=with_dot)
     span = min(stop, film.duration or np.inf) - start
     for time, picture in pictures(film, start, stop):
@@ -137,12 +136,10 @@ def _beginning(film: Film, start: float, stop: float) -> tuple[Array, Picture, i
             before = time
     if still is None or len(found) < 3:
         raise DataError(
-            Text(
-                "{path:s}: holds {n} pictures from {start:g} s on: a second of film is needed at least",
-                path=film.path,
-                n=len(found),
-                start=start,
-            )
+            "{path:s}: holds {n} pictures from {start:g} s on: a second of film is needed at least",
+            path=film.path,
+            n=len(found),
+            start=start,
         )
     return np.stack(found), still, factor
 
@@ -242,13 +239,11 @@ def _followed(film: Film, track: _Track, watch: _Watch, base: Circle | None) -> 
         if track.ended == "hand":
             raise HandInView(times=(max(watch.clean, 0.0), track.last), share=watch.share)
         raise DataError(
-            Text(
-                "{path:s}: the top is seen for {span:.2f} s, {least:g} s are needed: name a part where it floats by "
-                "`start` and `stop`",
-                path=film.path,
-                span=span,
-                least=_LEAST_S,
-            )
+            "{path:s}: the top is seen for {span:.2f} s, {least:g} s are needed: name a part where it floats by "
+            "`start` and `stop`",
+            path=film.path,
+            span=span,
+            least=_LEAST_S,
         )
     times = np.array(track.times)
     missed = sum(time < times[-1] for time in track.missed)
