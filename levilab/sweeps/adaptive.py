@@ -28,10 +28,8 @@ from levilab.sweeps.refinement import (
     STRIDE,
     Flags,
     Points,
-    Question,
     Refined,
     refine,
-    run_refinement,
 )
 from levilab.sweeps.run import Task, compute
 from levilab.sweeps.store import COMPUTED, DONE, FILLED, STATUS, Store, as_text
@@ -102,16 +100,16 @@ def run_adaptive(store: Store, executor: Workers, progress: Callable[[float], No
         WorkersLost, SimulationError: points could not be computed.
     """
     asked, plan = store.attribute(ASKED), store.plan
-    refinement = refine(plan.shape, stride=asked["stride"], audit=asked["audit"], seed=plan.seed)
     run, feed = _Run.of(store, progress), _Feed()
     with contextlib.closing(results_of(compute, feed, executor)) as results:
 
-        def answer(question: Question) -> Flags:
-            run.compute(run.missing(question.points), question.until, feed, results)
-            return np.asarray(run.columns[asked["observable"]].flat[question.points], dtype=np.bool_)
+        def answer(points: Points, until: float) -> Flags:
+            run.compute(run.missing(points), until, feed, results)
+            return np.asarray(run.columns[asked["observable"]].flat[points], dtype=np.bool_)
 
         try:
-            return run.finish(run_refinement(refinement, answer))
+            found = refine(answer, plan.shape, stride=asked["stride"], audit=asked["audit"], seed=plan.seed)
+            return run.finish(found)
         finally:
             run.write()
 

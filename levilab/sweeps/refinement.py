@@ -15,7 +15,7 @@ Only an island on which no computed point lies may be missed.  An island that ho
 every axis holds a point of the coarse grid, and is sure to be seen.
 """
 
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -26,20 +26,9 @@ Flags = NDArray[np.bool_]
 Points = NDArray[np.intp]
 
 
-class Question(NamedTuple):
-    """Points whose values are wanted.
-
-    Attributes:
-        points: flat indices, increasing.
-        until: roughly the share of the work that is done with them.
-    """
-
-    points: Points
-    until: float
-
-
-#: Yields questions for points, receives their values in the same order, and returns the refined map.
-Refinement = Generator[Question, Flags, "Refined"]
+#: Computes points, which are flat indices that increase, and returns their values; the number is roughly the share of
+#: the work that is done with them.
+Answer = Callable[[Points, float], Flags]
 
 #: The coarse grid has every STRIDEth point of the full one, along each axis.
 STRIDE = 8
@@ -118,13 +107,13 @@ class Refined:
         return self.most_wrong / self.filled if self.filled else 0.0
 
 
-def refine(shape: Sequence[int], *, stride: int = STRIDE, audit: int = AUDIT, seed: int = 0) -> Refinement:
+def refine(answer: Answer, shape: Sequence[int], *, stride: int = STRIDE, audit: int = AUDIT, seed: int = 0) -> Refined:
     """Refine a yes/no map along its boundary.
 
-    A generator that yields questions for points and receives their values.  The questions depend on the values alone,
-    so that points with known values need not be computed again.
+    The points depend on the values alone, so that those with known values need not be computed again.
 
     Args:
+        answer: computes points.
         shape: of the map.
         stride: of the coarse grid, a power of 2.
         audit: points of each audit.
@@ -137,45 +126,35 @@ def refine(shape: Sequence[int], *, stride: int = STRIDE, audit: int = AUDIT, se
         raise ValueError(f"stride = {stride}: a power of 2 is expected, such as 8")
     grids = _grids(shape, stride)
     linked = tuple(axis for axis, n in enumerate(shape) if n > 1)
-    state = _State(np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_), linked)
+    state = _State(np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_), linked, answer)
     # each level has about twice as many points as the one before: a boundary is a line
     ends = [0.9 * 2.0 ** (level - len(grids) + 1) for level in range(len(grids))]
-    yield from _compute(state, _select(grids[0], shape), ends[0])
+    _compute(state, _select(grids[0], shape), ends[0])
     for coarse, fine, end in zip(grids, grids[1:], ends[1:], strict=False):
-        yield from _follow_boundary(state, coarse, end)
+        _follow_boundary(state, coarse, end)
         inside = _within(_open_cells(state.values[np.ix_(*coarse)], linked), coarse, fine, linked)
         _fill(state, coarse, fine)
-        yield from _compute(state, _select(fine, shape, inside), end)
-    yield from _follow_boundary(state, grids[-1], ends[-1])
+        _compute(state, _select(fine, shape, inside), end)
+    _follow_boundary(state, grids[-1], ends[-1])
     audits = []
     for number in range(2):
-        found, wrong = yield from _audit(state, np.random.default_rng([seed, number]), audit)
+        found, wrong = _audit(state, np.random.default_rng([seed, number]), audit)
         audits.append(found)
         if wrong.size:
             around = _around(wrong, grids[0], shape, linked)
-            yield from _compute(state, _select(grids[min(1, len(grids) - 1)], shape) & around, 1.0)
-            yield from _follow_boundary(state, grids[-1], 1.0)
+            _compute(state, _select(grids[min(1, len(grids) - 1)], shape) & around, 1.0)
+            _follow_boundary(state, grids[-1], 1.0)
     strides = tuple(int(grid[1] - grid[0]) if grid.size > 1 else 1 for grid in grids[0])
     return Refined(state.values, state.computed, strides, tuple(audits))
 
 
 class _State(NamedTuple):
-    """Values, filled in or computed; which of them are computed; the axes along which points have neighbours."""
+    """Values, filled in or computed; which are computed; axes along which points have neighbours; what computes."""
 
     values: Flags
     computed: Flags
     linked: tuple[int, ...]
-
-
-def run_refinement(refinement: Refinement, answer: Callable[[Question], Flags]) -> Refined:
-    """Answer all questions of a refinement with a function, and return its result."""
-    try:
-        question = next(refinement)
-        while True:
-            question = refinement.send(answer(question))
-    except StopIteration as end:
-        result: Refined = end.value
-        return result
+    answer: Answer
 
 
 # --- grids, each the coordinates of its points along every axis ---
@@ -248,22 +227,22 @@ def _after(array: Flags, axis: int) -> Flags:
 # --- steps ---
 
 
-def _compute(state: _State, wanted: Flags, until: float) -> Generator[Question, Flags, None]:
-    """Ask for those of the wanted points that are not computed yet."""
+def _compute(state: _State, wanted: Flags, until: float) -> None:
+    """Compute those of the wanted points that are not computed yet."""
     points = np.flatnonzero(wanted & ~state.computed)
     if points.size:
-        state.values.flat[points] = yield Question(points, until)
+        state.values.flat[points] = state.answer(points, until)
         state.computed.flat[points] = True
 
 
-def _follow_boundary(state: _State, grid: Grid, until: float) -> Generator[Question, Flags, None]:
+def _follow_boundary(state: _State, grid: Grid, until: float) -> None:
     """Compute all corners of open cells of a grid, which may open others, to the end."""
     where = np.ix_(*grid)
     while True:
         corners = _corners(_open_cells(state.values[where], state.linked), state.linked)
         if not np.any(corners & ~state.computed[where]):
             return
-        yield from _compute(state, _select(grid, state.values.shape, corners), until)
+        _compute(state, _select(grid, state.values.shape, corners), until)
 
 
 def _fill(state: _State, coarse: Grid, fine: Grid) -> None:
@@ -278,14 +257,14 @@ def _fill(state: _State, coarse: Grid, fine: Grid) -> None:
     state.values[where] = np.where(state.computed[where], state.values[where], state.values[np.ix_(*before)])
 
 
-def _audit(state: _State, random: np.random.Generator, most: int) -> Generator[Question, Flags, tuple[Audit, Points]]:
+def _audit(state: _State, random: np.random.Generator, most: int) -> tuple[Audit, Points]:
     """Compute points chosen at random among those filled in; returns the audit and the points that were wrong."""
     filled = np.flatnonzero(~state.computed)
     chosen = np.sort(random.choice(filled, min(most, filled.size), replace=False)) if filled.size else filled
     before = state.values.flat[chosen].copy()
     mask = np.zeros(state.values.shape, dtype=np.bool_)
     mask.flat[chosen] = True
-    yield from _compute(state, mask, 1.0)
+    _compute(state, mask, 1.0)
     wrong = chosen[state.values.flat[chosen] != before]
     return Audit(filled.size, chosen.size, wrong.size), wrong
 

@@ -1,12 +1,10 @@
 """Yes/no maps that are known, refined along their boundary: what is computed, what is missed, what is promised."""
 
-import contextlib
-
 import numpy as np
 import pytest
 from scipy.stats import beta
 
-from levilab.sweeps.refinement import AUDIT, Audit, refine, run_refinement
+from levilab.sweeps.refinement import AUDIT, Audit, refine
 
 
 def islands(seed, shape=(120, 160), count=15, largest=3.0):
@@ -21,7 +19,7 @@ def islands(seed, shape=(120, 160), count=15, largest=3.0):
 
 
 def refined(values, **how):
-    return run_refinement(refine(values.shape, **how), lambda question: values.flat[question.points])
+    return refine(lambda points, _: values.flat[points], values.shape, **how)
 
 
 def test_what_was_computed_is_right_and_every_edge_has_it_on_both_sides():
@@ -81,15 +79,14 @@ def test_where_all_was_audited_the_limit_is_what_was_wrong():
 
 def test_a_second_refinement_asks_for_the_same_points():
     values = islands(4)
-    asked = []
-    for _ in range(2):
-        refinement, questions = refine(values.shape), []
-        with contextlib.suppress(StopIteration):
-            question = next(refinement)
-            while True:
-                questions.append(question.points.tobytes())
-                question = refinement.send(values.flat[question.points])
-        asked.append(questions)
+    asked = [], []
+    for questions in asked:
+
+        def answer(points, _, questions=questions):
+            questions.append(points.tobytes())
+            return values.flat[points]
+
+        refine(answer, values.shape)
     assert len(asked[0]) > 5
     assert asked[0] == asked[1]
 
@@ -109,4 +106,4 @@ def test_a_map_of_one_value_needs_few_points():
 
 def test_a_stride_that_is_no_power_of_two_is_refused():
     with pytest.raises(ValueError, match="a power of 2"):
-        next(refine((10, 10), stride=6))
+        refined(np.zeros((10, 10), dtype=np.bool_), stride=6)
