@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.arrays import Array
+from analysis.budget import printed_step, u_of_step
 from analysis.precession.gates import Gates, whole_counts
 from analysis.uncertainty import Estimate, student
 
@@ -114,7 +115,8 @@ def find_miscounts(
 
     Without u few points hardly show their scatter: one that no miscount explains is farther off than `FAR` standard
     deviations by Student's t.  Of lines through five points 2 % have such a point by chance, through eight 0.3 %: the
-    median deviation is less certain than a standard deviation of n − 2 degrees of freedom.
+    median deviation is less certain than a standard deviation of n − 2 degrees of freedom.  Of rounded numbers most may
+    lie on the line, and those beside it by a step are no miscounts.
 
     Args:
         x: shape (n,) [Hz].
@@ -125,7 +127,8 @@ def find_miscounts(
         gates: behind each point, if they are known: each of them must be off by the same counts.
     """
     line = float(robust.intercept.value or 0.0) + float(robust.slope.value or 0.0) * x
-    usual = np.maximum(robust.scatter, 1e-9 * np.abs(line))
+    rounding = u_of_step(printed_step(y.tolist()) or 0.0)
+    usual = np.maximum(max(robust.scatter, rounding), 1e-9 * np.abs(line))
     deviation = usual if u is None else np.maximum(u, usual)
     far = FAR
     if u is None:

@@ -78,8 +78,11 @@ QUANTITIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
         "frecuencia_de_rotacion", "spin_rate", "rotation_rate")),
     "precession_frequency_hz": ("frequency", (
         "precession_frequency", "precession", "f_precession", "f_p", "fp", "νp", "ν_p", "nu_p", "prazession",
-        "prazessionsfrequenz")),
-    "drive_frequency_hz": ("frequency", ("drive_frequency", "f_drive", "drive", "f_d", "antriebsfrequenz")),
+        "prazessionsfrequenz", "precession_freq", "frequence_de_precession", "frecuencia_de_precesion", "precesion")),
+    "drive_frequency_hz": ("frequency", (
+        "drive_frequency", "f_drive", "drive", "f_d", "fd", "νd", "ν_d", "nu_d", "antrieb", "antriebsfrequenz",
+        "erregerfrequenz", "drive_freq", "driving_frequency", "frequence_d'excitation", "frecuencia_de_excitacion",
+        "drivfrekvens")),
     "drive_amplitude_v": ("voltage", ("drive_amplitude", "amplitude", "drive_voltage", "amplitude_drive")),
     "height_m": ("length", ("height", "z", "h", "hohe", "hoehe")),
     "x_m": ("length", ("x", "x_position", "position_x")),

@@ -86,6 +86,12 @@ def test_a_few_points_without_u_are_seldom_off_their_line_by_chance(n):
     assert all(("few left" in said) == (n == 3) for said in kinds)
 
 
+def test_a_rounded_point_a_step_beside_the_line_is_no_miscount():
+    drive = np.arange(44.0, 26, -2)
+    counted = drive - 0.1 * (drive == 42)  # in steps of 0.1 Hz the others lie on the line
+    assert all(point.miscount is None for point in fit_sweep(Sweep(drive, counted)).points)
+
+
 def test_counts_that_are_mostly_alike_have_a_line():
     drive = np.array([30.0, 30.0, 30.0, 36.0, 30.0])
     exact = fit_sweep(Sweep(drive, drive))

@@ -63,6 +63,14 @@ def test_the_options_reach_the_fit(tmp_path):
     assert (kept.line.n, kept.line.orthogonal, kept.points[0].u) == (9, True, 0.1)
 
 
+@pytest.mark.parametrize("titles", ["ν_d [Hz];ν_p [Hz]", "Antrieb (Hz);Präzession (Hz)", "drive_freq;precession_freq"])
+def test_titles_of_reports_and_of_people_are_known(tmp_path, titles):
+    file = tmp_path / "own.csv"
+    _, _, rows = sweep_csv(file, u=False).read_text(encoding="utf-8").partition("\n")
+    file.write_text(f"{titles}\n{rows}", encoding="utf-8")
+    assert PRECESSION.analyze([file]).combined.line.n == 9
+
+
 def test_several_sweeps_share_a_line(tmp_path):
     files = [sweep_csv(tmp_path / f"{k}.csv", seed=k) for k in (1, 2)]
     found = PRECESSION.analyze(files)
