@@ -67,7 +67,7 @@ def takes_options(
 
     Those of analyses stand behind the paths, more of them at the end; the command has all in `**given`.
     """
-    own = [_parameter(name, OPTIONS[name]) for name in names if OPTIONS[name].typed is not None]
+    own = [_parameter(name, OPTIONS[name]) for name in names]
 
     def decorate(command: Callable[..., None]) -> Callable[..., None]:
         paths, *shared, _ = inspect.signature(command).parameters.values()

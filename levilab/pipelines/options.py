@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from levilab.errors import UsageError, list_known
 from levilab.formats.ranges import WithUnit, problem_of
+from levilab.present.units import split
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -34,7 +35,6 @@ class Option:
         help: for people.
         kind: type of the value on the command line.
         metavar: its placeholder there.
-        typed: its name there; empty: that of the field; None: the command line lacks it.
         unit: of the value there.
         factor: from that unit to that of the field.
         low, high: least and greatest value, in the unit of the field.
@@ -48,7 +48,6 @@ class Option:
     help: str
     kind: type = str
     metavar: str | None = None
-    typed: str | None = ""
     unit: str = ""
     factor: float = 1.0
     low: float = -math.inf
@@ -142,15 +141,15 @@ _RATE = _about(
 )  # fmt: skip
 _HEIGHT = _about(
     "Height at which the top floats; with a scan its moment follows, if its mass is known.  Of the rim, with --camera.",
-    kind=float, metavar="MM", typed="height", unit="mm", factor=1e-3, above=0.0,
+    kind=float, metavar="MM", unit="mm", factor=1e-3, above=0.0,
 )  # fmt: skip
 _START = _about(
     "Time from which readings count, or from which the top of a film floats.",
-    kind=float, metavar="S", typed="start", unit="s", low=0.0,
+    kind=float, metavar="S", unit="s", low=0.0,
 )  # fmt: skip
 _STOP = _about(
     "Time until which readings count, or until which the top of a film floats.",
-    kind=float, metavar="S", typed="stop", unit="s", above=0.0,
+    kind=float, metavar="S", unit="s", above=0.0,
 )  # fmt: skip
 _CLOCK_U = _about(
     "Relative standard uncertainty of the clock that counts or samples, as 2e-6, from its manual; the budgets show "
@@ -238,19 +237,19 @@ class SpinOptions(RecordOptions):
     ))  # fmt: skip
     distance_m: float | None = field(default=None, metadata=_about(
         "Distance of a magnetometer from the axis of the top, horizontally; the tilt of its moment follows.",
-        kind=float, metavar="M", typed="distance", unit="m", above=0.0,
+        kind=float, metavar="M", unit="m", above=0.0,
     ))  # fmt: skip
     distance_u_m: float | None = field(default=None, metadata=_about(
         "Standard uncertainty of --distance, and of --below.", default_text="0.005", needs="distance_m",
-        kind=float, metavar="M", typed="distance_u", unit="m", above=0.0,
+        kind=float, metavar="M", unit="m", above=0.0,
     ))  # fmt: skip
     below_m: float | None = field(default=None, metadata=_about(
         "Height of the top above the magnetometer.", default_text="0, the same height", needs="distance_m",
-        kind=float, metavar="M", typed="below", unit="m",
+        kind=float, metavar="M", unit="m",
     ))  # fmt: skip
     moment_a_m2: float | None = field(default=None, metadata=_about(
         "Moment of the top, as levilab analyze field finds it; the angle of its tilt follows.", needs="distance_m",
-        kind=float, metavar="A_M2", typed="moment", unit="A m^2", above=0.0,
+        kind=float, metavar="A_M2", unit="A m^2", above=0.0,
     ))  # fmt: skip
 
 
@@ -262,7 +261,7 @@ class FieldOptions(InputOptions):
     height_m: float | None = field(default=None, metadata=_HEIGHT)
     height_u_m: float | None = field(default=None, metadata=_about(
         "Standard uncertainty of --height.", default_text="that of the scan's heights", needs="height_m",
-        kind=float, metavar="MM", typed="height_u", unit="mm", factor=1e-3, low=0.0, high=2.0,
+        kind=float, metavar="MM", unit="mm", factor=1e-3, low=0.0, high=2.0,
     ))  # fmt: skip
 
 
@@ -287,10 +286,9 @@ class LimitOptions(InputOptions):
     near: float | None = field(default=None, metadata=_NEAR)
 
 
-def _length(text: str, typed: str) -> Any:
+def _length(text: str) -> Any:
     """Return the field of a length [m] that is typed in millimetres."""
-    about = _about(text, kind=float, metavar="MM", typed=typed, unit="mm", factor=1e-3, above=0.0)
-    return field(default=None, metadata=about)
+    return field(default=None, metadata=_about(text, kind=float, metavar="MM", unit="mm", factor=1e-3, above=0.0))
 
 
 @dataclass(frozen=True)
@@ -307,11 +305,10 @@ class SwayOptions(InputOptions):
         kind=Path, metavar="TRACKS.csv", read=Path,
     ))  # fmt: skip
     spin_hz: float | None = field(default=None, metadata=_about(
-        "Spin of the top, where no column has it.", kind=float, metavar="HZ", typed="spin", unit="Hz", above=0.0,
+        "Spin of the top, where no column has it.", kind=float, metavar="HZ", unit="Hz", above=0.0,
     ))  # fmt: skip
     sensor_m: float | None = _length(
-        "Of a record of the field: distance of the top from the phone above it, or from two vertical probes beside it.",
-        "sensor",
+        "Of a record of the field: distance of the top from the phone above it, or from two vertical probes beside it."
     )
 
 
@@ -329,22 +326,22 @@ class HoldOptions(InputOptions):
 class VideoOptions(InputOptions):
     """Options of films of a top."""
 
-    rim_m: float | None = _length("Scale: diameter of the top's rim, which is best.", "rim")
-    base_m: float | None = _length("Scale: outer diameter of a round base.", "base")
+    rim_m: float | None = _length("Scale: diameter of the top's rim, which is best.")
+    base_m: float | None = _length("Scale: outer diameter of a round base.")
     scale_m: float | None = field(default=None, metadata=_about(
-        "Scale: metres in a pixel, at the top.", kind=float, metavar="M", typed="scale", unit="m", above=0.0,
+        "Scale: metres in a pixel, at the top.", kind=float, metavar="M", unit="m", above=0.0,
     ))  # fmt: skip
-    camera_m: float | None = _length("With --height: distance of the camera from the base.", "camera")
+    camera_m: float | None = _length("With --height: distance of the camera from the base.")
     beside: bool = field(default=False, metadata=_about(
         "The camera is beside the top, at its height: it shows one coordinate, the height and the lean.", kind=bool,
     ))  # fmt: skip
-    stem_m: float | None = _length("Height above the rim of a light dot on the stem, which shows the tilt.", "stem")
+    stem_m: float | None = _length("Height above the rim of a light dot on the stem, which shows the tilt.")
     height_m: float | None = field(default=None, metadata=_HEIGHT)
     start_s: float | None = field(default=None, metadata=_START)
     stop_s: float | None = field(default=None, metadata=_STOP)
     line_time_s: float | None = field(default=None, metadata=_about(
         "Rolling shutter: µs from a row of the picture to the next.",
-        kind=float, metavar="US", typed="line_time", unit="us", factor=1e-6, low=0.0, high=1e-3,
+        kind=float, metavar="US", unit="us", factor=1e-6, low=0.0, high=1e-3,
     ))  # fmt: skip
     rate: float | None = field(default=None, metadata=_RATE)
     near: float | None = field(default=None, metadata=_NEAR)
@@ -380,7 +377,7 @@ def typed_name(name: str) -> str:
     >>> typed_name("height_m"), typed_name("reading_u")
     ('height', 'reading_u')
     """
-    return OPTIONS[name].typed or name
+    return split(name)[0]
 
 
 #: What people write for none.

@@ -26,7 +26,7 @@ def test_the_command_line_has_the_same_defaults():
     def command(context, paths, last=None, **given): ...
 
     given = {name: one.default for name, one in inspect.signature(command).parameters.items()}
-    typed = {name: given[typed_name(name)] for name, one in OPTIONS.items() if one.typed is not None}
+    typed = {name: given[typed_name(name)] for name in OPTIONS}
     assert typed == {name: DEFAULTS[name] for name in typed}
 
 
