@@ -9,7 +9,7 @@ import typer
 from levilab.cli import exit_codes
 from levilab.cli.options import Json, among, argument, existing_paths, flag, option, place
 from levilab.cli.output import interruptible, message, place_of_report, print_json, result
-from levilab.crosscheck.names import ROWS
+from levilab.crosscheck.catalogue import ROWS
 from levilab.errors import UsageError
 from levilab.reproduce.chapters import CHAPTERS
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.markup import escape
 
-from levilab.crosscheck.catalogue import SUBJECTS
+from levilab.crosscheck.catalogue import ROWS, subject_of
 from levilab.crosscheck.own.study import OWN, TRIALS, study_result
 from levilab.crosscheck.stored import NAME, as_json, store
 from levilab.crosscheck.study import Judge, Study, by_pulls, study_world
@@ -26,10 +26,10 @@ CALIBRATION = 200
 
 def study_worlds(names: Sequence[str], trials: int | None, seed: int) -> list[Study]:
     """Make the trials of some subjects, or of all where none is named.  Raises UsageError for an unknown name."""
-    _check(names, SUBJECTS, "known are")
+    _check(names, ROWS, "known are")
     found = []
-    for name in names or SUBJECTS:
-        subject = SUBJECTS[name]
+    for name in names or ROWS:
+        subject = subject_of(name)
         progress = ShareBar(f"cross-checking {name}")
         try:
             found.append(study_world(subject, trials or subject.trials, seed, progress))

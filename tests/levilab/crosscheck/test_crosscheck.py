@@ -11,7 +11,7 @@ from scipy import stats
 
 from analysis.uncertainty import Estimate
 from instruments.clock import VirtualClock
-from levilab.crosscheck.catalogue import SUBJECTS
+from levilab.crosscheck.catalogue import subject_of
 from levilab.crosscheck.figure import crosscheck_figure
 from levilab.crosscheck.mock import acquire_mock
 from levilab.crosscheck.priors import PRIORS
@@ -126,7 +126,7 @@ def test_a_signal_in_a_trial_ends_the_cross_check(number):
 def test_a_trial_of_limits_finds_their_means_and_each_cause(tmp_path, monkeypatch):
     """With three tops in place of ten: Student's t of two degrees of freedom is below 10 in 99 % of all cases."""
     monkeypatch.setattr("levilab.crosscheck.subjects.limit.TOPS", 3)
-    pulls = SUBJECTS["limit"].trial(9000, tmp_path)
+    pulls = subject_of("limit").trial(9000, tmp_path)
     assert [pull.quantity for pull in pulls] == ["lower mean", "upper mean", "triggered upper mean"]
     assert all(abs(pull.value) < 10 for pull in pulls)
 
@@ -134,7 +134,7 @@ def test_a_trial_of_limits_finds_their_means_and_each_cause(tmp_path, monkeypatc
 def test_a_trial_films_a_top_and_finds_spin_and_place(tmp_path, monkeypatch):
     pytest.importorskip("av")
     monkeypatch.setitem(PRIORS["video"], "length", replace(PRIORS["video"]["length"], b=0.9))
-    pulls = SUBJECTS["video"].trial(1, tmp_path)
+    pulls = subject_of("video").trial(1, tmp_path)
     assert [pull.quantity for pull in pulls] == [
         "spin", "spin of a second", "place", "place", "precession", "spin from beside", "place from beside",
         "height from beside",
@@ -146,7 +146,7 @@ def test_a_trial_films_a_top_and_finds_spin_and_place(tmp_path, monkeypatch):
 def test_a_trial_tunes_washers_and_finds_the_mass_to_set(tmp_path, monkeypatch):
     monkeypatch.setattr("levilab.crosscheck.subjects.tune.DAYS_C", (19.0,))
     monkeypatch.setattr("levilab.crosscheck.subjects.tune.MOST", 2)
-    pulls = SUBJECTS["tune"].trial(9800, tmp_path)
+    pulls = subject_of("tune").trial(9800, tmp_path)
     assert [pull.quantity for pull in pulls] == ["mass to set", "mass per kelvin"]
     assert max(abs(pull.value) for pull in pulls) < 5  # a slip in a unit or a sign of the slope would be 4 u and more
 
@@ -163,7 +163,7 @@ def test_a_trial_tunes_washers_and_finds_the_mass_to_set(tmp_path, monkeypatch):
 )
 def test_a_trial_goes_through_drivers_and_analysis(tmp_path, monkeypatch, name, seed, quantities):
     monkeypatch.setitem(PRIORS["motion"], "drag", replace(PRIORS["motion"]["drag"], a=1.8, b=2.2))  # it falls sooner
-    pulls = SUBJECTS[name].trial(seed, tmp_path)
+    pulls = subject_of(name).trial(seed, tmp_path)
     assert {pull.quantity for pull in pulls} == quantities
     # a wrong truth or a slip in its unit would be thousands of u away
     assert max(abs(pull.value) for pull in pulls) < 15
@@ -173,7 +173,8 @@ def test_a_trial_goes_through_drivers_and_analysis(tmp_path, monkeypatch, name, 
 
 @pytest.mark.usefixtures("drawn_figures")
 def test_the_command_prints_writes_and_judges(levilab, tmp_path, monkeypatch):
-    monkeypatch.setattr("levilab.crosscheck.command.SUBJECTS", {"spin": made_up(), "tune": made_up(2.0)})
+    subjects = {"spin": made_up(), "tune": made_up(2.0)}
+    monkeypatch.setattr("levilab.crosscheck.command.subject_of", subjects.__getitem__)
     done = levilab("crosscheck", "spin", "--trials", "40", "--out", "kept")
     assert "five" in done.stdout
     document = json.loads((tmp_path / "kept/crosscheck.json").read_text(encoding="utf-8"))
