@@ -534,7 +534,7 @@ def export(
 
     Raises:
         UsageError: an argument is wrong.
-        DataError: there is nothing to export, or several runs.
+        DataError: there is nothing to export.
         CannotWrite: a file is there already, or cannot be written.
     """
     from levilab.notebook.export import export_data

@@ -42,4 +42,4 @@ def _contents(data: Any) -> Contents:
     except TypeError:
         expected = "a run, a result, a motion, a map, a path, a list of runs or of results of unlike kinds is expected"
         raise UsageError("data", f"{expected}: export(analyze([…]), …)", value=type(data).__name__) from None
-    return contents_of(path, lambda text: print(unquote(text), file=sys.stderr))  # noqa: T201 - as warnings are
+    return contents_of([path], lambda text: print(unquote(text), file=sys.stderr))  # noqa: T201 - as warnings are

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, cast
 
 import levilab
-from levilab.errors import LevilabError, UsageError
+from levilab.errors import LevilabError, UsageError, check_ending
 
 F = TypeVar("F", bound="Callable[..., Any]")
 #: Flags of a function's code: it takes any names, any number of values.
@@ -161,6 +161,18 @@ class Helpful:
                 raise NoSuchAttribute(f"{type(self).__name__} has no {name!r}: {text}")
 
 
+def _exports_as(ending: str) -> Callable[..., list[Path]]:
+    """Return the method `export` for files with an ending."""
+
+    @bare
+    def export(data: "Exportable", output: str | PathLike[str], **options: Any) -> list[Path]:
+        """Write it in the format that the method's name says; see `export`."""
+        check_ending(Path(output), (ending,), "output")
+        return data.export(output, **options)
+
+    return export
+
+
 class Exportable(Helpful):
     """Such an object that other programs can read."""
 
@@ -169,4 +181,4 @@ class Exportable(Helpful):
         """Write it for other programs; the same as `levilab.export(self, output, …)`."""
         return levilab.export(self, output, **options)  # type: ignore[arg-type]
 
-    to_csv = to_excel = to_netcdf = export
+    to_csv, to_excel, to_netcdf = (_exports_as(ending) for ending in (".csv", ".xlsx", ".nc"))

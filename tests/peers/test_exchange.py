@@ -28,7 +28,7 @@ def test_netcdf_keeps_the_cf_conventions(source, tmp_path):
     from compliance_checker.runner import CheckSuite, ComplianceChecker
 
     file, report = tmp_path / "out.nc", tmp_path / "report.json"
-    contents = contents_of(SAMPLE_DATA / source)
+    contents = contents_of([SAMPLE_DATA / source])
     if source == "trace-tape":  # and once as a ragged array
         first, *others = contents.traces
         cut = tuple(replace(one, values=one.values[:100]) for one in first.columns)
@@ -44,7 +44,7 @@ def test_netcdf_keeps_the_cf_conventions(source, tmp_path):
 def test_the_library_of_netcdf_reads_the_readings(tmp_path):
     import netCDF4
 
-    export(lambda: contents_of(SAMPLE_DATA / "spin-down-1"), tmp_path / "out.nc")
+    export(lambda: contents_of([SAMPLE_DATA / "spin-down-1"]), tmp_path / "out.nc")
     readings = np.genfromtxt(SAMPLE_DATA / "spin-down-1" / "readings.csv", delimiter=",", names=True)
     with netCDF4.Dataset(tmp_path / "out.nc") as file:
         assert np.array_equal(file["spin_frequency_hz"][:], readings["spin_frequency_hz"])
@@ -64,7 +64,7 @@ def test_udunits_knows_each_unit(si):
 def test_frictionless_validates_an_export(source, tmp_path):
     from frictionless import Package
 
-    export(lambda: contents_of(SAMPLE_DATA / source), tmp_path / "out.zip", creator="Group 7", licence="CC-BY-4.0")
+    export(lambda: contents_of([SAMPLE_DATA / source]), tmp_path / "out.zip", creator="Group 7", licence="CC-BY-4.0")
     package = Package(str(tmp_path / "out.zip"))
     assert package.validate().flatten(["title", "message"]) == []
     assert package.get_resource("result-csv").read_rows()[0]["value"] is not None

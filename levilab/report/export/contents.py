@@ -124,26 +124,26 @@ class Contents:
 
 
 def contents_of(
-    place: Path | Store, tell: Callable[[str], None] = lambda _: None, given: Mapping[str, Any] | None = None
+    place: Sequence[Path] | Store, tell: Callable[[str], None] = lambda _: None, given: Mapping[str, Any] | None = None
 ) -> Contents:
-    """Return what is exported of a run folder, a data file or a sweep.
+    """Return what is exported of run folders, data files or a sweep.
 
     Args:
-        place: a path, or the store of a sweep.
+        place: paths, or the store of a sweep.
         tell: called with the reason why there is no result.
         given: options of analyses by their names.
 
     Raises:
         DataError: there is nothing.
     """
-    if not isinstance(place, Path):
+    if isinstance(place, Store):
         return _of_sweep(place)
-    path = find_run(place)
-    if (path / "zarr.json").exists():
+    path, *others = paths = [*map(find_run, place)]
+    if (path / "zarr.json").exists() and not others:
         return _of_sweep(Store.open(path))
-    run = Run.load(path) if (path / RECORD).exists() else None
+    run = Run.load(path) if (path / RECORD).exists() and not others else None
     try:
-        results = recall_suiting([path], given or {})
+        results = recall_suiting(paths, given or {})
         for text in texts_of(skipped_by_all([found.skipped for _, found in results])):
             tell(text)
         if not run and any(

@@ -58,7 +58,6 @@ WRONG_USAGE = {
         )
     },
     "worksheet": "EXPERIMENT: name some of spin, limit",
-    f"export {SAMPLE} {SCOPE} -o x.nc": "one path is exported into one file",
     "simulate undriven --set top.mass_kg=25lb": "--set: top.mass_kg = '25lb': a number in kg, g or mg is expected",
     "acquire spin --mock --set gate_s=3x": "--set: spin.gate_s = '3x': a number in s, ms",
     f"analyze spindown {SAMPLE} --columns t": "--columns 't': ",

@@ -22,7 +22,7 @@ RUN, TRACES = SAMPLE_DATA / "spin-down-1", SAMPLE_DATA / "trace-tape"
 
 
 def written(source, out, **options):
-    return export(lambda: contents_of(source), out, **options)
+    return export(lambda: contents_of([source]), out, **options)
 
 
 def test_netcdf_has_readings_and_result_with_units_and_uncertainties(tmp_path):
@@ -114,7 +114,7 @@ def test_a_package_describes_its_files_with_units_and_hashes(tmp_path):
 @pytest.mark.parametrize("source", ["hold/26-hz", "precession-sweep"])
 def test_no_two_variables_have_one_name(source):
     """A column and a value, or a value and a parameter of a model, may be called alike."""
-    contents = contents_of(SAMPLE_DATA / source)
+    contents = contents_of([SAMPLE_DATA / source])
     names = [one.name for one in variables_of(contents)]
     assert len(set(names)) == len(names)
     assert len(contents.values) == sum(one.startswith("result_") and not one.endswith("_u") for one in names)
@@ -219,7 +219,7 @@ def test_of_several_runs_a_package_has_each_record_and_says_what_is_not_in_it(tm
     shutil.copytree(RUN, tmp_path / "in" / "broken")
     (tmp_path / "in" / "broken" / "run.json").write_text("{", encoding="utf-8")
     said: list[str] = []
-    export(lambda: contents_of(tmp_path / "in", said.append), tmp_path / "out.zip")
+    export(lambda: contents_of([tmp_path / "in"], said.append), tmp_path / "out.zip")
     assert sum("broken" in text for text in said) == 1
     assert sum("without their traces" in text for text in said) == 1
     with zipfile.ZipFile(tmp_path / "out.zip") as package:
@@ -267,6 +267,21 @@ def test_the_command_names_its_file(levilab, tmp_path):
     assert done.stdout == "wrote spin-down-1.zip\n"
     refused = levilab("export", str(RUN), check=1)
     assert "spin-down-1.zip is there already: give another name with --out, or --force to replace it" in refused.stderr
+
+
+def test_the_command_takes_several_paths_and_the_last_name_for_the_file_without_out(levilab, tmp_path):
+    pair = [str(SAMPLE_DATA / f"spin-down-{k}") for k in (1, 2)]
+    levilab("export", *pair, "-o", "pair.csv")
+    levilab("export", *pair, "same.csv")
+    assert (tmp_path / "pair.csv").read_bytes() == (tmp_path / "same.csv").read_bytes()
+    assert set(pd.read_csv(tmp_path / "pair.csv")["input"]) == {"spin-down-1", "spin-down-2"}
+    refused = levilab("export", pair[0], "pair.csv", check=1)
+    assert "pair.csv is there already" in refused.stderr
+
+
+def test_a_method_writes_the_format_of_its_name_alone(tmp_path):
+    with pytest.raises(LevilabError, match=r"a name that ends in \.xlsx is expected"):
+        door.load(RUN).to_excel(tmp_path / "run.csv")
 
 
 def test_hdf5_is_opened_by_xarray_with_what_the_extra_brings(tmp_path):
