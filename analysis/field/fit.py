@@ -86,7 +86,8 @@ class Known:
         inner_radius, outer_radius: [m].
         origin: height of the middle of the thickness [m], None: not known.
         thickness: [m], None: not known.
-        background: common offset of all readings [T].
+        background: common offset of all readings [T]; unless it is given, of a probe that was zeroed in no chamber: a
+            Hall sensor's zero is off by some tenths of a millitesla, and drifts.
         gain_u: relative standard uncertainty of the instrument's scale.
     """
 
@@ -94,7 +95,7 @@ class Known:
     outer_radius: Prior
     origin: Prior | None = None
     thickness: Prior | None = None
-    background: Prior = Prior(0.0, 5e-5)
+    background: Prior = Prior(0.0, 5e-4)
     gain_u: float = 0.0
 
     def prior(self, name: str) -> Prior | None:
@@ -243,7 +244,8 @@ def fit_scan(
     z, b, u_b, u_z = _check_columns(height, flux_density, u, height_u)
     _refuse_bad_scans(z, b, known)
     problem = _Problem(z, b, u_b, u_z, known)
-    return _describe_scan(problem, *problem.solve())
+    found = _describe_scan(problem, *problem.solve())
+    return replace(found, remarks=(*found.remarks, *_hidden_background(problem)))
 
 
 # --- the input ---
@@ -565,7 +567,8 @@ def _doubts(scan: FieldScan) -> list[Remark]:
     said = []
     for name in scan.fitted:
         prior, found = scan.known.prior(name), scan.parameters[name].value
-        if prior is not None and found is not None and abs(found - prior.value) > APART * prior.u:
+        hidden = name == "background" and scan.statistics.chi_square is None  # see _hidden_background
+        if prior is not None and found is not None and abs(found - prior.value) > APART * prior.u and not hidden:
             said.append(Remark("contradicts", name=name, values=(found, prior.value, prior.u)))
     left, largest = scan.statistics.rms_residual, float(np.abs(scan.flux_density).max())
     if left > _MOST_LEFT * largest and scan.statistics.keeps_sign:
@@ -574,6 +577,22 @@ def _doubts(scan: FieldScan) -> list[Remark]:
     if strength.value is not None and strength.u is not None and abs(strength.value) < 3 * strength.u:
         said.append(Remark("no strength"))
     return said
+
+
+def _hidden_background(problem: _Problem) -> list[Remark]:
+    """Return a remark where the readings alone put the background far from the known one.
+
+    The fit may take it for scatter of an unknown size, with a strength that makes up for a part of it.
+    """
+    prior = problem.known.background
+    if prior.u == 0 or (problem.u_b is not None and problem.u_z is not None):
+        return []
+    known = replace(problem.known, background=Prior(prior.value, float(np.abs(problem.b).max())))
+    free = replace(problem, known=known)
+    found = _describe_scan(free, *free.solve()).parameters["background"]
+    if found.value is None or abs(found.value - prior.value) <= APART * math.hypot(prior.u, found.u or 0.0):
+        return []
+    return [Remark("contradicts", name="background", values=(found.value, prior.value, prior.u))]
 
 
 def _outliers(scan: FieldScan, leverage: Array) -> list[Remark]:

@@ -57,6 +57,30 @@ def test_of_heights_and_readings_without_u_the_fit_finds_which_scatter(u_b, u_z,
     assert np.std(pulls, axis=0) == pytest.approx(np.ones(4), abs=0.43)
 
 
+def of_background(found):
+    return [one for one in found.remarks if (one.kind, one.name) == ("contradicts", "background")]
+
+
+@pytest.mark.parametrize("background", [5e-4, -2e-3])
+def test_a_zero_that_is_off_is_found_where_nothing_is_known_of_the_probe(background):
+    field = scan(background=background, u_b=2e-5, u_z=0.0)
+    found = fit_scan(Z, field, replace(KNOWN, background=Known.background), None, None)
+    strength = found.parameters["strength"]
+    assert abs(strength.value - TRUTH.strength) < 3 * strength.u  # with a zero that is known to 50 µT 5 and 20 u
+
+
+@pytest.mark.parametrize("background", [5e-4, -2e-3])
+def test_a_zero_that_scatter_of_unknown_size_hides_is_named(background):
+    found = fit_scan(Z, scan(background=background, u_b=2e-5, u_z=0.0), KNOWN, None, None)
+    (remark,) = of_background(found)
+    assert remark.values[0] == pytest.approx(background, abs=1.5e-4)  # three u
+
+
+def test_a_sound_zero_is_not_doubted():
+    doubted = sum(bool(of_background(fit_scan(Z, scan(k, *drawn(k), 2e-5, 0.0), KNOWN))) for k in range(60))
+    assert doubted <= 1  # 0.3 % each
+
+
 def test_uncertain_radii_are_no_misfit_of_exact_readings():
     pulls = []
     for seed in range(25):
@@ -195,6 +219,7 @@ def test_a_stand_that_is_set_badly_makes_no_other_field_of_a_rings():
 def test_residuals_that_keep_their_sign_are_named_where_no_u_tells_them():
     z = np.linspace(0.03, 0.12, 60)
     field = on_axis(TRUTH, z)[0]
-    assert {of.kind for of in fit_scan(z, field + 1e-4 * np.sin(z / 0.01), KNOWN).remarks} == {"scan bends"}
+    bent = fit_scan(z, field + 1e-4 * np.sin(z / 0.01), KNOWN)
+    assert {of.kind for of in bent.remarks} == {"scan bends", "contradicts"}  # a free background follows a part of it
     for other in (np.random.default_rng(2).normal(size=60), (-1.0) ** np.arange(60)):
         assert fit_scan(z, field + 1e-4 * other, KNOWN).remarks == ()
