@@ -19,7 +19,7 @@ class NoSpinDown(AnalysisError):
         self.first, self.last = first, last
         super().__init__(
             "the spin goes from {first:.6g} Hz to {last:.6g} Hz (medians of the first and last third of the readings), "
-            "a falling spin was expected: is the drive still on?"
+            "a falling spin was expected"
         )
 
 

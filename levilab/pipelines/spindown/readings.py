@@ -57,6 +57,8 @@ _FASTEST_HZ, _MOST_MARKS = 80.6, 6
 _MOST_U_HZ = 10.0
 #: Whole uncertainties of one counter differ by no more; five random digits from 1 on do in 97 of 100 tables [Hz].
 _MOST_APART_HZ = 2.0
+#: Steps that are larger than resolution and scatter by this factor do not vanish twice by chance.
+_REPEATS = 4.0
 #: A first time above this, three years, counts from 1970; as dates, such times count from the first reading [s].
 _SINCE_1970_S = 1e8
 _NAMED = "{name:s}: {text}"
@@ -229,7 +231,10 @@ def record_readings(record: "Waveform | PulseTimes", options: "InputOptions") ->
     what = Text(
         "a list of pulse times of {s:n} s" if times is not None else "a record of {s:n} s", s=digits(duration, 3)
     )
-    return _of_track(path, track, WINDOW_S, what, options=options, notes=((*record.warnings, *channels), notes))
+    readings = _of_track(path, track, WINDOW_S, what, options=options, notes=((*record.warnings, *channels), notes))
+    too_fast = any(note.kind == "fast" and is_doubt(note) for note in notes)
+    marks = [] if too_fast else _of_marks(path.name, readings.frequency)
+    return replace(readings, warnings=(*marks, *readings.warnings), doubtful=too_fast or any(map(is_doubt, marks)))
 
 
 def _weight_of(found: Finding, frequency: "NDArray[np.float64]") -> Weight:
@@ -341,14 +346,17 @@ def spin_readings(table: Table, options: "InputOptions | None" = None) -> SpinRe
         _must_be_possible(table, u, frequency)
     time = time - time[0] if time[0] > _SINCE_1970_S else time
     part = _part_of_times(time, options)
-    doubts = []
+    doubts, repeats = list[Note](), list[Note]()
     if time[part].size:  # else the options are wrong
         try:  # as the fit does; here, too, since one run under the drive spoils no search of a folder
             check_readings(table.column("time_s")[part], frequency[part], None if u is None else u[part])
         except AnalysisError as error:
             raise _in_the_file(_rows(table, part), error) from error
-        doubts = _doubts(table, time[part], frequency[part]) or _of_seconds(table, time[part])
-    return SpinReadings(time, frequency, u, (*doubts, *notes), doubtful=any(map(is_doubt, [*doubts, *notes])))
+        doubts = _doubts(table, time[part], frequency[part]) or _of_marks(table.path.name, frequency[part], table)
+        doubts = doubts or _of_seconds(table, time[part])
+        repeats = _of_repeats(table.path.name, time[part], frequency[part])
+    doubtful = any(map(is_doubt, [*doubts, *notes]))  # of the unit
+    return SpinReadings(time, frequency, u, (*doubts, *repeats, *notes), doubtful=doubtful)
 
 
 def _part_of_times(time: "NDArray[np.float64]", options: "InputOptions | None") -> slice:
@@ -398,24 +406,51 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
             if 1e3 * step * middle >= 1 and table.factors.get("time_s") == 1e-3 else "",
         )  # fmt: skip
         return [_doubt(doubt)]
-    lasts, first, last = float(time[-1] - time[0]), float(frequency[0]), float(frequency[-1])
+    lasts, (first, last) = float(time[-1] - time[0]), frequency[[0, -1]].tolist()
     loss, factor = math.log(first / last) / lasts, table.factors.get("time_s", 1.0)
     if loss > 0 and not is_possible_loss(loss):
         units = possible_times(loss * factor).items()
         say = _say_unit(table, "t", {unit: length_of(lasts / factor * of) for unit, of in units})
         text = "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz in {length}, in air it takes minutes{say}"
         return [_doubt(Text(text, table.path.name, first, last, length_of(lasts), say))]
+    return []
+
+
+def _of_marks(name: str, frequency: "NDArray[np.float64]", table: Table | None = None) -> list[Note]:
+    """Return the doubt about turns counted twice; a warning where a hand may start a top so fast."""
+    first, last = frequency[[0, -1]].tolist()
     numbers = range(2, _MOST_MARKS + 1)  # with which the spin falls to the lower limit, and begins above it
     marks = next((n for n in numbers if _LOWEST_FALL_HZ < last / n < FALLS_BETWEEN_HZ[0] < first / n), None)
-    if first > (FASTEST_BY_HAND_HZ if marks else _FASTEST_HZ):
-        n = marks or math.ceil(first / FASTEST_BY_HAND_HZ)
-        doubt = Text(
-            "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz, no hand starts a top so fast: with {n} marks a "
-            "turn it would go from {begin:.3g} to {end:.3g} Hz{say}",
-            name=table.path.name, first=first, last=last, n=n, begin=first / n, end=last / n, say=_say_marks(table, n),
-        )  # fmt: skip
-        return [_doubt(doubt)]
-    return []
+    by_hand = first <= FASTEST_BY_HAND_HZ
+    if first <= (0.0 if marks else _FASTEST_HZ):
+        return []
+    n = marks or math.ceil(first / FASTEST_BY_HAND_HZ)
+    said = (
+        "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz, and no fall at 21 to 25 Hz is seen; if there are "
+        "{n} marks a turn, it goes from {begin:.3g} to {end:.3g} Hz{say}"
+        if by_hand
+        else "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz, no hand starts a top so fast: with {n} marks "
+        "a turn it would go from {begin:.3g} to {end:.3g} Hz{say}"
+    )
+    say = _say_marks(table, n) if table else ""
+    text = Text(said, name=name, first=first, last=last, n=n, begin=first / n, end=last / n, say=say)
+    return [of_file("marks", text) if by_hand else _doubt(text)]
+
+
+def _of_repeats(name: str, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[Note]:
+    """Return the doubt about equal readings in a row while the spin falls, as of a logger that hung."""
+    steps = np.diff(frequency)
+    falls = -float(np.median(steps))
+    bends = np.round(np.abs(np.diff(steps)), 9)  # the least is the resolution
+    stands = np.flatnonzero((steps[1:] == 0) & (steps[:-1] == 0))
+    if not stands.size or falls < _REPEATS * max(bends[bends > 0].min(initial=math.inf), np.median(bends)):
+        return []
+    first, last = time[[stands[0], stands[0] + 2]].tolist()
+    said = (
+        "{name:s}: three readings from {first:.6g} s to {last:.6g} s are equal, between others the spin falls by "
+        "{hz:n} Hz: did the logger hang, or a drive hold the top? Leave them out"
+    )
+    return [of_file("repeats", Text(said, name, first, last, digits(falls, 2)), "doubt")]
 
 
 def _say_marks(table: Table, marks: int) -> str:
@@ -476,8 +511,23 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
             advice = "Hz, as after a fall or without a pulse: delete such rows"
         line = int(table.lines[error.index])
         return TableError(table.path, "{what} is {value:.9g} {advice}", what, error.value, advice, line=line)
-    spun = "Was the top spun again? `start` and `stop` choose a part" if isinstance(error, NoSpinDown) else ""
-    return TableError(table.path, Sentences(text_of(error), Text(spun)))
+    spun = _why_no_fall(table) if isinstance(error, NoSpinDown) else ""
+    return TableError(table.path, Sentences(text_of(error), spun, between=". "))
+
+
+def _why_no_fall(table: Table) -> Text:
+    """Return where the spin rises, and the likely cause."""
+    time, steps = table.column("time_s"), np.diff(table.column("spin_frequency_hz"))
+    k = int(np.argmax(steps))
+    if np.all(steps >= 0) and steps[k] > 0:
+        return Text("It rises from row to row: were the rows sorted by the spin, or is the drive still on?")
+    if steps[k] > steps.max(initial=0.0, where=np.arange(steps.size) != k) + abs(steps.min()):
+        said = (
+            "It rises by {hz:n} Hz from {first:.6g} s to {last:.6g} s, in lines {line} and {next}: was the top spun "
+            "again? `start` and `stop` choose a part"
+        )
+        return Text(said, digits(float(steps[k]), 3), time[k], time[k + 1], *table.lines[k : k + 2].tolist())
+    return Text("Is the drive still on?")
 
 
 #: What the analysis calls a column, in the words of a file, and what to do.

@@ -13,7 +13,7 @@ import numpy as np
 from analysis.arrays import Array
 from analysis.numbers import digits
 from analysis.remarks import Remark
-from analysis.residuals import independent
+from analysis.residuals import Change, independent
 from analysis.spindown.air import LEAST, MOST, drag_over_disc
 from analysis.spindown.combine import Combined, CombinedLaw
 from analysis.spindown.drag import LAWS, DragLaw
@@ -326,10 +326,9 @@ def doubts_about_law(run: SpinDown, runs: int) -> Iterator[Note]:
         size = min(-change.size, falls) if change.size < 0 < falls else abs(change.size)
         said = Text(
             "no law describes the readings: they {way} by {hz:n} Hz beyond each law between {first:.6g} s and "
-            "{last:.6g} s, or bend there, as of a top that was spun again or touched. Fit a part, by `start` and "
-            "`stop`, or leave it out",
+            "{last:.6g} s, or bend there, as {cause}. Fit a part, by `start` and `stop`, or leave it out",
             way="rise" if change.size > 0 else "fall", hz=digits(size),
-            first=float(run.time[change.first]), last=float(run.time[change.last]),
+            first=float(run.time[change.first]), last=float(run.time[change.last]), cause=_cause(run, change),
         )  # fmt: skip
         before = change.first + 1 >= run.time.size - change.last  # the part with more readings
         end = run.time[change.first if before else change.last]
@@ -339,6 +338,20 @@ def doubts_about_law(run: SpinDown, runs: int) -> Iterator[Note]:
         yield from _drag_in_doubt(drag_over_disc(run))
 
 
+def _cause(run: SpinDown, change: Change) -> str:
+    """Return the causes of a change that fit it, the likeliest first."""
+    periods = 1e3 / run.frequency
+    if np.all(np.abs(periods - np.round(periods)) < _WHOLE_MS):
+        return Text("of periods that are counted in whole milliseconds")
+    if change.size < 0 and change.last == change.first + 1:
+        return Text("where a row was missed and the times were numbered on, or of a top that was touched")
+    if change.size > 0 and 4 * change.last < run.time.size:
+        return Text("of a top that is still driven or held, or was spun again or touched")
+    return Text("of a top that was spun again or touched")
+
+
+#: Periods that are this near to whole milliseconds all are [ms]; a frequency of 1/min, rounded, moves them by 0.01.
+_WHOLE_MS = 0.02
 #: A drag below this multiple of its u is not known; one is out of bounds if it is so by more than the other multiple.
 _KNOWN, _CERTAIN = 2.0, 3.0
 #: By which factor it changes the drag where times are taken for others.

@@ -346,7 +346,7 @@ def test_a_spin_down_is_no_limit_and_runs_without_limits_are_told(tmp_path, samp
     file.write_text("t,f\n" + "".join(f"{k},21.8\n" for k in range(6)), encoding="utf-8")  # a top under the drive
     with pytest.raises(DoesNotSuit, match="the spin does not change with time: is the drive on"):
         LIMIT.analyze([file])
-    with pytest.raises(DataError, match="is the drive still on"):
+    with pytest.raises(DataError, match="Is the drive still on"):
         analyze_suiting([file], {})
     for wrong, says in (("0,40\nca. 9,39\n20,40\n30,39.5\n", "'ca. 9' stands in"), ("0,40\n0,39\n9,40\n", "repeated")):
         file.write_text(f"t,f\n{wrong}", encoding="utf-8")

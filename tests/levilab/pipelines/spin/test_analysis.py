@@ -141,6 +141,16 @@ def test_a_spin_too_fast_for_hand_and_drive_is_doubted(analysis, marks, seconds,
     found = analysis.analyze([path])
     said = [text for text in found.all_warnings if "Hz is too fast for a hand: without a drive there are two" in text]
     assert (len(found.doubts), len(said)) == (doubts, 1)
+    assert analysis is SPIN or found.is_doubtful == bool(doubts)  # as of a table
+
+
+@pytest.mark.parametrize(("marks", "warns"), [(1.4, True), (1, False)])
+def test_a_record_that_ends_at_twice_the_lower_limit_may_be_of_two_marks(marks, warns, tmp_path):
+    turns = marks * coasting_turns(t := np.linspace(0, 60, 60_001))
+    times = np.interp(np.arange(1, int(turns[-1])), turns, t)
+    (tmp_path / "marks.csv").write_text("pulse time [s]\n" + "".join(f"{x:.7f}\n" for x in times), encoding="utf-8")
+    said = SPINDOWN.analyze([tmp_path / "marks.csv"]).all_warnings
+    assert any("if there are 2 marks a turn" in text for text in said) == warns
 
 
 def test_windows_whose_turns_count_once_and_twice_are_doubted_where_they_are_used(tmp_path):

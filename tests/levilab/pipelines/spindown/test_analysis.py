@@ -265,6 +265,24 @@ def test_a_change_counts_once_for_each_run_beside_it(tmp_path):
     assert f"they fall by {first - last:.2g} Hz beyond each law" in doubt
 
 
+@pytest.mark.parametrize(
+    ("between", "size", "whole_ms", "cause"),
+    [
+        ((5, 6), -1.0, False, "as where a row was missed and the times were numbered on, or"),
+        ((1, 3), 1.0, False, "as of a top that is still driven or held, or"),
+        ((9, 12), 1.0, False, "as of a top that was spun again or touched"),
+        ((5, 6), -1.0, True, "as of periods that are counted in whole milliseconds"),
+    ],
+)
+def test_a_change_has_the_causes_that_fit_it(between, size, whole_ms, cause, tmp_path):
+    run = SPINDOWN.analyze([spin_down_csv(tmp_path / "a.csv", jump=3.0)]).runs[0]
+    change = replace(run.verdict.change, first=between[0], last=between[1], size=size)
+    if whole_ms:
+        run = replace(run, frequency=1e3 / np.round(1e3 / run.frequency))
+    (doubt,) = doubts_about_law(replace(run, verdict=replace(run.verdict, change=change)), 1)
+    assert cause in doubt
+
+
 @pytest.mark.parametrize(("first", "option"), [(7, {"start_s": 50732.8}), (9, {"stop_s": 50734.7})])
 def test_a_doubt_about_a_bend_advises_the_part_with_more_readings_to_its_last_one(first, option, tmp_path):
     run = SPINDOWN.analyze([spin_down_csv(tmp_path / "a.csv", jump=3.0)]).runs[0]

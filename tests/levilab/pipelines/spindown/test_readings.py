@@ -308,3 +308,38 @@ def test_u_from_turns_since_the_start_is_too_large_by_what_its_note_says(tmp_pat
     scatter, u = np.std([one.value for one in found], ddof=1), np.mean([one.u for one in found])
     assert 2 < u / scatter < 8
     assert np.mean([one.value for one in found]) == pytest.approx(c1, abs=u)
+
+
+@pytest.mark.parametrize(
+    ("stands", "places", "asks"),
+    [((6, 7, 8), 2, True), ((0, 1, 2), 2, True), ((6, 7), 2, False), ((6, 7, 8), 0, False)],
+)
+def test_three_equal_readings_in_a_row_are_a_doubt_where_the_spin_falls_by_much_more(stands, places, asks, tmp_path):
+    time = np.arange(0.0, 171.0, 10.0)
+    frequency = 38 / (1 + 0.00178 * time) ** 2 + np.random.default_rng(1).normal(0, 0.03, time.size)
+    frequency[list(stands)] = frequency[stands[0]]
+    rows = "".join(f"{t},{f:.{places}f}\n" for t, f in zip(time, frequency, strict=True))
+    readings = spin_readings(table_of(tmp_path, f"t [s],f [Hz]\n{rows}"))
+    assert ["readings from" in one for one in readings.warnings if is_doubt(one)] == [True] * asks
+    assert not readings.doubtful  # the unit is known
+
+
+@pytest.mark.parametrize(("first", "last", "warns"), [(56, 44.4, True), (56, 52, False), (49, 44.4, False)])
+def test_a_count_that_ends_at_twice_the_lower_limit_may_be_of_two_marks(first, last, warns, tmp_path):
+    readings = spin_readings(table_of(tmp_path, f"t [s],f [Hz]\n0,{first}\n40,{(first + last) / 2}\n80,{last}\n"))
+    said = ["if there are 2 marks a turn, it goes from 28 to 22.2 Hz; `columns` = " in one for one in readings.warnings]
+    assert (said, readings.doubtful) == ([True] * warns, False)
+
+
+@pytest.mark.parametrize(
+    ("frequency", "says"),
+    [
+        ([30, 30, 30, 30, 30, 30], "Is the drive still on?"),
+        ([30, 31, 32, 33, 34, 35], "were the rows sorted by the spin, or is the drive still on?"),
+        ([30, 29, 28, 38, 37, 36], "It rises by 10 Hz from 2 s to 3 s, in lines 4 and 5: was the top spun again?"),
+    ],
+)
+def test_a_spin_that_does_not_fall_has_the_cause_that_fits_it(frequency, says, tmp_path):
+    rows = "".join(f"{t},{f}\n" for t, f in enumerate(frequency))
+    with pytest.raises(TableError, match=re.escape(says)):
+        spin_readings(table_of(tmp_path, f"t [s],f [Hz]\n{rows}"))
