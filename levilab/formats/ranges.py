@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple, Self
 
-from levilab.texts.text import Text
+from levilab.texts.text import Sentences, Text
 
 
 class Unit(NamedTuple):
@@ -100,11 +100,11 @@ def problem_of(key: str, value: float, factor: float = 1.0, *, asks: bool = True
     said = Text(
         "a number from {low:g} to {high:g}{unit:s} is expected", low / factor, high / factor, f" {own.sign}".rstrip()
     )
-    for one in units:
-        meant = typed * one.factor + one.shift
-        if asks and one is not own and low <= meant <= high and meant:
-            asked = "Were {units} meant?  {typed:g} {sign:s} are {meant:.6g}"
-            return Text(
-                "{said}.  {asked}", said, Text(asked, units=one.name, typed=typed, sign=one.sign, meant=meant / factor)
-            )
-    return said
+    meant = [(one, typed * one.factor + one.shift) for one in units if asks and one is not own]
+    fitting = [(one, size / factor) for one, size in meant if low <= size <= high and size]
+    if not fitting:
+        return said
+    one, size = fitting[0]
+    asked = Text("Were {units} meant?  {typed:g} {sign:s} are {meant:.6g}", one.name, typed, one.sign, size)
+    also = [Text("{typed:g} {sign:s} are {meant:.6g}", typed, one.sign, size) for one, size in fitting[1:2]]
+    return Text("{said}.  {asked}", said, Sentences(asked, *also, between=", "))

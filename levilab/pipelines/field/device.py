@@ -31,8 +31,8 @@ def known_of(source: Source[FieldReadings], device: Device | None) -> Known:
     base = _merged(source, BaseTable, _OF_BASE, of_run, device.base if device else None)
     if base.inner_radius_m is None or base.outer_radius_m is None:
         raise DataError(
-            "{path:s}: the radii of the base are not known: write [base] with inner_radius_m and outer_radius_m into a "
-            "file, as sample_data/device.toml, and give it to levilab analyze field with `device`",
+            "{path:s}: the radii of the base are not known: write three lines with yours into a file, [base], "
+            "inner_radius_m = 0.030 and outer_radius_m = 0.055, and give it to levilab analyze field with `device`",
             path=source.path,
         )
     magnetometer = device.magnetometer if device else None

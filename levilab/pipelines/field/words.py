@@ -217,7 +217,8 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Weighed] = MappingProxyType(
         "no ring": Weighed(
             lambda left, largest: Text(
                 "the residuals are {left:n} mT (rms) where the field is {largest:n} mT at most: no ring magnet has "
-                "such a field; are heights, unit and radii right, and is nothing magnetic beside the base?",
+                "such a field; are heights and unit right, are the radii no diameters, and is nothing magnetic "
+                "beside the base?",
                 left=digits(1e3 * left),
                 largest=digits(1e3 * largest),
             ),

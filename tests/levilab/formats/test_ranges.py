@@ -45,7 +45,7 @@ def test_the_command_line_gives_the_same_answer(levilab):
         ({"rim_m": 29}, "Were millimetres meant? 29 mm are 0.029"),
         ({"near": 2400}, "Were turns per minute meant? 2400 rpm are 40"),
         ({"clock_u": 20}, "Were millionths meant? 20 ppm are 2e-05"),
-        ({"distance_m": 50}, "Were centimetres meant? 50 cm are 0.5"),
+        ({"distance_m": 50}, "Were centimetres meant? 50 cm are 0.5, 50 mm are 0.05"),
     ],
 )
 def test_an_option_in_another_unit_is_asked_about(given, said):
