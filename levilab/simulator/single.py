@@ -177,16 +177,23 @@ def simulate(
 
 
 def simulate_at_step(
-    scene: Scene, duration: float, step: float, rate: float | None, *, errors: bool
+    scene: Scene,
+    duration: float,
+    step: float,
+    rate: float | None,
+    *,
+    errors: bool,
+    start: Array | None = None,
+    memory: Array | None = None,
 ) -> tuple[Run, Array]:
     """Simulate a scene once, at one step [s]; return the motion and its estimated errors of place [m] and axis [rad].
 
     Raises:
         LeftRange: the motion leaves the numbers' range.
     """
-    start = start_of(scene)
-    model = model_of(scene, start[R])
-    problem = Problem(scene, model, start, scheme_for(None, model))
+    state = start_of(scene) if start is None else start
+    model = model_of(scene, state[R])
+    problem = Problem(scene, model, state, scheme_for(None, model), memory)
     run = _run(problem, _Wanted(duration, rate, None, None), step)
     return run, np.sum(_errors(problem, run, step), axis=0) if errors else np.full(2, math.nan)
 

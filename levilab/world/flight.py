@@ -14,7 +14,7 @@ from levilab.simulator.kernels.motion import ARM, TIME, L, N, R, V
 from levilab.simulator.keys import SceneError
 from levilab.simulator.model import with_attitude
 from levilab.simulator.scene import Scene
-from levilab.simulator.single import simulate
+from levilab.simulator.single import simulate, simulate_at_step
 from levilab.simulator.start import start_of
 from levilab.simulator.trajectory import Trajectory
 from levilab.world.timeline import Timeline
@@ -126,7 +126,6 @@ class Flight:
         self._scene = with_attitude(scene.changed(without_drive))
         self._put_back_after_s, self._stem_height = put_back_after_s, stem_height_m
         self._pieces: Timeline[_Flying | _Absent] = Timeline(-math.inf, _Absent(-math.inf))
-        self._step: float | None = None
         # what comes next: a top in this state, or none until a new one is put there; and when [s]
         self._state: Array | None = (first := self._start_state(start))
         self._first_height = float(first[R][2])
@@ -163,7 +162,6 @@ class Flight:
             values: dotted keys of the scene, and their values.
         """
         now = self._piece_at(time)
-        self._step = None  # another drive may need another step
         if isinstance(now, _Flying):
             self._pieces.cut(time)
             samples = self._samples_of(now)
@@ -181,7 +179,7 @@ class Flight:
         """Start the top again at this time, as the scene says, if it has fallen."""
         if isinstance(self._piece_at(time), _Absent):
             self._pieces.cut(math.nextafter(time, math.inf))
-            self._state, self._step, self._known_until = self._put_by_hand(time), None, time
+            self._state, self._known_until = self._put_by_hand(time), time
 
     def take_away(self, time: float) -> None:
         """Let no top be there from this time on, neither up nor where it fell."""
@@ -328,7 +326,7 @@ class Flight:
         """Simulate the motion up to this time [s]."""
         while self._known_until <= until:
             if self._state is None:
-                self._state, self._step = self._start_state(self._known_until), None
+                self._state = self._start_state(self._known_until)
             self._advance(self._state)
 
     def _start_state(self, time: float) -> Array:
@@ -353,7 +351,8 @@ class Flight:
     def _advance(self, state: Array) -> None:
         begin = float(state[TIME])
         try:
-            motion = self._motion(state)
+            # at a step of its own: to check that of the last piece would take two runs more
+            motion = simulate(self._scene, PIECE_S, tolerance=TOLERANCE, rate=RATE, start=state, memory=self._memory)
         except LeftRange:  # it has hit the base, where the field is infinite
             self._fall(begin, state)
             return
@@ -367,17 +366,6 @@ class Flight:
             self._fall(motion.fell.time, motion.fell.state)
         else:
             self._state, self._known_until = motion.states[-1].copy(), float(motion.time[-1])
-
-    def _motion(self, state: Array) -> Trajectory:
-        """Simulate a piece with the step of the last one, or with a new one where that is too long."""
-        options: dict[str, Any] = {"tolerance": TOLERANCE, "rate": RATE, "start": state, "memory": self._memory}
-        if self._step is not None:
-            motion = simulate(self._scene, PIECE_S, step=self._step, **options)
-            if motion.accuracy.reached:
-                return motion
-        motion = simulate(self._scene, PIECE_S, **options)
-        self._step = motion.accuracy.step
-        return motion
 
     def _fall(self, time: float, state: Array | None = None) -> None:
         """Let no top be up from a time on.  state: of one that fell, shape (18,); None: it was taken away."""
@@ -406,8 +394,10 @@ def _state_within(piece: _Flying, time: float) -> tuple[Array, Array | None]:
     """Return the state at a time within a piece, shape (18,), and the memory of its drive."""
     state, memory = piece.state.copy(), piece.memory
     if time - piece.start > _AT_ONCE:
-        motion = simulate(piece.scene, time - piece.start, rate=None, step=piece.step, start=state, memory=memory)
-        state, memory = motion.states[-1].copy(), motion.memory
+        run, _ = simulate_at_step(
+            piece.scene, time - piece.start, piece.step, None, errors=False, start=state, memory=memory
+        )
+        state, memory = run.states[-1].copy(), run.stops.memory
     state[TIME] = time
     return state, memory
 

@@ -183,16 +183,23 @@ def test_a_scene_without_motion_is_refused():
         Flight(preset("friction").changed({"observed": "spin"}))
 
 
-def test_the_step_that_a_fast_drive_needs_goes_with_it():
+def test_each_piece_is_simulated_once_at_the_step_that_its_drive_needs(monkeypatch):
+    steps = []
+
+    def count(*scene, **options):
+        motion = simulate(*scene, **options)
+        steps.append(motion.accuracy.step)
+        return motion
+
     flight = Flight(TILTED)
-    flight.simulate_until(2.0)
-    usual = flight._step
-    flight.change(3.0, SINE | {"frequency_hz": 900.0})
-    flight.simulate_until(5.0)
-    assert flight._step < usual / 2
-    flight.change(5.0, OFF)
-    flight.simulate_until(8.0)
-    assert flight._step == pytest.approx(usual, rel=0.3)
+    monkeypatch.setattr("levilab.world.flight.simulate", count)
+    for begins, drive in ((0.0, OFF), (2.0, SINE | {"frequency_hz": 900.0}), (4.0, OFF)):
+        flight.change(begins, drive)
+        flight.simulate_until(begins + 1.5)
+    assert len(steps) == 9  # two pieces of each drive, and the one that its change cuts off
+    usual, fast, again = steps[2::3]
+    assert fast < usual / 2
+    assert again == pytest.approx(usual, rel=0.3)
 
 
 # --- the drive of the bench ---
