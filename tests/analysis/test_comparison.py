@@ -69,8 +69,8 @@ def test_values_of_any_size_are_compared_alike():
 
 
 def test_a_value_that_holds_the_whole_mean_is_compared_with_the_others():
-    distances = compare([1.0, 1.001], [1e-12, 1e-3]).distances
-    assert distances == pytest.approx((-1.0, 1.0), rel=1e-9)
+    distances = compare([1.0, 1001.0], [1e-9, 1e3]).distances  # of which tops differ by 10⁻⁴ u
+    assert distances == pytest.approx((-1.0, 1.0), rel=1e-4)
 
 
 def test_tops_that_differ_are_in_the_distances():
@@ -97,6 +97,16 @@ def test_groups_are_seldom_far_off_by_chance(n, between):
     found = [compare(x + of * random.standard_normal(n), of).distances for x, of in zip(tops, u, strict=True)]
     share = np.mean(np.abs(np.array(found)) > 3)
     assert share < 0.0027 + 4 * math.sqrt(0.0027 / 2400)  # four standard errors of 2400
+
+
+@pytest.mark.parametrize("between", [0.0, 0.02, 0.05])
+def test_two_groups_are_seldom_far_apart_as_tops_differ_and_a_factor_is_seen(between):
+    random = np.random.default_rng(28)
+    values, u = 1 + between * random.standard_normal((600, 2)), random.uniform(0.001, 0.02, (600, 2))
+    values += u * random.standard_normal(u.shape)
+    found = [compare(*one).distances for one in zip(values, u, strict=True)]
+    assert np.mean(np.abs(np.array(found)) > 3) < 0.0027 + 4 * math.sqrt(0.0027 / 600)  # four standard errors of 600
+    assert min(np.abs(compare([1, 3], [0.005, 0.015]).distances)) > 3
 
 
 def test_the_probability_of_a_gross_error_is_that_of_its_mixture_over_all_means_and_scatters():
