@@ -233,7 +233,9 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
     quantities = tuple(one for one in found_of if one.together)
     if why := analysis.apart(found):
         quantities = tuple(
-            replace(one, mean=None, together=None, apart=why, wrong=(0.0,) * len(groups))
+            replace(
+                one, mean=None, together=None, apart=why, wrong=(0.0,) * len(groups), used=(*map(bool, one.estimates),)
+            )
             if one.name in analysis.compared
             else one
             for one in quantities
@@ -279,6 +281,9 @@ def _with_command(text: str, analysis: Analysis[Any], source: Source[Any], optio
     """Return a doubt, with the command that follows its advice, if a program can say it."""
     if not isinstance(text, Note) or not text.options:
         return plain_text(text)
+    if answer := text.options.get("columns"):
+        said = '{reason}: levilab open {typed:s} --columns "{answer:s}" --keep answers so for all commands'
+        return Text(said, plain_text(text), as_typed(source.path), answer)
     typed = " ".join(typed_options(replace(options, **text.options)))
     said = "{doubt}; levilab analyze {name:s} {path:s} {typed:s} fits a part, and levilab class then takes its result"
     return Text(said, plain_text(text), analysis.name, as_typed(source.path), typed)
@@ -395,7 +400,9 @@ def _beside_others(one: Compared, k: int) -> str:
     mine, others = one.estimates[k], [*filter(None, one.estimates[:k] + one.estimates[k + 1 :])]
     median, u = (statistics.median(each) for each in zip(*((each.value, each.u) for each in others), strict=True))
     if abs(median) > FAR * u:
-        said = "{symbol}: {factor:n} times the median of the others, more than tops differ"
+        said = "{symbol}: {factor:n} times the median of the others"
+        if one.wrong[k] > _WRONG:
+            said = "{symbol}: {factor:n} times the median of the others, more than tops differ"
         return Text(said, symbol=one.symbol, factor=digits(mine.value / median))  # type: ignore[union-attr]
     return _from_others(one, (mine.value - median) / math.hypot(mine.u, u))  # type: ignore[union-attr, arg-type]
 

@@ -55,10 +55,10 @@ def _name_for_people(source: Source[R], name: str, sources: Sequence[Source[R]])
 
 def by_group(sources: Sequence[Source[R]]) -> Sequence[Source[R]]:
     """Return the runs of groups in the order of their names, "Group 2" before "Group 10", those of no group last."""
-    return sorted(sources, key=lambda one: (not one.group, [*_natural(one.group)]))
+    return sorted(sources, key=lambda one: (not one.group, [*natural(one.group)]))
 
 
-def _natural(name: str) -> Iterator[tuple[float, str]]:
+def natural(name: str) -> Iterator[tuple[float, str]]:
     """Yield the parts of a name, numbers as numbers, so that names are in a person's order."""
     for digits, letters in re.findall(r"([0-9]+)|([^0-9]+)", name):
         yield (float(digits), "") if digits else (math.inf, letters.casefold())

@@ -383,8 +383,9 @@ def _without_rest(table: Table) -> Table:
     return replace(_rows(table, slice(end)), warnings=(*table.warnings, of_file("rest", note, "advice")))
 
 
-def _doubt(text: str) -> Note:
-    return Note("unit", text, weight="doubt", names_input=True)
+def _doubt(text: str, say: str = "") -> Note:
+    """Return a doubt; say: the advice in it, whose options are those of the doubt."""
+    return Note("unit", text, weight="doubt", names_input=True, options=say.options if isinstance(say, Note) else {})
 
 
 def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[Note]:
@@ -396,7 +397,7 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
         if not say and is_possible_spin(1e3 * middle):
             say = "; if its point stands behind the thousands, write the numbers without it"
         text = "{name:s}: the spin is about {spin:n} Hz, a Levitron spins at 20 to 60 Hz{say}"
-        return [_doubt(Text(text, name=table.path.name, spin=digits(middle, 4), say=say))]
+        return [_doubt(Text(text, name=table.path.name, spin=digits(middle, 4), say=say), say)]
     if step * middle < 1:  # nor does a counter give a reading in less
         doubt = Text(
             "{name:s}: the readings lie {step:.3g} ms apart, the top needs {turn:.3g} ms for a turn; if the times are "
@@ -412,7 +413,7 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
         units = possible_times(loss * factor).items()
         say = _say_unit(table, "t", {unit: length_of(lasts / factor * of) for unit, of in units})
         text = "{name:s}: the spin goes from {first:.4g} to {last:.4g} Hz in {length}, in air it takes minutes{say}"
-        return [_doubt(Text(text, table.path.name, first, last, length_of(lasts), say))]
+        return [_doubt(Text(text, table.path.name, first, last, length_of(lasts), say), say)]
     return []
 
 
@@ -434,7 +435,7 @@ def _of_marks(name: str, frequency: "NDArray[np.float64]", table: Table | None =
     )
     say = _say_marks(table, n) if table else ""
     text = Text(said, name=name, first=first, last=last, n=n, begin=first / n, end=last / n, say=say)
-    return [of_file("marks", text) if by_hand else _doubt(text)]
+    return [of_file("marks", text) if by_hand else _doubt(text, say)]
 
 
 def _of_repeats(name: str, time: "NDArray[np.float64]", frequency: "NDArray[np.float64]") -> list[Note]:
@@ -457,15 +458,21 @@ def _say_marks(table: Table, marks: int) -> str:
     """Return the advice to take a part of the unit of the spin; nothing for periods."""
     factor, n = table.factors.get("spin_frequency_hz"), table.numbers.get("spin_frequency_hz")
     per, unit = (PER_MINUTE, "min") if factor == PER_MINUTE else (1, "s")
+    if not factor or not n:
+        return ""
     said = '; `columns` = "f={n} [1/{length:g}{unit:s}]" divides the numbers by {marks}'
-    return Text(said, n, marks * per / factor, unit, marks) if factor and n else ""
+    length = marks * per / factor
+    return Note("marks", Text(said, n, length, unit, marks), options={"columns": f"f={n} [1/{length:g}{unit}]"})
 
 
 def _say_unit(table: Table, key: Literal["t", "f"], units: Mapping[str, str]) -> str:
     """Return the advice to say the unit of a column, with what its numbers are in each."""
     n = table.numbers.get(SHORTHANDS[key], 0)
     meant = tuple(Text('"{key:s}={n} [{unit:s}]" ({value})', key, n, unit, value) for unit, value in units.items())
-    return Text("; say the unit: `columns` = {columns}", columns=meant) if meant and n else ""
+    if not meant or not n:
+        return ""
+    answer = {"columns": f"{key}={n} [{next(iter(units))}]"} if len(units) == 1 else {}
+    return Note("say unit", Text("; say the unit: `columns` = {columns}", columns=meant), options=answer)
 
 
 #: Beyond these a number is no measurement: 3000 years (a clock in ms since 1970 shows 1.8e12), and spins whose powers

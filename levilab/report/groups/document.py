@@ -17,7 +17,7 @@ from levilab.files import check_writable
 from levilab.formats.texts import locate
 from levilab.pipelines.analyzed import A
 from levilab.pipelines.inputs.files import data_files, is_archive_of
-from levilab.pipelines.inputs.names import each_once, short_paths, with_short_names
+from levilab.pipelines.inputs.names import by_group, each_once, natural, short_paths, with_short_names
 from levilab.pipelines.inputs.search import Found
 from levilab.pipelines.inputs.unread import (
     OTHER_COLUMNS,
@@ -190,12 +190,15 @@ def _with_copies(of: Class, copies: Mapping[str, Path]) -> Class:
 
 
 def _with_folders_as_groups(results: Results, folder_of: Callable[[Path], str]) -> Results:
-    """Return results whose files have the group of their folder, as Anna/readings.csv."""
+    """Return results in the order of their groups, where files have that of their folder, as Anna/readings.csv."""
     done = []
     for analysis, found in results:
-        sources = [one if one.run else replace(one, folder=folder_of(one.path)) for one in found.sources]
-        named = with_short_names(sources) if any(one.folder for one in sources) else found.sources
-        done.append((analysis, replace(found, sources=named)))
+        each = [one if one.run else replace(one, folder=folder_of(one.path)) for one in found.sources]
+        sources = by_group(sorted(each, key=lambda one: [*natural(one.path.name)]))
+        numbers = [*map([one.name for one in each].index, (one.name for one in sources))]
+        ordered = _of_sources(analysis, [found], [found.sources[k] for k in numbers], found.warnings, numbers)
+        named = with_short_names(sources) if any(one.folder for one in sources) else ordered.sources
+        done.append((analysis, replace(ordered, sources=named)))
     return done
 
 
@@ -256,9 +259,13 @@ def _without_spins_of_falls(results: Results) -> Results:
 
 
 def _of_sources(
-    analysis: Analysis[A], results: Sequence[A], sources: Sequence[Source[Any]], warnings: Iterable[str]
+    analysis: Analysis[A],
+    results: Sequence[A],
+    sources: Sequence[Source[Any]],
+    warnings: Iterable[str],
+    order: Sequence[int] = (),
 ) -> A:
-    """Return the result of some inputs of results."""
+    """Return the result of some inputs of results; order: the numbers of all inputs of one result in another order."""
     done = {
         source.name: (source, run, origin)
         for one in results
@@ -267,7 +274,8 @@ def _of_sources(
     skipped = tuple(skipped for one in results for skipped in one.skipped)
     together = Found(tuple(sources), tuple(warnings), skipped)
     paths = [source.path for source in sources]
-    return analysis.gather(paths, together, results[0].options, lambda source: done[source.name])
+    recall = (lambda _: analysis.renumber(results[0].combined, order)) if order else None
+    return analysis.gather(paths, together, results[0].options, lambda source: done[source.name], recall)
 
 
 def _with_other_readings(analysis: Analysis[A], first: A, found: A) -> A:
@@ -352,26 +360,27 @@ def _short_table(of: Class) -> Table:
 
 def _values(of: Class, quantity: Compared) -> Tabular:
     """Return a row for each group: its value, how far it lies from the others, and from the truth."""
-    estimates = [quantity.show(one.value, one.u) if one else None for one in quantity.estimates]
+    unread = [None] * len(of.unread)
+    estimates = [*(quantity.show(one.value, one.u) if one else None for one in quantity.estimates), *unread]
     mean, difference = (
         quantity.show(one.value, one.u) if one else None for one in (quantity.mean, quantity.difference)
     )
-    marks = [*(mark.word for mark in of.marks), "", ""]
-    columns = [column([*estimates, mean, difference]), [*map(_distance, quantity.from_class), "", ""]]
+    marks = [*(mark.word for _, mark in _each(of)), "", ""]
+    columns = [column([*estimates, mean, difference]), [*map(_distance, [*quantity.from_class, *unread]), "", ""]]
     heads = ["group", quantity.head, _FROM_CLASS]
     if of.knows_truth:
         truth, distance, _ = quantity.truth or (None, None, None)
         columns += [
-            [*map(truth_text, map(quantity.show, (*quantity.truths, truth)), (*estimates, mean)), ""],
-            [*map(_distance, quantity.from_truth), "", _distance(distance)],
+            [*map(truth_text, map(quantity.show, (*quantity.truths, *unread, truth)), (*estimates, mean)), ""],
+            [*map(_distance, [*quantity.from_truth, *unread]), "", _distance(distance)],
         ]
         heads += [_TRUTH, _FROM_TRUTH]
     columns, numbers, heads = [marks, *columns], heads[1:], [heads[0], "result", *heads[1:]]  # what a phone shows first
-    names = [*(group.source.name for group in of.groups), "class mean", "mean − truth"]
-    kinds = [*(_ROWS[mark.word] for mark in of.marks), "together", "together"]
+    names = [*(name for name, _ in _each(of)), "class mean", "mean − truth"]
+    kinds = [*(_ROWS[mark.word] for _, mark in _each(of)), "together", "together"]
     rows = [Row(cells, kind) for kind, cells in zip(kinds, zip(names, *columns, strict=True), strict=True)]
     several = len(of.groups) > 1
-    rows = rows[: len(of.groups) + (several and mean is not None) + (several and difference is not None)]
+    rows = rows[: len(estimates) + (several and mean is not None) + (several and difference is not None)]
     note = "value(u): the digits in parentheses are u of the last digits."
     limits = quantity.limits(FAR)
     if max(limits) > FAR:

@@ -138,6 +138,22 @@ def test_a_folder_is_the_group_of_its_files(tmp_path):
         assert "readings.csv," not in page.split("Made by")[0].replace("readings.csv, line", "")
 
 
+def test_groups_are_in_the_order_of_their_numbers_and_one_that_was_not_read_has_its_row(tmp_path):
+    (tmp_path / "files").mkdir()
+    for k in (1, 3, 10):
+        (tmp_path / f"Group {k}").mkdir()
+        spin_down_csv(tmp_path / f"Group {k}" / "ours.csv", seed=k)
+        spin_down_csv(tmp_path / "files" / f"g{k}.csv", seed=k)
+    (tmp_path / "Group 4").mkdir()
+    (tmp_path / "Group 4" / "ours.csv").write_text("t [s],f [Hz]\n0,38\n10,37.2\n20,3x.5\n30,35\n", "utf-8")
+    page = write_class(sorted(tmp_path.glob("Group *")), tmp_path / "class.html").read_text(encoding="utf-8")
+    values = Page(page).text.split("from the others [u]")[1]
+    assert re.search(r"Group 1 good.*Group 3 good.*Group 10 good.*Group 4 repeat — —\s+class mean", values, re.DOTALL)
+    shown = []
+    write_class([tmp_path / "files" / f"g{k}.csv" for k in (10, 3, 1)], tmp_path / "c.html", show=shown.append)
+    assert [row.cells[0] for row in shown[0].rows] == ["g1.csv", "g3.csv", "g10.csv"]
+
+
 def test_the_only_folder_beside_runs_is_a_group(of_three, tmp_path):
     shutil.copytree(of_three, tmp_path / "class")
     (tmp_path / "class" / "Group 5").mkdir()
@@ -303,7 +319,8 @@ def test_held_spins_are_compared_by_their_drag_and_no_residuals_are_spoken_of(tm
     assert "Residuals" not in write_class([root], tmp_path / "class.html").read_text(encoding="utf-8")
 
 
-def test_groups_that_held_different_spins_have_no_mean_drag(tmp_path):
+def test_groups_that_held_different_spins_have_no_mean_drag(tmp_path, monkeypatch):
+    monkeypatch.setattr("levilab.report.beside.gross_errors", lambda values, _: np.arange(len(values)) == 1)
     for k, run in enumerate(sorted((SAMPLE_DATA / "hold").glob("*-hz"))):
         folder = tmp_path / "class" / run.name
         shutil.copytree(run, folder)
@@ -626,8 +643,11 @@ def test_a_value_far_beyond_the_others_repeats_and_is_in_no_mean(tmp_path):
     of = compared(class_of_files(tmp_path, [(3, 1), (0.3, 1), (1, 1), (1, 1), (1, 1), (0.75, 1)]))
     assert [mark.word for mark in of.marks] == [REPEAT, REPEAT, GOOD, GOOD, GOOD, LOOK]
     assert [mark.why for mark in of.marks if mark.why] == [
-        (f"C₃/₂: {factor} times the median of the others, more than tops differ",) for factor in ("0.33", "3.3", "1.3")
-    ]
+        (f"C₃/₂: {factor} times the median of the others{beyond}",)
+        for factor, beyond in (
+            ("0.33", ", more than tops differ"), ("3.3", ", more than tops differ"), ("1.3", ""),
+        )
+    ]  # fmt: skip
     assert of.quantities[0].used == (False, False, True, True, True, True)
 
 
@@ -685,6 +705,15 @@ def test_the_command_that_a_doubt_advises_gives_the_class_another_result(tmp_pat
     write_class([tmp_path], tmp_path / "class.html", tell=(told := []).append)
     assert "no law describes" not in str(told)
     assert "are fitted, as asked" in str(told)
+
+
+def test_the_command_that_a_doubt_of_two_marks_advises_makes_the_group_good(tmp_path, levilab):
+    class_of_files(tmp_path, [(1, 1), (1, 1), (1, 2)])
+    write_class([tmp_path], tmp_path / "class.html", tell=(told := []).append)
+    (command,) = re.findall(r"levilab (open \S*G2.csv --columns .* --keep) answers", str(told))
+    levilab(*shlex.split(command))
+    write_class([tmp_path], tmp_path / "class.html", tell=(told := []).append)
+    assert "G2.csv: G2.csv" not in str(told)
 
 
 def test_what_lies_far_beyond_the_others_is_an_arrow_with_its_value_and_stretches_no_axis(tmp_path):
