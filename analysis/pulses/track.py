@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.arrays import Array
 from analysis.errors import NotPositive
-from analysis.pulses.errors import TooFewPulses
+from analysis.pulses.errors import OnlyHum, TooFewPulses
 from analysis.pulses.regression import median
 from analysis.pulses.result import Finding, SpinFrequency
 from analysis.pulses.times import FEWEST, check_times, spin_of_times
@@ -158,19 +158,25 @@ def track_of_blocks(
         raise NotPositive(quantity="sample rate", unit="1/s", index=0, value=rate)
     _check_window(window)
     size = max(round(window * rate), 16)
-    total = 0
+    total, hum = 0, False
 
     def spins() -> Iterator[SpinFrequency | tuple[float, float]]:
-        nonlocal total
+        nonlocal total, hum
         for piece in _pieces(blocks, size):
             begin = start + total / rate
             total += piece.size
             try:
                 yield spin_of_trace(piece, rate, start=begin, method=method)
-            except TooFewPulses:
+            except TooFewPulses as error:
+                hum = hum or isinstance(error, OnlyHum)
                 yield begin, start + total / rate
 
-    return _connect(spins(), 0, size / rate)
+    try:
+        return _connect(spins(), 0, size / rate)
+    except TooFewPulses as error:
+        if hum:
+            raise OnlyHum(seen=error.seen, needed=error.needed, duration=error.duration) from None
+        raise
 
 
 def _pieces(blocks: Iterable[ArrayLike], size: int) -> Iterator[Array]:

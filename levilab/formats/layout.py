@@ -277,7 +277,7 @@ def _header(above: list[Line], width: int) -> int | None:
 
 
 #: A word before a comma, as blanks separate it, or before the end of a sentence.
-_SENTENCE = re.compile(r"\w{2,}(?:,\s|[.!?](?:\s+[^\W\d_a-z]|\s*$))")
+_SENTENCE = re.compile(r"(?!N[ro]\.)\b\w{2,}(?:,\s|[.!?](?:\s+[^\W\d_a-z]|\s*$))")
 
 
 def _is_sentence(fields: Sequence[str], width: int) -> bool:

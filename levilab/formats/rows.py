@@ -346,7 +346,9 @@ def _clocks(
         )
         return times / 60
     if CLOCK.fullmatch(first) and float(times[there].max()) < day:
-        times[there] += day * np.cumsum(np.diff(times[there], prepend=times[there][0]) < -day / 2)
+        steps = np.diff(read, prepend=read[0])
+        noon = (steps > -day / 2) & (steps < -day * 11 / 24)  # 12:59 and 1:00, of a clock with 12 hours
+        times[there] += day * np.cumsum((steps <= -day / 2) + noon / 2)
         return np.asarray(times - read[0] * (read[0] >= _HOUR_S / column.factor))
     return times
 
@@ -438,14 +440,20 @@ def _number(path: Path, layout: Layout, column: Column, line: int, cell: str) ->
         what = "column '{label:s}' holds a formula without its value: open the file in Excel or LibreOffice, save it"
         raise TableError(path, what, shorten(column.label), line=line)
     no_number = "'{cell:s}' stands in column '{column:s}', {expected} is expected: {do}"
-    do = "correct it, or leave it empty if the reading was missed"
+    usual = "correct it, or leave it empty if the reading was missed"
     if column.name == "time_s":
-        do = "write times as 62.5, 1:02.5, 14:05:12 or 2026-11-23 14:05:12"
-    if "±" in cell:
-        do = "write what stands behind the ± into a column of its own, with the title u"
+        usual = "write times as 62.5, 1:02.5, 14:05:12 or 2026-11-23 14:05:12"
+    do = next((advice for seen, advice in _ADVICE.items() if re.match(seen, cell)), usual)
     expected = EXPECTED[layout.dialect.decimal]
     said = Said(no_number, cell=shorten(cell), column=shorten(column.label), expected=expected, do=do)
     raise (TableError if _NUMBER_IN.search(cell) and cell[0] != "#" else _Words)(path, said, line=line)
+
+
+#: What to do about a cell that is no number, by how it looks.
+_ADVICE = {
+    ".*±": "write what stands behind the ± into a column of its own, with the title u",
+    r"\d{4}-\d\d-\d\d": "a spreadsheet takes 30.1 for a date: format the column as text, and type the numbers again",
+}
 
 
 def _other_unit(column: Column, cell: str) -> Said:

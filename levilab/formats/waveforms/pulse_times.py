@@ -26,6 +26,8 @@ _SHORTEST_S = 1e-3
 _TURNS_S = (1 / 75, 1 / 14)
 #: Units in which micro-controllers print the time from pulse to pulse, and names of it beside those of a period.
 _UNITS, _BETWEEN = ("s", "ms", "us"), re.compile(r"(d|δ|Δ|delta)[ _]?t\b|interval|pulse to pulse", re.IGNORECASE)
+#: A counter of 32 bits, as micros(), goes on from 0 here: after 71.6 min.
+_OVERFLOW = 2**32
 #: What a title of times may say: nothing known, times, or Δt, the uncertainty of times in a table.
 _TIMES = {None, "time_s", "time_u_s"}
 OTHER_COLUMNS = "holds readings: its columns are named"
@@ -72,7 +74,7 @@ def read_column(
     unit_of_intervals = _unit_of_intervals(path, numbers, unit, titles)
     if unit_of_intervals is not None:
         return _added(path, numbers, unit_of_intervals, first + 1, warnings)
-    times = numbers * (unit_factor(unit, "time") or 1.0 if unit else 1.0)
+    times = _without_overflow(numbers) * (unit_factor(unit, "time") or 1.0 if unit else 1.0)
     late = np.flatnonzero(np.diff(times) <= 0)
     if late.size > max(0.01 * len(times), 3):
         raise NoRate(path, "holds one column of numbers that do not increase: of samples say the `rate` in Hz")
@@ -146,6 +148,13 @@ def _added(path: Path, numbers: NDArray[np.float64], unit: float, line: int, war
     said = "{name:s}: its numbers are times from pulse to pulse, of {slow:.4g} to {fast:.4g} Hz"
     note = of_file("turns", Text(said, path.name, 1 / turns.max(), 1 / turns.min()), "advice")
     return PulseTimes(path, "list of times from pulse to pulse", np.cumsum(turns), (*warnings, note), step)
+
+
+def _without_overflow(numbers: "NDArray[np.float64]") -> "NDArray[np.float64]":
+    """Return whole numbers of a counter that went on from 0 as ones that go on; others as they are."""
+    if not np.all((numbers % 1 == 0) & (numbers < _OVERFLOW)):
+        return numbers
+    return np.asarray(numbers + _OVERFLOW * np.cumsum(np.diff(numbers, prepend=numbers[0]) < -_OVERFLOW / 2))
 
 
 def _unit(path: Path, titles: list[str]) -> str:

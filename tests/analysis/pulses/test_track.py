@@ -5,7 +5,7 @@ import pytest
 
 from analysis.errors import NotPositive
 from analysis.pulses import Finding, phases, track_of_blocks, track_of_samples, track_of_times
-from analysis.pulses.errors import TooFewPulses
+from analysis.pulses.errors import OnlyHum, TooFewPulses
 from analysis.pulses.track import collect_findings
 
 RATE = 5000.0
@@ -128,3 +128,10 @@ def test_findings_of_windows_are_counted_by_window_and_kind():
         ("missing", ""): (2, 1, 3),
     }
     assert [one.of for one in collect_findings({1: [hum, harmonic]}, 1)] == ["", "harmonic"]
+
+
+def test_a_record_of_hum_alone_is_said_to_be_hum():
+    time = np.arange(8 * RATE) / RATE
+    hum = np.sin(2 * np.pi * 50 * time) + np.random.default_rng(1).normal(0, 0.05, time.size)
+    with pytest.raises(OnlyHum, match="hum of the mains"):
+        track_of_blocks([hum], RATE)

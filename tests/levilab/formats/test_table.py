@@ -212,6 +212,25 @@ def test_hours_and_minutes_go_on_beyond_midnight(write):
     assert np.diff(table.column(T)).tolist() == [60, 60]
 
 
+def test_a_clock_of_12_hours_goes_on_after_noon_and_a_run_at_another_time_does_not(write):
+    table = read_table(write("time,f [Hz]\n12:59:50,61.5\n01:00:00,61.25\n01:00:10,61\n"))
+    assert np.diff(table.column(T)).tolist() == [10, 10]
+    table = read_table(write("time,f [Hz]\n12:59:50,61.5\n09:00:00,61.25\n09:00:10,61\n"))
+    assert table.column(T)[1] < table.column(T)[0]
+
+
+def test_numbers_of_rows_with_a_point_are_titles_and_no_sentence(write):
+    table = read_table(
+        write("Nr.;Umdrehungsfrequenz beim Fall in Hz;t in s\n1;38.5;0\n2;37.5;10\n3;36.5;20\n"), columns={"f": "2"}
+    )
+    assert table.column(T).tolist() == [0, 10, 20]
+
+
+def test_a_date_in_place_of_a_decimal_says_how_it_came_there(write):
+    with pytest.raises(TableError, match=r"'2026-01-30' stands in column 'f / Hz', .*: a spreadsheet takes 30\.1 for"):
+        read_table(write("t / s,f / Hz\n0,32.2\n10,31.1\n20,2026-01-30\n30,29.4\n40,28.6\n"))
+
+
 @pytest.mark.parametrize(("text", "says"), [
     ("t,f\n01/02/2026 23:59:59,61.5\n02/02/2026 0:00:00,61.25\n02/02/2026 0:00:01,61\n", "for day/month/year"),
     ("t,f\n1/2/2026 23:59:59,61.5\n1/3/2026 0:00:00,61.25\n1/3/2026 0:00:01,61\n", "for month/day/year"),

@@ -340,6 +340,12 @@ def test_pulse_times_in_microseconds_without_a_unit_are_asked_for_it(write):
     assert read_record(write(f"t [us]\n{times}")).times[1] == pytest.approx(0.025, rel=1e-12)
 
 
+def test_a_counter_of_32_bits_that_begins_again_at_0_goes_on(write):
+    times = 2**32 - 500_000 + 25_000 * np.arange(60)
+    record = read_record(write("micros\n" + "".join(f"{k % 2**32}\n" for k in times)))
+    np.testing.assert_allclose(record.times, times * 1e-6, rtol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("title", "unit"), [("dt [ms]", 1e-3), ("dt", 1e-6), ("Periode in ms", 1e-3), ("T us", 1e-6), ("Δt", 1e-3)]
 )
