@@ -2,11 +2,6 @@
 
 import math
 
-import numpy as np
-
-from analysis.spindown.fit import SpinDown
-from analysis.uncertainty import Estimate
-
 #: Air at 20 °C: density [kg/m³] and kinematic viscosity [m²/s].
 AIR_KG_M3, AIR_M2_S = 1.20, 1.50e-5
 #: Torque on both sides of a disc over π ρ R⁴ √(ν ω³): von Kármán's momentum integral, Z. angew. Math. Mech. 1, 233
@@ -26,13 +21,3 @@ def disc_constant(radius: float, inertia: float) -> float:
     '2.234e-04'
     """
     return KARMAN * math.pi * AIR_KG_M3 * radius**4 * math.sqrt(AIR_M2_S) / inertia
-
-
-def drag_over_disc(run: SpinDown) -> Estimate:
-    """Return the drag between the first and the last reading, by the best law, over that of a bare disc as large."""
-    fit, ends = run.fit(run.best), run.time[[0, -1]]
-    root = np.sqrt(2 * np.pi * np.maximum(fit.spin_frequency(ends), 1e-3))
-    per_second = 2 / float(ends[1] - ends[0]) / run.model.top.disc_constant
-    spread = fit.u_spin_frequency(ends)
-    u = 0.0 if spread is None else float(np.linalg.norm(np.pi * spread / root**3)) * per_second
-    return Estimate(float(1 / root[1] - 1 / root[0]) * per_second, u, "1")

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -100,6 +101,16 @@ class SpinDown:
     def fit(self, name: str) -> LawFit:
         """Return the fit of one law."""
         return next(fit for fit in self.fits if fit.name == name)
+
+    @cached_property
+    def drag_over_disc(self) -> Estimate:
+        """The drag between the first and the last reading, by the best law, over that of a bare disc as large."""
+        fit, ends = self.fit(self.best), self.time[[0, -1]]
+        root = np.sqrt(2 * np.pi * np.maximum(fit.spin_frequency(ends), 1e-3))
+        per_second = 2 / float(ends[1] - ends[0]) / self.model.top.disc_constant
+        spread = fit.u_spin_frequency(ends)
+        u = 0.0 if spread is None else float(np.linalg.norm(np.pi * spread / root**3)) * per_second
+        return Estimate(float(1 / root[1] - 1 / root[0]) * per_second, u, "1")
 
     def misfit(self, exponent: float) -> float:
         """Return −2 ln of the greatest likelihood of a power law with this exponent, see `Statistics.misfit`."""

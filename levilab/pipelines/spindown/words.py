@@ -14,7 +14,7 @@ from analysis.arrays import Array
 from analysis.numbers import digits
 from analysis.remarks import Remark
 from analysis.residuals import Change, independent
-from analysis.spindown.air import LEAST, MOST, drag_over_disc
+from analysis.spindown.air import LEAST, MOST
 from analysis.spindown.combine import Combined, CombinedLaw
 from analysis.spindown.drag import LAWS, DragLaw
 from analysis.spindown.fit import SpinDown
@@ -335,7 +335,7 @@ def doubts_about_law(run: SpinDown, runs: int) -> Iterator[Note]:
         options = {"stop_s" if before else "start_s": float(f"{end:.9g}")}
         yield Note("no law", said, weight="doubt", options=options)
     else:
-        yield from _drag_in_doubt(drag_over_disc(run))
+        yield from _drag_in_doubt(run.drag_over_disc)
 
 
 def _cause(run: SpinDown, change: Change) -> str:
