@@ -183,7 +183,9 @@ def fit_spin_down(
         if keep_outliers or not agree.any():
             break
         outliers = outliers[~agree]
-    change = _change(found[best], found.get("power"))
+    # of few laws that were asked for the best may be the wrong one: that is no change of the top
+    power = found.get("power") or model.fit(LAWS["power"], readings)
+    change = _change(found[best] if "power" in found else power, power)
     decision = verdict(stats, criterion, change=change, failed=failed)
     best = decision.best
     return SpinDown(

@@ -97,6 +97,8 @@ def bare(function: F) -> F:
                 own = code.co_varnames[0] == "self"
                 expected = f"at most {code.co_argcount - own} without a name are expected: name the others"
                 raise UsageError(function.__name__, expected, value=f"{len(args) - own} values")
+            if twice := [name for name in names[: code.co_argcount][: len(args)] if name in named]:
+                raise UsageError(twice[0], "is given twice, once without its name: name all but the first")
             required = names[len(args) : code.co_argcount - len(function.__defaults__ or ())]
             if missing := [name for name in required if name not in named]:
                 raise UsageError(missing[0], f"{function.__name__} needs it", value="nothing")

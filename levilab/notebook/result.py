@@ -326,7 +326,7 @@ class AnalysisResult(Exportable):
         return "\n".join(
             [
                 f"<{self.kind} of {of}{', SYNTHETIC' if self.synthetic else ''}",
-                *(f"  {unquote(text)}" for text in self.found.doubts),
+                *(f"  {unquote(text)}" for text in self.found.doubts or [self.verdict.partition(". ")[0]]),
                 *shown,
                 f"  {'; '.join([*ends, 'summary() says all'])}>",
             ]

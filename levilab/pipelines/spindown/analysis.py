@@ -20,7 +20,15 @@ from levilab.pipelines.field.device import THESIS, inertias
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import SpinDownOptions
 from levilab.pipelines.spindown.readings import SpinReadings
-from levilab.pipelines.spindown.words import TILT_ALLOWED, UNIT_FIRST, doubts_about_law, is_seen, remark, verdict_of_all
+from levilab.pipelines.spindown.words import (
+    TILT_ALLOWED,
+    UNIT_FIRST,
+    doubts_about_law,
+    is_seen,
+    law_names,
+    remark,
+    verdict_of_all,
+)
 from levilab.present.numbers import enumeration
 from levilab.texts.text import Text
 
@@ -47,7 +55,8 @@ class SpinDownAnalysis(Analyzed[SpinReadings, SpinDown, Combined, SpinDownOption
             return
         yield from (*map(remark, self.combined.remarks), *self._left_out(), *self._of_laws(self.combined.fits))
         if self.options.laws:
-            yield f"drag laws other than {enumeration(self.options.laws)} are left out, as asked"
+            said = "drag laws other than {laws} are left out, as asked: another one may fit better"
+            yield Text(said, laws=law_names(self.options.laws))
         if self.options.correlation == "none":
             yield "the noise of the readings is taken to be white, as asked: u is too small where it is not"
         if any(run.has_tilt for run in self.runs) and not is_seen(self.combined.tilt):

@@ -224,6 +224,8 @@ def _verdict(
         )  # fmt: skip
     elif said.decided:
         start = "The {law} law fits best: {how}." if how else "The {law} law fits best."
+        if len(fits) == 1:
+            start = "The {law} law alone was fitted: {how}." if how else "The {law} law alone was fitted."
         first = Text(start, law=law, how=how)
     elif len(simple) == 1:
         alike = law_names(said.indistinguishable, power)

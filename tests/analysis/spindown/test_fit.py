@@ -248,6 +248,12 @@ def test_understated_uncertainties_are_enlarged_and_exclude_nothing_falsely():
     assert run.fit("newton").statistics.difference < 100  # it would be 1e4 if 0.003 Hz were believed
 
 
+def test_a_law_that_was_asked_for_and_does_not_fit_is_no_change_of_the_top():
+    found = fit_spin_down(T, readings(), SIGMA, laws=["stokes"])
+    assert found.fit("stokes").statistics.reduced_chi_square > 9
+    assert found.verdict.describes
+
+
 def test_readings_without_uncertainty_are_warned_of():
     assert kinds(fit_spin_down(T, readings())) == ["no u"]
     assert kinds(fit_spin_down(T, readings(), SIGMA)) == []

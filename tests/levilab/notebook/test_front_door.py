@@ -148,7 +148,9 @@ def test_outliers_keep_their_row_and_have_no_residual():
 
 
 def test_the_short_form_of_a_result_is_a_few_lines(four, limits):
-    assert repr(limits).splitlines()[:2] == ["<limit of lower-limits", "  mean = 21.86(8) Hz"]
+    name, sentence, mean, *_ = repr(limits).splitlines()
+    assert (name, mean) == ("<limit of lower-limits", "  mean = 21.86(8) Hz")
+    assert limits.verdict.startswith(sentence.strip())
     assert len(repr(four).splitlines()) <= 7
 
 

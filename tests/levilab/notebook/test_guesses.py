@@ -325,6 +325,7 @@ REFUSED = {
     "result.to_csv()": "output = nothing: export needs it",
     "result.chi2_red": "did you mean redchi?",
     "levilab.analyze(t, f, 0.03, 0.03)": "analyze = 4 values: at most 3 without a name are expected",
+    "levilab.simulate('driven', {'start.spin_hz': 25}, duration=2)": "duration: is given twice, once without its name",
     "levilab.analyze('sample_data/spin-down-1', u=0.03)": "two arrays beside it, analyze(t, f, u), are expected",
     "result.ci_report(with_offset=False)": "is no option of ci_report",
     "motion.plot(('x', 'y'))": "known are x, y, z",
