@@ -18,7 +18,7 @@ from levilab.report.worksheets.document import key as key_of
 from levilab.report.worksheets.document import measure, read_language, write_worksheets
 from levilab.report.worksheets.sheets import SHEETS
 from levilab.runs.writer import RunWriter
-from levilab.texts.text import languages
+from levilab.texts.text import in_language, languages
 from levilab.world.spin_world import random_scene
 from support.browser import watch
 from support.pages import Page
@@ -41,6 +41,7 @@ def test_the_key_of_the_spin_knows_both_ways_to_measure(code):
     for answer, (every, start) in zip(read_language(code).sheets["spin"].answers[0].split(";"), how, strict=True):
         assert f"{every:.0f} s, " in answer
         assert f" {start:.0f} Hz " in answer
+    assert in_language("undecided", code) in read_language(code).sheets["spin"].answers[1]  # as the class says
 
 
 @pytest.mark.parametrize("code", LANGUAGES)
