@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-from levilab.cli.analyze import takes_options
+from levilab.cli.analyze import LINE_EVERY_S, takes_options
 from levilab.cli.options import HEADING, Language, Paths, among, argument, flag, option, place
 from levilab.cli.output import interruptible, message, place_of_report, result
 from levilab.errors import UsageError
@@ -31,6 +31,7 @@ def of_class(
     **given: Any,
 ) -> None:
     """Put the groups of a class beside each other."""
+    from levilab.present.progress import ShareBar
     from levilab.present.terminal import draw, terminal
     from levilab.report.groups.document import write_class
     from levilab.report.reproduction import Heading
@@ -39,7 +40,11 @@ def of_class(
     heading = Heading(**{one.name: given.pop(one.name) for one in HEADING})
     with interruptible("nothing is written"):
         options, show = read_options(given, typed=True), lambda one: terminal().print(draw(one))
-        write_class(paths or (), out, options, tell=message, show=show, heading=heading)
+        bar = ShareBar("inputs", line_every=LINE_EVERY_S)
+        try:
+            write_class(paths or (), out, options, tell=message, show=show, heading=heading, progress=bar)
+        finally:
+            bar.close()
     result(place)
 
 

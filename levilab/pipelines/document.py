@@ -360,9 +360,16 @@ class Analysis(Needs[Any], Generic[A]):
         return self.recall_found(paths, found, archive, options)
 
     def recall_found(
-        self, paths: Sequence[Path], found: Found[Any], archive: Archive[Any], options: Any, *, skips: bool = False
+        self,
+        paths: Sequence[Path],
+        found: Found[Any],
+        archive: Archive[Any],
+        options: Any,
+        *,
+        skips: bool = False,
+        step: Callable[[], None] = lambda: None,
     ) -> A:
-        """Do the same for inputs that were found already; skips: see `gather`."""
+        """Do the same for inputs that were found already; skips: see `gather`; step: called before each is analyzed."""
         given = _given_options(options)
         whole = archive.whole(found.sources)
         if whole and not any(self._problem(whole.of(source), given, source) for source in found.sources):
@@ -374,7 +381,12 @@ class Analysis(Needs[Any], Generic[A]):
                 lambda source: self._read_one(source, whole.of(source)),
                 lambda _: self.renumber(whole.result.combined, numbers),
             )
-        return self.gather(paths, found, options, lambda source: self._recall_one(source, archive, given), skips=skips)
+
+        def one(source: Source[Any]) -> Done:
+            step()
+            return self._recall_one(source, archive, given)
+
+        return self.gather(paths, found, options, one, skips=skips)
 
     def _options(self, earlier: Earlier[Any]) -> Any:
         return self.options(**dict(earlier.result.settings))

@@ -49,7 +49,11 @@ class Skips:
 
 
 def recall_suiting(
-    paths: Sequence[Path], given: Mapping[str, Any], *, skips: bool = False
+    paths: Sequence[Path],
+    given: Mapping[str, Any],
+    *,
+    skips: bool = False,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> list[tuple[Analysis[Any], Any]]:
     """Read the results of the inputs at the paths, of each analysis that has one; in the order of the catalogue.
 
@@ -61,6 +65,7 @@ def recall_suiting(
             nothing to analyze in it.
         given: options by their names, of any analysis.
         skips: whether an input that cannot be used is skipped with a note, as long as there is another one.
+        progress: called before each input that is analyzed, with the share of them that is done.
     """
     skipped = Skips(skips)
     places, written = _split(paths)
@@ -68,7 +73,7 @@ def recall_suiting(
     names = _names_of_results(shares)
     done = []
     for k, results in enumerate(shares):
-        recalled = _recall(places if k == 0 else [], results, given, skipped)
+        recalled = _recall(places if k == 0 else [], results, given, skipped, progress if k == 0 else lambda _: None)
         done += [(analysis, _with_names_of_results(analysis, found, results, names)) for analysis, found in recalled]
     if skipped.errors and not done:
         raise skipped.errors[0]
@@ -80,7 +85,11 @@ def recall_suiting(
 
 
 def _recall(
-    places: Sequence[Path], written: Sequence[Written], given: Mapping[str, Any], skips: Skips
+    places: Sequence[Path],
+    written: Sequence[Written],
+    given: Mapping[str, Any],
+    skips: Skips,
+    progress: Callable[[float], None],
 ) -> list[tuple[Analysis[Any], Any]]:
     """Read or make the results of inputs; skips: where those go that are skipped."""
     own = {name: [one for one in written if one.analysis == name] for name in catalogue.ANALYSES}
@@ -117,11 +126,15 @@ def _recall(
 
     readers = {name: options(row) for name, row in catalogue.ANALYSES.items()}
     looks = [*choose_inputs([*_looks(places, readers, skips)], choose), *_inputs_of(own, readers, skips)]
-    done = []
-    for one in together(looks):
+    done, inputs = [], together(looks)
+    count = sum(len(one.found.sources) for one in inputs)
+    shares = (k / count for k in range(count))
+    for one in inputs:
         chosen, archive = one.analysis.options_from(given), archives[one.analysis.name]
         with skips.over(one.found.sources[0].path, one.found.skipped):
-            found = one.analysis.recall_found(one.paths, one.found, archive, chosen, skips=skips.allowed)
+            found = one.analysis.recall_found(
+                one.paths, one.found, archive, chosen, skips=skips.allowed, step=lambda: progress(next(shares))
+            )
             done.append((one.analysis, found))
     return done
 

@@ -471,6 +471,7 @@ def write_class(
     tell: Callable[[str], None] = lambda _: None,
     show: Callable[[Table], None] = lambda _: None,
     heading: Heading | None = None,
+    progress: Callable[[float], None] = lambda _: None,
 ) -> Path:
     """Put the groups of a class beside each other; what has no result yet is analyzed, and nothing is stored.
 
@@ -481,6 +482,7 @@ def write_class(
         tell: called with what lies there and is of no use.
         show: called with a table of the groups by each analysis.
         heading: title, course, authors and date above it.
+        progress: called with the share of the inputs that are analyzed.
 
     Returns:
         The file.
@@ -497,7 +499,9 @@ def write_class(
         form.check()
     with writing_report(output):
         check_writable(output)
-    results = _without_spins_of_falls(_each_reading_once(recall_suiting(paths, given or {}, skips=True)))
+    results = _without_spins_of_falls(
+        _each_reading_once(recall_suiting(paths, given or {}, skips=True, progress=progress))
+    )
     unread, others = _left_out(results)
     copies = _copies(results)
     used = [source.path for _, found in results for source in found.sources]

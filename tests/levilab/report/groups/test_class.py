@@ -679,6 +679,12 @@ def test_groups_that_all_differ_by_more_than_tops_do_are_not_said_to_differ_as_t
     assert "more than their u, and more than tops do: compare how they measured" in agreement(of)
 
 
+def test_a_class_that_is_analyzed_says_how_much_is_done(tmp_path):
+    shares = []
+    write_class([class_of_files(tmp_path, [(1, 1)] * 4)], tmp_path / "class.html", progress=shares.append)
+    assert shares == [0, 0.25, 0.5, 0.75]
+
+
 def test_a_run_that_is_too_long_makes_no_other_one_short(tmp_path):
     of = compared(class_of_files(tmp_path, [(1, 1), (3.5, 1), (1, 1)]))
     assert [mark.why for mark in of.marks if mark.word != REPEAT] == [(), ()]
