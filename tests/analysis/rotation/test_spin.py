@@ -11,12 +11,6 @@ from phone_records import frequency_bounds, synthetic_field
 TRIALS = 60
 
 
-@pytest.fixture
-def fresh():
-    """Random numbers that no constant was chosen with."""
-    return np.random.default_rng(20261124)
-
-
 @pytest.mark.parametrize("snr_db", [6.0, 20.0])
 def test_errors_are_as_large_as_the_bound_and_as_u_say(fresh, snr_db):
     errors, u, bound = [], [], []

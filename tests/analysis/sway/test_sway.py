@@ -24,12 +24,6 @@ def field(z):
     return on_axis(RING, np.atleast_1d(z), 5)
 
 
-@pytest.fixture
-def fresh():
-    """Random numbers that no constant was chosen with."""
-    return np.random.default_rng(20261124)
-
-
 def swing(times, slow, amplitudes=(4e-4, 6e-4), precession=6.0):
     backward, forward = slow
     waves = zip((backward, forward, precession), (*amplitudes, 8e-5), (0.3, 1.1, 2.0), strict=True)

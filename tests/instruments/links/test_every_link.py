@@ -6,7 +6,6 @@ from unittest.mock import Mock
 import pytest
 import serial
 
-from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected
 from instruments.links.opening import open_link
 from instruments.virtual.bench import protocol_levilab
@@ -21,11 +20,6 @@ WAYS = {
     "line": ("ASRLslow.levilab::INSTR", ""),
     "pyserial": ("ASRLslow::INSTR", "levilab://slow"),
 }
-
-
-@pytest.fixture
-def clock():
-    return VirtualClock()
 
 
 @pytest.fixture(params=WAYS)

@@ -14,7 +14,6 @@ import serial.tools.list_ports  # before a test changes what platform this is
 from hypothesis import given
 from hypothesis import strategies as st
 
-from instruments.clock import VirtualClock
 from instruments.drivers.magnetometer.lakeshore_425 import LakeShore425
 from instruments.errors import BadAnswer, InstrumentError, NoAnswer, NotConnected, Occupied, OutOfRange
 from instruments.links.opening import open_link
@@ -30,11 +29,6 @@ METER = "levilab://magnetometer"
 SLOW = "levilab://slow"
 #: The 425's line; the pause between two exchanges is the wall's, and would make the tests wait.
 LINE = dict(LakeShore425.SERIAL) | {"pause": 0.0}
-
-
-@pytest.fixture
-def clock():
-    return VirtualClock()
 
 
 @pytest.fixture

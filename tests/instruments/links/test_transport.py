@@ -4,7 +4,6 @@ from unittest.mock import Mock
 
 import pytest
 
-from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied, SilentLine
 from instruments.links.transport import LONGEST_ANSWER, Failure, MessageLink, Resynchronising
 
@@ -58,11 +57,6 @@ class Port:
 
     def failure(self, error):
         return Failure.LOST
-
-
-@pytest.fixture
-def clock():
-    return VirtualClock()
 
 
 @pytest.fixture(params=list(Resynchronising), ids=lambda way: way.name)

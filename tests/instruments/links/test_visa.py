@@ -7,7 +7,6 @@ import pytest
 from pyvisa import VisaIOError
 from pyvisa.constants import ResourceAttribute, StatusCode
 
-from instruments.clock import VirtualClock
 from instruments.errors import BadAnswer, NoAnswer, NotConnected, Occupied
 from instruments.links.opening import open_link
 from instruments.virtual.bench.bench import VirtualBench
@@ -19,11 +18,6 @@ ADDRESS = "TCPIP0::slow.levilab::inst0::INSTR"
 SOCKET = "TCPIP0::slow.levilab::5025::SOCKET"
 
 _unique = itertools.count()
-
-
-@pytest.fixture
-def clock():
-    return VirtualClock()
 
 
 @pytest.fixture
