@@ -333,7 +333,7 @@ def spin_readings(table: Table, options: "InputOptions | None" = None) -> SpinRe
         TableError: a column is missing, there are too few readings, times repeat or go back, the spin does not fall,
             or a frequency or an uncertainty is not positive; the line of the file is named.
     """
-    table = _without_rest(table)
+    table = _without_start(_without_rest(table))
     time, frequency = table.column("time_s"), table.column("spin_frequency_hz")
     u = table.columns.get("spin_frequency_u_hz")
     if time.size < FEWEST:
@@ -381,6 +381,22 @@ def _without_rest(table: Table) -> Table:
         f"{table.path.name}: the last {rows} of 0 Hz, after the top fell, {'is' if left_out == 1 else 'are'} left out"
     )
     return replace(_rows(table, slice(end)), warnings=(*table.warnings, of_file("rest", note, "advice")))
+
+
+def _without_start(table: Table) -> Table:
+    """Return a table without its first rows, in which the spin rises from row to row up to its highest, with a note."""
+    time, frequency = table.column("time_s"), table.column("spin_frequency_hz")
+    top = int(np.argmax(frequency)) if frequency.size else 0
+    if top < 2 or frequency.size - top < FEWEST:
+        return table
+    if np.any(np.diff(frequency[: top + 1]) <= 0) or frequency[0] > (1 - LEAST_FALL) * frequency[top]:
+        return table
+    said = (
+        "{name:s}: the top coasts from {start:.1f} s to {end:.1f} s; the rows before, in which it speeds up, are left "
+        "out"
+    )
+    note = of_file("coasts", Text(said, name=table.path.name, start=time[top], end=time[-1]), "advice")
+    return replace(_rows(table, slice(top, None)), warnings=(*table.warnings, note))
 
 
 def _doubt(text: str, say: str = "") -> Note:

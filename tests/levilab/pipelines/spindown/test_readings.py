@@ -73,6 +73,15 @@ def test_rows_of_0_hz_after_the_fall_are_left_out_with_a_note(tmp_path):
     assert readings.warnings == ("data.csv: the last 2 rows of 0 Hz, after the top fell, are left out",)
 
 
+@pytest.mark.parametrize(("start", "kept"), [((25, 31, 35, 37.4), 6), ((37.9, 37.95), 8), ((38.2, 30), 8)])
+def test_rows_in_which_the_top_speeds_up_are_left_out_with_a_note(start, kept, tmp_path):
+    frequency = [*start, 38, 37, 36.1, 35.2, 34.4, 33.6]
+    rows = "".join(f"{10 * k},{f}\n" for k, f in enumerate(frequency))
+    readings = spin_readings(table_of(tmp_path, f"t [s],f [Hz]\n{rows}"))
+    assert readings.frequency.tolist() == frequency[-kept:]
+    assert any("coasts from 40.0 s to 90.0 s" in one for one in readings.warnings) == (kept == 6)
+
+
 def test_readings_closer_than_a_turn_are_doubted(tmp_path):
     rows = "0,40\n10,39\n20,38.1\n30,37.2\n"
     said = {u: spin_readings(table_of(tmp_path, f"T [{u}],f [Hz]\n{rows}")).warnings for u in ("ms", "s", "h")}
