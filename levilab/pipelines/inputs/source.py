@@ -146,8 +146,8 @@ class Source(Generic[R]):
 
     @property
     def time_zero(self) -> datetime | None:
-        """When the clock of the readings was zero, in local time; None where that is not known."""
-        return local(self.run.record.time_zero_utc) if self.run else None
+        """When the clock of the readings was zero, in local time; None where that is not known, or simulated."""
+        return local(self.run.record.time_zero_utc) if self.run and not self.run.record.synthetic else None
 
     @property
     def start(self) -> datetime | None:

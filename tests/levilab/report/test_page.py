@@ -184,7 +184,9 @@ def test_times_are_to_the_second_and_what_is_not_known_is_left_out(run):
     text = text_of(changed(run, started_utc=started, ended_utc=ended))
     assert "2026-11-21 00:52:00 UTC to 2026-11-21 00:55:10 UTC" in text
     zero = "2026-11-21T00:52:00Z"
-    parsed = text_of(changed(run, started_utc=started, time_zero_utc=zero))
+    changed(run, started_utc=started, time_zero_utc=zero)
+    assert "time zero at" not in text_of(run), "the clock of a simulation is no clock time"
+    parsed = text_of(changed(run, synthetic=False))
     here = datetime.fromisoformat(zero).astimezone()
     assert f"time zero at {here:%Y-%m-%d %H:%M:%S} " in parsed
     assert f"{here + timedelta(seconds=190):%H:%M:%S} 190.000 21.75" in parsed  # the last reading
