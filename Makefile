@@ -81,6 +81,7 @@ classroom: setup  ## what a teacher hands out for Windows, in dist/classroom: wh
 site: setup  ## the pages as a site in build/site, in an environment of its own; a warning or a dead link is an error
 	$(BIN)/nox --session site
 	$(BIN)/python -m pytest -q tests/docs/test_search.py tests/docs/test_reference.py
+	@echo "The pages are made: open build/site/index.html in a browser."
 
 bench: setup  ## speed, as ratios within one run (a few minutes); the kept results are in docs/speed.md
 	$(BIN)/python benchmarks/spindown.py

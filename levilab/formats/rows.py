@@ -194,7 +194,7 @@ def _read_lines(
     """Read all rows line by line; some 2 µs a number."""
     lines, values = array("q"), [array("d") for _ in chosen]
     time, path, notes = "", text.path, list[str]()
-    layout = _with_order_of_dates(text, layout, chosen, notes)
+    layout, beside = _with_order_of_dates(text, layout, chosen, notes), _columns_of_remarks(layout, chosen)
     refused, remarks = list[tuple[TableError, str]](), list[tuple[TableError, str]]()
     for number, line in _lines(text, layout, notes):
         if not line.endswith("\n"):
@@ -210,7 +210,7 @@ def _read_lines(
                 break
             continue
         time = time or _time_in(layout, chosen, line)
-        notes += _remark_behind(layout, number, line)
+        notes += _remark(layout, beside, number, line)
         lines.append(number)
         for column, value in zip(values, row, strict=True):
             column.append(value)
@@ -281,12 +281,19 @@ def _lines(text: Text, layout: Layout, notes: list[str] | None = None) -> Iterat
                 notes.append(left_out(number, line, "has bytes that are no text"))
 
 
-def _remark_behind(layout: Layout, number: int, line: str) -> Iterator[str]:
-    """Yield a note on the words that a person wrote behind the last column."""
-    remark = "" if layout.aligned else " ".join(filter(None, layout.dialect.split(line)[layout.width :]))
-    if remark:
-        said = "line {number}: '{remark:s}' behind the last column is left out"
-        yield Note("remark", Said(said, number, shorten(remark)))
+def _columns_of_remarks(layout: Layout, chosen: Sequence[Column]) -> list[int]:
+    """Return the columns that are not read, and empty in most of the first rows."""
+    unread = {*range(layout.width)} - {column.index for column in chosen}
+    filled = {k: sum(any(row[k : k + 1]) for row in layout.sample) for k in unread}
+    return sorted(k for k, cells in filled.items() if 2 * cells < len(layout.sample))
+
+
+def _remark(layout: Layout, beside: Sequence[int], number: int, line: str) -> Iterator[str]:
+    """Yield a note on the words that a person wrote beside a row: in columns of remarks, or behind the last one."""
+    fields = layout.dialect.split(line)
+    cells = [cell for k in beside for cell in fields[k : k + 1] if layout.dialect.kind(cell) == "text"]
+    if remark := " ".join(filter(None, [*cells, *([] if layout.aligned else fields[layout.width :])])):
+        yield Note("remark", Said("line {number}: the remark '{remark:s}' is not read", number, shorten(remark)))
 
 
 def _with_order_of_dates(text: Text, layout: Layout, chosen: Sequence[Column], notes: list[str]) -> Layout:

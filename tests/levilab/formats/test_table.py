@@ -426,6 +426,15 @@ def test_a_pipe_is_refused_at_once(tmp_path):
         read_table(tmp_path / "pipe")
 
 
+@pytest.mark.parametrize("title", ["t [s];f [Hz];Bemerkung", "t [s];f [Hz]"])
+def test_a_remark_beside_a_row_is_named(title, write):
+    rows = [f"{t};{40 - t / 10}{';touched' * (t == 20)}" for t in range(0, 60, 10)]
+    table = read_table(write("\n".join([title, *rows, ""])))
+    assert list(table.columns[T]) == [0, 10, 20, 30, 40, 50]
+    (said,) = [text for text in table.warnings if "touched" in text]
+    assert said.endswith("line 4: the remark 'touched' is not read")
+
+
 @pytest.mark.parametrize(
     ("error", "words"), [(PermissionError(13, "denied"), "may not be read"), (OSError(5, "I/O error"), "I/O error")]
 )
