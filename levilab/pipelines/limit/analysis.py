@@ -196,9 +196,17 @@ class Limits:
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether tops that nothing stops would have floated on for long, or have fallen long before."""
-        edge = next((one for one in self.comparisons if one.name == LOWER_EDGE), None)
-        return edge is not None and abs(edge.difference.value or 0.0) > STOPPED_ABOVE_HZ - FALLS_BETWEEN_HZ[1]
+        """Whether tops that nothing stops would have floated on for long, or have fallen or flown off long before."""
+        off = {one.name: one.difference.value or 0.0 for one in self.comparisons}
+        far = STOPPED_ABOVE_HZ - FALLS_BETWEEN_HZ[1]
+        return abs(off.get(LOWER_EDGE, 0.0)) > far or off.get(UPPER_EDGE, 0.0) > far
+
+    @property
+    def may_be_of_two_marks(self) -> bool:
+        """Whether upper limits of a file are lower ones if two pulses a turn were counted."""
+        high, low = FALLS_BETWEEN_HZ
+        unsaid = self.which == "upper" and self.conditions.waveform is None  # a run has its drive
+        return unsaid and low <= (self.statistics.mean.value or 0.0) / 2 <= high
 
     @property
     def conditions_text(self) -> str:
@@ -260,11 +268,17 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
 
     def about_run(self, run: Limits) -> Iterable[str]:
         """Yield what to know of one run."""
-        if run.is_doubtful:
+        if run.which == "upper" and run.is_doubtful:
+            said = "{spin:n} is no upper limit of a top: is it in rad/s, or was each turn counted several times?"
+            yield Note("stopped", Text(said, with_uncertainty(run.statistics.mean)), weight="doubt")
+        elif run.is_doubtful:
             fast = (run.statistics.mean.value or 0.0) > run.device.linear_lower_hz
             why = "was it stopped, or held by a drive?" if fast else "was each second turn counted?"
             text = Text("{spin:n} is no lower limit of a top: {why}", with_uncertainty(run.statistics.mean), why)
             yield Note("stopped", text, weight="doubt")
+        if run.may_be_of_two_marks:
+            said = "taken for upper limits of a driven top; with 2 marks a turn they are lower ones, at {hz:.2f} Hz"
+            yield Note("two marks", Text(said, hz=(run.statistics.mean.value or 0.0) / 2))
         yield from warnings_of(run.statistics)
 
 

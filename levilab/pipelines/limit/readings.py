@@ -151,7 +151,8 @@ def single_column(path: Path, *, guess: bool) -> Table | None:
     title = read_title(titles[0]) if titles else None
     named = title is not None and title.column == NEEDED[0]
     other = title is not None and title.column not in {None, NEEDED[0]}
-    factor = 1.0 if title is None or title.unit is None else unit_factor(title.unit, "frequency")
+    unit = title and ("rad/s" if title.counts_radians(title.unit) else title.unit)
+    factor = unit_factor(unit, "frequency") if unit else 1.0
     if other or factor is None or not (guess or named):
         return None
     notes: tuple[str, ...] = ()

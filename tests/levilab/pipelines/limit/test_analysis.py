@@ -41,6 +41,26 @@ def test_the_published_limits_give_the_published_statistics(sample_data):
     assert analysis.all_warnings == []
 
 
+@pytest.mark.parametrize(
+    ("title", "factor", "said"),
+    [
+        ("f [Hz]", 1, ""), ("omega [1/s]", 2 * np.pi, ""), ("omega", 2 * np.pi, ""),
+        ("f [Hz]", 2, "with 2 marks a turn they are lower ones, at 21.80 Hz"),
+        ("f [Hz]", 2 * np.pi, "is no upper limit of a top: is it in rad/s"),
+    ],
+)  # fmt: skip
+def test_lower_limits_in_other_units_are_read_or_named(tmp_path, title, factor, said):
+    rows = factor * np.array([21.6, 21.9, 21.7, 22.0])
+    (tmp_path / "limits.csv").write_text("\n".join([title, *(f"{row:.3f}" for row in rows), ""]), encoding="utf-8")
+    found = LIMIT.analyze([tmp_path / "limits.csv"])
+    (limits,) = found.runs
+    if said:
+        assert any(said in text for text in found.all_warnings)
+    else:
+        assert (limits.which, limits.statistics.mean.value) == ("lower", pytest.approx(21.8, abs=1e-4))
+        assert not any("marks" in text for text in found.all_warnings)
+
+
 def test_theory_beside_them_is_that_of_the_thesis_top(sample_data, tmp_path):
     """PHYSICS: window 21.65 to 80.6 Hz at z = 7.30 cm, computed there from the quartic; resonance 22.1 Hz."""
     file = tmp_path / "upper.csv"  # with no scene of its own
