@@ -111,9 +111,10 @@ def read_table(
         return table
     holds = how_many(len(table), "reading") if rows.lines.size else Said("only a header")
     missed = rows.lines.size - len(table)
-    holds = Said("{readings} and {n} missed ones", holds, missed) if missed else holds
-    what = "holds {what}, at least {fewest} readings are needed: record longer"
-    what = Sentences(Said(what, holds, FEWEST), *rows.notes, between="; ")
+    holds = Said("{readings} and {n} missed (no number)", holds, missed) if missed else holds
+    advice = "record longer, or fill in what is missing" if missed else "record longer"
+    what = "holds {what}, at least {fewest} readings are needed: {advice}"
+    what = Sentences(Said(what, holds, FEWEST, advice), *rows.notes, between="; ")
     raise TableError(path, what, line=layout.header_line or layout.first_line)
 
 

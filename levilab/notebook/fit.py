@@ -65,6 +65,8 @@ def _residual(of: FittedModel) -> Array:
 
 
 def _covariance(of: FittedModel) -> Array | None:
+    if of.covariance is None and of.runs > 1:
+        raise of.refuse_several("covar", "covariance")
     return None if of.covariance is None else np.array(of.covariance, dtype=float)
 
 
@@ -165,11 +167,14 @@ class FittedModel(Named[Quantity]):
         if curve is None:
             raise UsageError(what, f"a result of {self._of.kind} has no curve")
         if self._number is None:
-            names = ", ".join(self._of.inputs)
-            raise UsageError(
-                what, f"each of several inputs has its own curve: models_by_input[NAME][{self.name!r}] of {names}"
-            )
+            raise self.refuse_several(what, "curve")
         return curve(self._of.found, self._number, self.name)
+
+    def refuse_several(self, what: str, thing: str) -> UsageError:
+        """Return the error of who asks a fit of several inputs together for a thing that each of them has."""
+        names = ", ".join(self._of.inputs)
+        where = f"models_by_input[NAME][{self.name!r}] of {names}"
+        return UsageError(what, f"each of several inputs has its own {thing}: {where}")
 
     @bare
     def eval(self, x: ArrayLike | None = None, *, t: ArrayLike | None = None) -> Array:

@@ -78,10 +78,13 @@ class SimulatedMotion(Exportable, Trajectory):
         "data": "to_dataframe()",
         "notes": "warnings",
         "theta": "tilt",
+        "lines": "found.lines.lines",
         **{name: lambda motion, name=name: getattr(motion.to_xarray(), name) for name in ("sel", "isel", "interp")},
     }
     instead: ClassVar[Mapping[str, str]] = {
         **dict.fromkeys(("coords", "dims"), "to_xarray(), which has it"),
+        "spectrum": "found.lines.spectrum, frequencies [Hz] and amplitudes [rad] of the axis; lines are its peaks",
+        **dict.fromkeys(("success", "message"), "survived, values['tolerance_reached'], or print(….summary())"),
         **dict.fromkeys(("samples", "dt", "step"), "time; rate=… of simulate chooses the states per second"),
     }
 

@@ -28,7 +28,12 @@ _OTHERS = {
     **dict.fromkeys(("chi2", "chisq", "chi_square"), ("chisqr",)),
     **dict.fromkeys(("chi2_red", "rchi2", "reduced_chi_square", "reduced_chi2"), ("redchi",)),
     **dict.fromkeys(("r2", "r_squared"), ("rsquared",)),
-    "kind": ("what",),
+    "kind": ("what", "experiment"),
+    "to_pandas": ("to_dataframe",),
+    "by_run": ("by_input",),
+    "limits": ("spins",),
+    "popt": ("best_values",),
+    "pcov": ("covar",),
     "correlation": ("correl",),
     **dict.fromkeys(("ci", "confidence", "confidence_interval"), ("conf_interval", "interval")),
 }
@@ -40,6 +45,14 @@ _NEEDLESS = {
     "nan_policy": "rows without a number are left out, with a note",
     "scale_covar": "u is from the scatter and, where they are stated, from u of the readings",
 }
+#: What chooses runs.
+CHOOSE = "[run for run in runs if run.experiment == 'spin']"
+#: Function → where what people take for its options is given.
+_NO_OPTIONS = {
+    "acquire": "settings of an experiment go as settings={'spin.longest_s': 60, 'spin.interval_s': 5} or "
+    "{'limit.repetitions': 3}, see levilab acquire NAME --settings; options are those which help(acquire) lists",
+    "runs": f"choose from them: {CHOOSE}",
+}
 #: Names that a message lists.
 _MOST_NAMES = 15
 
@@ -48,8 +61,8 @@ class NoSuchAttribute(LevilabError, AttributeError):
     """An attribute that an object lacks; the text has the name that was probably meant."""
 
 
-def meant(name: str, known: Iterable[str], lists: str = "dir()") -> str:
-    """Return the question after what was meant, or names where none is like it, and which function lists them all.
+def meant(name: str, known: Iterable[str], lists: str = "dir()", otherwise: str = "") -> str:
+    """Return the question after what was meant; where no name is like it `otherwise`, or names and what lists them all.
 
     >>> meant("law", ["model", "input"]), meant("modle", ["model", "input"])
     ('known are model, input', 'did you mean model?')
@@ -64,7 +77,7 @@ def meant(name: str, known: Iterable[str], lists: str = "dir()") -> str:
     if near:
         return f"did you mean {' or '.join(near)}?"
     more = f" and {len(names) - _MOST_NAMES} more, which {lists} lists" * (len(names) > _MOST_NAMES)
-    return f"known are {', '.join(names[:_MOST_NAMES])}{more}"
+    return otherwise or f"known are {', '.join(names[:_MOST_NAMES])}{more}"
 
 
 class _Border:
@@ -115,7 +128,7 @@ def _refuse_unknown(function: str, named: Iterable[str], names: Iterable[str]) -
     for name in named:
         if name not in known:
             why, lists = _NEEDLESS.get(name), f"help({function})"
-            advice = f"leave it out: {why}" if why else meant(name, known, lists)
+            advice = f"leave it out: {why}" if why else meant(name, known, lists, _NO_OPTIONS.get(function, ""))
             raise UsageError(name, f"is no option of {function}; {advice}")
 
 
@@ -149,17 +162,18 @@ class Helpful:
         def __getattr__(self, name: str) -> Any:
             if name.startswith("_") or not vars(self):  # what copies and pickles ask for, and an empty object
                 raise AttributeError(name)
-            where = type(self).also.get(name)
-            if callable(where):
-                return where(self)
-            if where:
-                value = attrgetter(where.removesuffix("()"))(self)
-                return value() if where.endswith("()") else value
-            if name in self._contents:
-                return self._contents[name]
-            advice = type(self).instead.get(name) or self._elsewhere(name)
-            text = f"take {advice}" if advice else meant(name, (one for one in dir(self) if not one.startswith("_")))
             with border:
+                where = type(self).also.get(name)
+                if callable(where):
+                    return where(self)
+                if where:
+                    value = attrgetter(where.removesuffix("()"))(self)
+                    return value() if where.endswith("()") else value
+                if name in self._contents:
+                    return self._contents[name]
+                advice = type(self).instead.get(name) or self._elsewhere(name)
+                known = (one for one in dir(self) if not one.startswith("_"))
+                text = f"take {advice}" if advice else meant(name, known)
                 raise NoSuchAttribute(f"{type(self).__name__} has no {name!r}: {text}")
 
 

@@ -94,8 +94,9 @@ class AnalysisResult(Exportable):
         "notes": "warnings",
     }
     instead: ClassVar[Mapping[str, str]] = {
-        "to_pandas": "to_dataframe()",
         "savefig": "plot().savefig(path)",
+        **dict.fromkeys(("figure", "fig", "ax", "axes"), "plot(), which returns the figure, or plot().axes"),
+        **dict.fromkeys(("stats", "statistics"), "fit.statistics"),
         "laws": "models",
         "compare": "to_dataframe('models'), with the weight of each law",
         "quantities": "values",
@@ -112,7 +113,9 @@ class AnalysisResult(Exportable):
         **dict.fromkeys(("dump", "dumps"), "to_json(), or save(folder)"),
         **dict.fromkeys(("pull", "pulls"), "data, which has residuals and u of each reading"),
         **dict.fromkeys(("x", "y", "t", "f", "frequency", "spin"), "time, or data, which has all readings"),
-        **dict.fromkeys(("u", "errors", "stderr", "bse", "uncertainties"), "u of a quantity, as result['c32'].u"),
+        **dict.fromkeys(
+            ("u", "errors", "stderr", "perr", "bse", "uncertainties"), "u of a quantity, as result['c32'].u"
+        ),
         **dict.fromkeys(("head", "describe", "to_numpy", "to_markdown"), "to_dataframe(), which has it"),
         **dict.fromkeys(("rms", "rmse"), "fit.rms_residual"),
         **dict.fromkeys(("show", "print"), "plot(), or print(….summary())"),

@@ -10,7 +10,7 @@ import levilab
 from levilab.errors import UsageError
 from levilab.notebook.analysis import analyze_data
 from levilab.notebook.labels import dataset_of_contents
-from levilab.notebook.names import Exportable, Helpful, bare, meant
+from levilab.notebook.names import CHOOSE, Exportable, Helpful, bare, meant
 from levilab.notebook.quantity import NoSuchName
 from levilab.present.html import facts_as_html, table_as_html
 from levilab.report.export.contents import contents_of_results
@@ -70,7 +70,14 @@ class RecordedRun(Exportable, Run):
     instead: ClassVar[Mapping[str, str]] = {
         "values": "df.to_numpy(), or analyze().values",
         "truth": "record.synthetic_how",
+        "duration": "time.iloc[-1], or record.ended_utc",
+        "id": "name",
+        "attrs": "record",
+        **dict.fromkeys(("settings", "parameters", "config"), "record.configuration"),
     }
+
+    def _elsewhere(self, name: str) -> str:
+        return next((f"record.{one}" for one in type(self.record).model_fields if name in {one, one.split("_")[0]}), "")
 
     @bare
     def __getitem__(self, column: object) -> Any:
@@ -174,9 +181,9 @@ class RunList(Helpful, list[RecordedRun]):
 
     also: ClassVar[Mapping[str, Any]] = {name: f"df.{name}" for name in ("head", "tail", "columns")}
     instead: ClassVar[Mapping[str, str]] = {
-        **dict.fromkeys(("filter", "query", "sel"), "[run for run in runs if run.experiment == 'spin']"),
+        **dict.fromkeys(("filter", "query", "sel", "where", "select"), CHOOSE),
         **dict.fromkeys(("names", "paths", "index_of"), "[run.name for run in runs], or df"),
-        **dict.fromkeys(("groupby", "experiment", "status"), "df, a table with a row for each"),
+        **dict.fromkeys(("groupby", "experiment", "kind", "status"), "df, a table with a row for each"),
         "analyze": "levilab.analyze(runs, kind)",
     }
 

@@ -57,10 +57,10 @@ def in_seconds(duration: float | str) -> float:
 
 
 def whole_key(scene: Scene, name: str) -> str:
-    """Return the dotted key that ends in a name; the name itself where none or several do, for the error to come.
+    """Return the dotted key that ends in a name, or is it with underscores; the name where none or several do.
 
-    >>> whole_key(preset("undriven"), "mass_kg"), whole_key(preset("undriven"), "start.spin_hz")
+    >>> whole_key(preset("undriven"), "mass_kg"), whole_key(preset("undriven"), "start_spin_hz")
     ('top.mass_kg', 'start.spin_hz')
     """
-    found = [key for key, _ in leaves(scene.as_table()) if key.rpartition(".")[2] == name]
+    found = [key for key, _ in leaves(scene.as_table()) if name in {key.rpartition(".")[2], key.replace(".", "_")}]
     return found[0] if len(found) == 1 else name

@@ -55,10 +55,17 @@ class SimulatedMap(Exportable):
         "coords": "axes",
         "keys": "values.keys",
     }
+    instead: ClassVar[Mapping[str, str]] = dict.fromkeys(("shape", "dims", "sizes"), "to_xarray().sizes")
 
     @property
     def _contents(self) -> Mapping[str, Any]:
-        return self.values
+        short = {key.rpartition(".")[2]: key for key in self.axes}
+        return {**{name: self.axes[key] for name, key in short.items() if self._key(name) == key}, **self.values}
+
+    def _key(self, name: str) -> str:
+        """Return the key of the only axis that ends in a name; the name itself where none or several do."""
+        found = [key for key in self.axes if f".{key}".endswith(f".{name}")]
+        return found[0] if len(found) == 1 else name
 
     @property
     def path(self) -> Path | None:
@@ -78,7 +85,7 @@ class SimulatedMap(Exportable):
     @bare
     def __getitem__(self, name: str) -> np.ndarray:
         found: Mapping[str, np.ndarray] = Named({**self.values, **self.axes}, "what was observed")
-        return found[name]
+        return found[self._key(name)]
 
     def __repr__(self) -> str:
         return f"<SimulatedMap: {headline(summarise(self.store))}>"
@@ -130,11 +137,9 @@ class SimulatedMap(Exportable):
         return self._part("isel", {**(at or {}), **named})
 
     def _part(self, how: str, at: Mapping[str, Any]) -> xarray.Dataset:
-        whole = {name: [key for key in self.axes if f".{key}".endswith(f".{name}")] for name in at}
-        keys = {name: found[0] if len(found) == 1 else name for name, found in whole.items()}
         part = getattr(self.to_xarray(), how)
         try:
-            return cast("xarray.Dataset", part(**{keys[name]: value for name, value in at.items()}))
+            return cast("xarray.Dataset", part(**{self._key(name): value for name, value in at.items()}))
         except (KeyError, ValueError, IndexError, TypeError):
             asked = ", ".join(f"{name} = {value}" for name, value in at.items())
             axes = "; ".join(f"{key} = {', '.join(map(str, values))}" for key, values in self.axes.items())

@@ -518,14 +518,15 @@ def _in_the_file(table: Table, error: AnalysisError) -> TableError:
         times = table.column("time_s")
         turned = np.all(np.diff(times) < 0) and np.all(np.diff(frequency) > 0)
         again = times[error.index :]
-        restarts = np.sum(again <= error.before) >= FEWEST and again.max() > times[0] and not turned
+        rises = np.all(np.diff(again[:FEWEST]) > 0)
+        restarts = np.sum(again <= error.before) >= FEWEST and again.max() > times[0] and rises
         advice = (
             "sort the rows by time, the latest comes first; or, if the columns are exchanged, name them the other way "
             "round with `columns`"
             if turned
-            else "a second run seems to begin here: repeat the titles above it, or save each as a file of its own"
+            else "a second run seems to begin here: repeat the titles above it, or analyze each by itself"
             if restarts
-            else "sort the readings, or correct one"
+            else "sort the readings by time, or correct one"
         )
         return TableError(table.path, text, error.after, what, error.before, before, advice, line=after)
     if isinstance(error, NotPositive):
