@@ -210,7 +210,8 @@ class PracticeDrive:
         """Take note that the top has fallen.  Returns how the drive held it by then."""
         hold, self._hold = self._hold, None
         if hold is None:
-            return ""
+            beside = ", beside a drive at {hz:.1f} Hz that did not hold it"
+            return Text(beside, hz=self.output_hz) if self.output_hz else ""
         return ", after its drive had lost it" if hold.is_lost else ", where its drive held it"
 
     def take_count(self, spin: float | None) -> None:

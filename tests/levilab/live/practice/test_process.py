@@ -345,6 +345,12 @@ def test_a_top_falls_near_the_edge_and_is_put_back(tmp_path):
     assert script.spins(36.0, 39.0)[-1][2] == pytest.approx(25.0, abs=0.5)
 
 
+def test_a_fall_beside_a_drive_that_does_not_hold_the_top_names_the_drive(tmp_path):
+    far = (0.5, TuneDrive(frequency_hz=40.0)), (0.6, SwitchDrive(on=True))
+    script = carry_out(tmp_path, *far, (36.0, None), start_hz=25.0)
+    assert ", beside a drive at 40.0 Hz that did not hold it: the spin holds" in script.said("message")[-1]
+
+
 @pytest.mark.parametrize(("tune", "end", "before", "held"), [
     (TuneDrive(frequency_hz=20.0, ramp_hz_per_s=0.3), 45.0, "the top follows the drive at ", "where its drive held"),
     (TuneDrive(amplitude_vpp=0.5), 70.0, "the drive has lost the top near 26.", "after its drive had lost"),
