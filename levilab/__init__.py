@@ -310,7 +310,7 @@ def analyze(
     from levilab.notebook.analysis import analyze_data
 
     if light is not None:
-        return analyze_data((time, light), kind or "spin", options)
+        return analyze_data((time, light), kind or "spin", options, u)
     return analyze_data(data if time is None and frequency is None else (time, frequency), kind, options, u)
 
 

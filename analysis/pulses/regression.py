@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.arrays import Array
 from analysis.pulses.jump import Jump
@@ -209,23 +210,25 @@ class Fit:
         """Return the phase multiplied: half or twice the frequency."""
         return replace(self, coefficients=self.coefficients * factor)
 
-    def of_rounded_intervals(self, times: Array, step: float) -> Fit:
+    def of_rounded_intervals(self, times: Array, used: NDArray[np.intp], step: float) -> Fit:
         """Return the same where the times are sums of rounded intervals, whose errors add up from pulse to pulse.
 
         Intervals that change by less than a step are all rounded alike: the residuals do not show it.
 
         Args:
-            times: of the pulses, without a weight, shape (n,) [s].
+            times: of all pulses, shape (m,) [s].
+            used: the numbers of those that are fitted, without a weight, shape (n,).
             step: of the intervals [s].
         """
-        powers, turn = self._place(times)[:, None] ** np.arange(3), step * self.middle_frequency
+        powers, turn = self._place(times[used])[:, None] ** np.arange(3), step * self.middle_frequency
+        # a smooth sum of roundings has no second differences; of a jitter of 1 they have a variance of 6
         jitter = np.random.default_rng(0).standard_normal(times.size - 1)
-        jitter *= float(np.std(np.diff(self.residuals))) / 2**0.5 / turn
+        jitter *= float(np.std(np.diff(self.residuals, 2))) / 6**0.5 / turn
         intervals = 1 / self.frequency(times[1:]) / step
-        place = _places(powers[1:, 1]) + intervals + jitter
+        place = _places(self._place(times[1:])) + intervals + jitter
         summed = np.cumsum((place - np.rint(place)) * turn, axis=-1).reshape(-1, times.size - 1)
         seen, unit = float(np.sqrt(np.mean(self.residuals**2))), self.unit_covariance
-        errors = np.column_stack([np.zeros(len(summed)), summed])
+        errors = np.column_stack([np.zeros(len(summed)), summed])[:, used]
         more = _hidden_variance(errors, powers, powers @ unit, turn, seen) / float(unit[1, 1])
         covariance = self.covariance.copy()
         covariance[:3, :3] += more * unit

@@ -84,7 +84,7 @@ def spin_of_times(pulse_times: ArrayLike, *, degree: int | None = None, interval
     """
     times = check_times(pulse_times)
     train = fit_train(times, degree=degree, step=interval_step)
-    fit = train.fit.of_rounded_intervals(times[train.used], interval_step) if interval_step else train.fit
+    fit = train.fit.of_rounded_intervals(times, train.used, interval_step) if interval_step else train.fit
     frequency, chirp, bend = fit.motion_at(fit.reference)
     assert frequency.value is not None
     return SpinFrequency(

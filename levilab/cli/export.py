@@ -14,13 +14,15 @@ from levilab.report.export.endings import ENDINGS
 def _split(paths: list[Path] | None, out: Path | None) -> tuple[list[Path], Path | None]:
     """Return the inputs, and the file to write: without --out the last of several names, unless it is another input.
 
-    Raises UsageError, DataError, CannotWrite.
+    Raises UsageError, also for a last name of a file that exists: it may be an input; DataError, CannotWrite.
     """
     if not paths:
         raise UsageError("PATH", "is missing: name a run, a data file or a sweep, as in levilab export runs/NAME")
     *inputs, last = paths
     if not (out or not inputs or (last.exists() and last.suffix.lower() not in ENDINGS)):
         check_ending(last, ENDINGS)
+        if last.exists():
+            raise UsageError("PATH", "is there already: name the file to write with `out`", value=last)
         paths, out = inputs, writable(last)
     return existing_paths(paths) or [], out
 

@@ -38,7 +38,7 @@ LEVITRON = [
 ]
 
 
-def test_lines_of_a_levitron_are_says_synthetic_though_the_weakest_is_two_hundred_times_weaker():
+def test_lines_of_a_levitron_are_resolved_though_one_is_200_times_weaker():
     found = spectral_lines(signal(LEVITRON), 200.0)
     assert len(found.lines) == len(LEVITRON)
     for line, (frequency, amplitude, _) in zip(found.lines, sorted(LEVITRON, key=lambda line: -line[1]), strict=True):

@@ -150,7 +150,7 @@ def _added(path: Path, numbers: NDArray[np.float64], unit: float, line: int, war
     return PulseTimes(path, "list of times from pulse to pulse", np.cumsum(turns), (*warnings, note), step)
 
 
-def _without_overflow(numbers: "NDArray[np.float64]") -> "NDArray[np.float64]":
+def _without_overflow(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return whole numbers of a counter that went on from 0 as ones that go on; others as they are."""
     if not np.all((numbers % 1 == 0) & (numbers < _OVERFLOW)):
         return numbers

@@ -45,8 +45,17 @@ def test_the_uncertainty_predicts_the_scatter():
     assert np.std(pulls) == pytest.approx(1, abs=0.12)  # 3 standard errors of a standard deviation, and u's own scatter
 
 
-@pytest.mark.parametrize(("step", "jitter", "duration"), [(1e-5, 2e-5, 2.0), (1e-5, 2e-5, 10.0), (1e-4, 1e-4, 10.0)])
-def test_rounding_of_intervals_adds_up_in_the_uncertainty(step, jitter, duration):
+@pytest.mark.parametrize(
+    ("step", "jitter", "duration", "most"),
+    [
+        (1e-5, 2e-5, 2.0, 1.7),
+        (1e-5, 2e-5, 10.0, 1.7),
+        (1e-4, 1e-4, 10.0, 1.7),
+        (1e-3, 1e-5, 5.0, 2.5),
+        (1e-3, 1e-5, 10.0, 2.5),
+    ],
+)
+def test_rounding_of_intervals_adds_up_in_the_uncertainty(step, jitter, duration, most):
     """Times that are sums of intervals wander; their residuals show a third to a tenth of it."""
     random, pulls = np.random.default_rng(7), []
     for _ in range(200):
@@ -57,7 +66,8 @@ def test_rounding_of_intervals_adds_up_in_the_uncertainty(step, jitter, duration
         found = spin_of_times(summed, interval_step=step)
         truth = frequency - 0.1 * (found.reference_time + times[1] - summed[0])
         pulls.append((found.frequency.value - truth) / found.frequency.u)
-    assert 0.85 < np.sqrt(np.mean(np.square(pulls))) < 1.7  # 1.0 to 1.5: the first is from rounding of a slow ramp
+    # 1.0 to 1.5; of whole milliseconds 2.3, as of turns that change by one of them many count as missed
+    assert 0.85 < np.sqrt(np.mean(np.square(pulls))) < most
 
 
 def test_equal_intervals_are_known_to_their_step():

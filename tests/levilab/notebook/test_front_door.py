@@ -268,7 +268,7 @@ def test_the_folder_of_a_saved_result_of_arrays_is_loaded(tmp_path):
         levilab.load(tmp_path / "result.json")
 
 
-def test_several_dataframes_are_says_synthetic_by_their_place():
+def test_several_dataframes_are_named_by_their_place():
     frames = [spin_down(), spin_down() * 1.01]
     assert levilab.analyze(frames, reading_u=0.03).inputs == ("DataFrame 1", "DataFrame 2")
     frames[1].loc[2, "spin_frequency_hz"] = -1.0

@@ -333,6 +333,7 @@ REFUSED = {
     "levilab.analyze(t, f, 0.03, 0.03)": "analyze = 4 values: at most 3 without a name are expected",
     "levilab.simulate('driven', {'start.spin_hz': 25}, duration=2)": "duration: is given twice, once without its name",
     "levilab.analyze('sample_data/spin-down-1', u=0.03)": "two arrays beside it, analyze(t, f, u), are expected",
+    "levilab.analyze(time=t, light=f, u=0.03)": "arrays of time_s, light_v, in this order, are expected",
     "result.ci_report(with_offset=False)": "is no option of ci_report",
     "motion.plot(('x', 'y'))": "known are x, y, z",
     "result.plot('fit', 'x')": "plot = 2 values: at most 1 without a name",

@@ -147,7 +147,7 @@ def marks_of_budgets(analysis):
     return [mark_of(analysis.inputs_of(budget.group)) for budget in analysis.budget]
 
 
-def test_groups_of_the_same_mean_are_says_synthetic(sample_data, tmp_path):
+def test_groups_of_the_same_mean_have_each_a_section(sample_data, tmp_path):
     limits = ["67.5,0.25", "68.5,0.25", "68,0.25", "69,0.25"]
     for name, changes, rows in (("a", {}, limits), ("b", {"drive_amplitude_vpp": 20.0}, reversed(limits))):
         folder = shutil.copytree(sample_data / "upper-limits", tmp_path / name)

@@ -153,7 +153,7 @@ def test_real_and_synthetic_inputs_together_are_warned_of(sample_data, tmp_path)
     assert analysis.output_folder == Path()
 
 
-def test_inputs_of_the_same_name_are_says_synthetic(tmp_path):
+def test_inputs_of_the_same_name_have_their_folders_in_it(tmp_path):
     for k, folder in enumerate(("monday", "tuesday")):
         (tmp_path / folder).mkdir()
         spin_down_csv(tmp_path / folder / "run.csv", seed=k)
