@@ -74,7 +74,7 @@ def is_property(method):
 
 @cache
 def overridden(name):
-    """The methods that some class below this one has again."""
+    """The methods that a class below this one overrides."""
     below = [other for other in classes() if other != name and name in lineage(other)]
     return frozenset(method for other in below for method in methods(other))
 

@@ -222,12 +222,15 @@ class Fit:
         """
         powers, turn = self._place(times[used])[:, None] ** np.arange(3), step * self.middle_frequency
         # a smooth sum of roundings has no second differences; of a jitter of 1 they have a variance of 6
-        jitter = np.random.default_rng(0).standard_normal(times.size - 1)
-        jitter *= float(np.std(np.diff(self.residuals, 2))) / 6**0.5 / turn
+        white = float(np.std(np.diff(self.residuals, 2))) / 6**0.5
+        jitter = white / turn * np.random.default_rng(0).standard_normal(times.size - 1)
         intervals = 1 / self.frequency(times[1:]) / step
         place = _places(self._place(times[1:])) + intervals + jitter
         summed = np.cumsum((place - np.rint(place)) * turn, axis=-1).reshape(-1, times.size - 1)
-        seen, unit = float(np.sqrt(np.mean(self.residuals**2))), self.unit_covariance
+        # differences of a clock are rounded, too, but do not add up: their residuals are white, and only the rest may
+        # wander; its standard error is 1.4 white² / √n
+        rest = max(float(np.mean(self.residuals**2)) - white**2, 0.0) + white**2 * (2 / used.size) ** 0.5
+        seen, unit = rest**0.5, self.unit_covariance
         errors = np.column_stack([np.zeros(len(summed)), summed])[:, used]
         more = _hidden_variance(errors, powers, powers @ unit, turn, seen) / float(unit[1, 1])
         covariance = self.covariance.copy()

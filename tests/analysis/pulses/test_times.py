@@ -70,6 +70,15 @@ def test_rounding_of_intervals_adds_up_in_the_uncertainty(step, jitter, duration
     assert 0.85 < np.sqrt(np.mean(np.square(pulls))) < most
 
 
+def test_intervals_that_are_differences_of_a_clock_do_not_add_up():
+    random, uncertainties = np.random.default_rng(7), []
+    for _ in range(40):
+        times = pulse_times(random.uniform(27, 33), duration=5.0, phase=random.uniform())
+        clock = 1e-3 * np.rint(times / 1e-3)
+        uncertainties.append(spin_of_times(np.cumsum(np.diff(clock)), interval_step=1e-3).frequency.u)
+    assert np.median(uncertainties) < 0.01  # rounded one by one they would leave 0.09 Hz
+
+
 def test_equal_intervals_are_known_to_their_step():
     found = spin_of_times(0.033 * np.arange(1, 60), interval_step=1e-3)
     u = 1e-3 / 24**0.5 / 0.033**2  # any place in the step and any slope within it: |place| + |slope| < half a step

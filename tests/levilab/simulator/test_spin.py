@@ -14,7 +14,7 @@ START = 2 * math.pi * 40.0  # [rad/s]
 
 #: Constants of which one is hardly or not at all there.
 OF_ONE = [(1e-9, 1.7e-5), (3e-3, 1e-12), (0.0, 1.7e-5), (3e-3, 0.0)]
-#: ω̇ = −g(ω), written down again, with constants of the size that tops show (PHYSICS.md, 5), and with extremes.
+#: ω̇ = −g(ω), written independently, with constants of the size that tops show (PHYSICS.md, 5), and with extremes.
 LAWS = {
     "stokes": (lambda w, c: c * w, [(3.18e-3,), (1e-7,), (0.5,)]),
     "newton": (lambda w, c: c * w**2, [(1.70e-5,), (1e-9,), (1e-2,)]),
