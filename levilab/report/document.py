@@ -306,7 +306,7 @@ def banner_of(sources: Sequence[Source[Any]], *, mixed: bool = False) -> Banner 
         return Banner(
             "SYNTHETIC.", "This file did not come from a real bench: its first line says so." if files else run
         )
-    how = "How each was made stands in its run.json." if files < total else ""
+    how = "How each was made stands in its run.json." if any(one.run for one in sources if one.synthetic) else ""
     if len(made_up) == total:
         said = Text("None of these {total} runs came from a real bench.", total)
         if files:

@@ -215,6 +215,8 @@ def test_a_file_whose_first_line_says_that_it_is_synthetic_has_the_mark(tmp_path
     assert "SYNTHETIC. This file did not come from a real bench: its first line says so." in text_of(file)
     both = text_of(sample_data / "spin-down-1", file)
     assert "1 run and 1 data file: none came from a real bench. How each was made stands in its run.json." in both
+    real = changed(shutil.copytree(sample_data / "spin-down-1", tmp_path / "real"), synthetic=False)
+    assert "How each was made" not in text_of(real, file)
 
 
 def test_a_mixture_of_real_and_synthetic_runs_is_no_measurement_and_says_so(tmp_path, sample_data):
