@@ -36,7 +36,7 @@ class Tail:
                 return []
             with self.path.open("rb") as file:
                 about = os.fstat(file.fileno())
-                self._begin_anew_if_replaced((about.st_dev, about.st_ino), about.st_size)
+                self._restart_if_replaced((about.st_dev, about.st_ino), about.st_size)
                 file.seek(self._at)
                 while piece := file.read(PIECE_BYTES):
                     self._at += len(piece)
@@ -63,7 +63,7 @@ class Tail:
         self._skipping = self._skipping or len(torn) > _LONGEST
         self._torn = b"" if self._skipping else torn
 
-    def _begin_anew_if_replaced(self, identity: tuple[int, int], size: int) -> None:
+    def _restart_if_replaced(self, identity: tuple[int, int], size: int) -> None:
         if self._identity is not None and (identity != self._identity or size < self._at):
             self.generation += 1
             self._at, self._torn, self._skipping = 0, b"", False

@@ -336,7 +336,7 @@ def test_the_coils_field_is_the_generators_voltage_in_time(output, times, seen):
     assert coil_at(top, times) == pytest.approx(1e-4 * np.array(seen), abs=1e-4 * 1e-9)
 
 
-def test_bursts_keep_their_rhythm_when_their_size_changes_and_begin_anew_with_another():
+def test_bursts_keep_their_rhythm_when_their_size_changes_and_restart_with_another():
     top = world()
     drive(top, 0.005, "SQU", 2.0, 1.0, burst=Burst(1, 2.0))
     drive(top, 3.005, "SQU", 2.0, 2.0, burst=Burst(1, 2.0))
