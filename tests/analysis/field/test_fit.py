@@ -209,6 +209,13 @@ def test_a_field_that_no_ring_has_is_none_of_a_base(u):
     assert "no ring" in {of.kind for of in found.remarks}
 
 
+def test_a_weak_field_far_from_the_base_is_no_background_as_it_changes():
+    far = np.arange(0.2, 0.41, 0.01)  # from 2.1 to 0.3 mT, within the range of a phone
+    found = fit_scan(far, on_axis(TRUTH, far)[0] + 4e-5, replace(KNOWN, background=Known.background), 1e-6, 1e-4)
+    strength = found.parameters["strength"]
+    assert abs(strength.value - TRUTH.strength) < 3 * strength.u < 0.3 * TRUTH.strength
+
+
 def test_diameters_for_radii_make_the_field_that_of_no_ring():
     known = replace(KNOWN, inner_radius=Prior(0.060, 1e-4), outer_radius=Prior(0.110, 1e-4), origin=None)
     found = fit_scan(Z, scan(1, u_b=2e-5), known, None, None)
