@@ -46,6 +46,8 @@ Kind = Literal[
     "uncertain drive",  # greatest u of the drive in u of the precession
     "uncertain clock",  # relative u of the drive, the u of the slope from it, u of the slope
     "drive u unknown",
+    "ratio",  # of precession and drive, by a count or a unit
+    "spins off",  # number of points whose spin is off the drive, points, greatest distance [Hz]
     "spin off",  # mean of spin − drive [Hz]
     "slopes differ",  # number of runs, probability of such slopes
     # of a scan
@@ -57,6 +59,7 @@ Kind = Literal[
     "no strength",
     "stray reading",  # height [m], distance from the others in u
     # of the tops that float
+    "no such mass",  # mass of a top that floats [kg]
     "another zero",  # stated height, lowest and highest by the scan [m]
     "rough mass",  # u of the mass to set, width of the window [kg]
 ]

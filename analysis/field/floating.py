@@ -241,6 +241,10 @@ def _upper_window(field: AxialField, top: SymmetricTop, ring: Ring, near: list[W
     return lifted[-1]
 
 
+#: No Levitron in print weighs so little or so much: they weigh 16 to 30 g.
+_LIGHTEST_KG, _HEAVIEST_KG = 5e-3, 0.1
+
+
 def _doubts(found: Floating, top: KnownTop) -> list[Remark]:
     said = []
     if top.height is not None and top.height.value is not None:
@@ -249,6 +253,9 @@ def _doubts(found: Floating, top: KnownTop) -> list[Remark]:
             said.append(Remark("another zero", values=(height, low, high)))
     width = found["heaviest_mass"] - found["lightest_mass"]
     u = found.values["mass_to_set"].u
+    mass = found["mass_to_set"]
+    if not _LIGHTEST_KG <= mass <= _HEAVIEST_KG:
+        said.append(Remark("no such mass", values=(mass,)))
     if u is not None and u > width / 4:
         said.append(Remark("rough mass", values=(u, width)))
     return said

@@ -22,6 +22,8 @@ from analysis.uncertainty import FEW_LEFT, student
 
 #: A joint test below this excludes slope 1 and intercept 0.
 EXCLUDED_P = 0.01
+#: Precession over drive where pulses are counted twice or every second one, or a unit is 1/min or rad/s: within 2 %.
+RATIOS_OF_UNITS, _NEAR_RATIO = (2.0, 0.5, 3.0, 60.0, 1 / 60, 2 * math.pi, 1 / (2 * math.pi)), 0.02
 #: A point deserves a warning above this studentised residual, or this leverage in units of the mean one.
 _FAR, _HEAVY = 3.5, 3.0
 #: Least ratio of the drive's u to the precession's u that matters.
@@ -298,9 +300,29 @@ def _doubts(fit: SweepFit, sweep: Sweep, found: list[Miscount]) -> list[Remark]:
         said += _about_drive(sweep.drive, sweep.u_drive, sweep.u, line)
     if line.orthogonal and (sweep.u is None or sweep.u_drive is None):
         said.append(Remark("drive u unknown"))
-    off, u = fit.spin_offset, fit.u_spin_offset
-    if off is not None and u is not None and abs(off) >= max(_SPIN_SHARE * sweep.drive.mean(), _SPIN_FAR * u):
-        said.append(Remark("spin off", values=(off,)))
+    return [*said, *_about_ratio(sweep, line.slope), *_about_spins(fit, sweep)]
+
+
+def _about_ratio(sweep: Sweep, slope: float) -> list[Remark]:
+    """Return a remark where the precession is a multiple of the drive by a count or a unit, in slope and in size."""
+    times = float(sweep.precession.mean() / sweep.drive.mean())
+    near = (one for one in RATIOS_OF_UNITS if max(abs(slope / one - 1), abs(times / one - 1)) < _NEAR_RATIO)
+    return [Remark("ratio", values=(ratio,)) for ratio in near]
+
+
+def _about_spins(fit: SweepFit, sweep: Sweep) -> list[Remark]:
+    """Return remarks where the spin lies off the drive: at some points more than at most, or in the mean."""
+    said, mean, u = list[Remark](), fit.spin_offset, fit.u_spin_offset
+    if sweep.spin is None or mean is None or u is None:
+        return said
+    off = sweep.spin - sweep.drive
+    away = np.abs(off - np.median(off))
+    scatter = 1.4826 * float(np.median(away))  # of few points it is known badly
+    far = away > np.maximum(_SPIN_SHARE * sweep.drive, student(off.size - 1, _SPIN_FAR) * scatter)
+    if far.any():
+        said.append(Remark("spins off", values=(int(far.sum()), off.size, float(away[far].max()))))
+    if abs(mean) >= max(_SPIN_SHARE * sweep.drive.mean(), _SPIN_FAR * u):
+        said.append(Remark("spin off", values=(mean,)))
     return said
 
 

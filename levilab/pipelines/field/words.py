@@ -239,6 +239,14 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Weighed] = MappingProxyType(
             low=1e3 * low,
             high=1e3 * high,
         ),
+        "no such mass": Weighed(
+            lambda mass: Text(
+                "a top of {mass:n} g would float over this base, and Levitrons weigh 16 to 30 g: is the unit of the "
+                "flux density right (1 mT are 10 G), and the moment of the top?",
+                mass=digits(1e3 * mass, 2),
+            ),
+            "doubt",
+        ),
         "rough mass": lambda u, width: Text(
             "the mass to set is known to {u:n} g only, and the window is {width:n} g wide: try masses "
             "about it; the height at which one floats gives the moment",

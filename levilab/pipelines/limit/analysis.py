@@ -15,6 +15,7 @@ from analysis.locked import Cause
 from analysis.numbers import digits
 from analysis.spindown.fall import FALLS_BETWEEN_HZ, STOPPED_ABOVE_HZ
 from levilab.errors import DataError
+from levilab.formats.understanding import possible_spins
 from levilab.pipelines.analyzed import Analyzed
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.limit.readings import LimitReadings
@@ -269,8 +270,11 @@ class LimitAnalysis(Analyzed[LimitReadings, Limits, tuple[Limits, ...], LimitOpt
     def about_run(self, run: Limits) -> Iterable[str]:
         """Yield what to know of one run."""
         if run.which == "upper" and run.is_doubtful:
-            said = "{spin:n} is no upper limit of a top: is it in rad/s, or was each turn counted several times?"
-            yield Note("stopped", Text(said, with_uncertainty(run.statistics.mean)), weight="doubt")
+            mean = run.statistics.mean
+            fitting = possible_spins(mean.value or 0.0)
+            units = tuple(f"{unit} ({hz:.1f} Hz)" for unit, hz in fitting.items() if unit != "Hz")
+            said = "{spin:n} is no upper limit of a top: is it in {units}, or was each turn counted several times?"
+            yield Note("stopped", Text(said, with_uncertainty(mean), units or ("another unit",)), weight="doubt")
         elif run.is_doubtful:
             fast = (run.statistics.mean.value or 0.0) > run.device.linear_lower_hz
             why = "was it stopped, or held by a drive?" if fast else "was each second turn counted?"

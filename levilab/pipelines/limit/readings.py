@@ -13,8 +13,8 @@ from analysis.errors import AnalysisError
 from analysis.limits import U_OF_WAY, spin_at_fall
 from analysis.rotation import track_of_field
 from analysis.spindown.fall import STOPPED_ABOVE_HZ
-from levilab.errors import DoesNotSuit
-from levilab.formats.columns import NoSuchColumn, NoTable, TableError
+from levilab.errors import DataError, DoesNotSuit, UsageError
+from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, Table, must_be_positive, read_table
 from levilab.formats.texts import locate, texts_of
 from levilab.formats.titles import read_title, unit_factor
@@ -67,7 +67,7 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
         return limits_in_field(path, field, options.near)
     try:
         table = read_table(path, quantities=QUANTITIES, needed=NEEDED, **options.of_tables)
-    except (NoTable, NoSuchColumn) as error:
+    except (DataError, UsageError) as error:  # a title of several words looks like several columns
         single = single_column(path, guess=options.guess)
         if single is None:
             raise error from None

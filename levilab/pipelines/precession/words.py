@@ -110,6 +110,20 @@ def _point(points: tuple[Point, ...], k: float) -> str:
     return Text("point {number:.0f}, at {drive:.5g} Hz", number=k + 1, drive=points[int(k)].drive)
 
 
+#: What makes the precession this multiple of the drive.
+_CAUSES: Mapping[float, str] = MappingProxyType(
+    {
+        2.0: "two pulses a turn were counted",
+        0.5: "every second pulse was counted",
+        3.0: "three pulses a turn were counted",
+        60.0: "the precession is in 1/min",
+        1 / 60: "the drive is in 1/min",
+        2 * math.pi: "the precession is in rad/s",
+        1 / (2 * math.pi): "the drive is in rad/s",
+    }
+)
+
+
 _REMARKS: Mapping[str, str | Callable[..., str] | Weighed] = MappingProxyType(
     {
         "many miscounts": Weighed(
@@ -150,6 +164,22 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Weighed] = MappingProxyType(
             "is uncertain by {slope:n} beside its u of {u:n}"
         ),
         "drive u unknown": "u of the drive's frequency is not known and taken as large as that of the precession",
+        "ratio": Weighed(
+            lambda _, ratio: Text(
+                "the precession is {times:.3g} times the drive: {cause}", times=ratio, cause=_CAUSES[ratio]
+            ),
+            "doubt",
+        ),
+        "spins off": Weighed(
+            lambda _, n, points, most: Text(
+                "the spin of {n:.0f} of {points:.0f} points lies up to {hz:n} Hz farther off the drive than the "
+                "others: the top was not locked there; leave them out",
+                n=n,
+                points=points,
+                hz=digits(most, 3),
+            ),
+            "doubt",
+        ),
         "spin off": Weighed(
             lambda _, off: Text(
                 "the spin that was counted lies {hz:n} Hz {way} the drive: a locked top spins with it; is "

@@ -26,6 +26,7 @@ from levilab.formats.table import FEWEST, Table, read_table, refuse
 from levilab.formats.titles import PER_MINUTE
 from levilab.formats.understanding import (
     LEAST_FALL,
+    SLOWEST_SPIN_HZ,
     is_possible_loss,
     is_possible_spin,
     length_of,
@@ -399,6 +400,10 @@ def _without_start(table: Table) -> Table:
     return replace(_rows(table, slice(top, None)), warnings=(*table.warnings, note))
 
 
+#: Readings that may be lower than a top floats: its fall, and what is counted of one that lies.
+_FALLEN = 3
+
+
 def _doubt(text: str, say: str = "") -> Note:
     """Return a doubt; say: the advice in it, whose options are those of the doubt."""
     return Note("unit", text, weight="doubt", names_input=True, options=say.options if isinstance(say, Note) else {})
@@ -414,6 +419,13 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
             say = "; if its point stands behind the thousands, write the numbers without it"
         text = "{name:s}: the spin is about {spin:n} Hz, a Levitron spins at 20 to 60 Hz{say}"
         return [_doubt(Text(text, name=table.path.name, spin=digits(middle, 4), say=say), say)]
+    low = float(np.sort(frequency)[min(_FALLEN, len(frequency) - 1)])
+    if low < SLOWEST_SPIN_HZ:
+        text = (
+            "{name:s}: the spin goes down to {low:n} Hz, and no Levitron floats below 15 Hz: if every second turn was "
+            "counted, say so with its column, as f=NAME [1/0.5s]; rows after the fall leave out"
+        )
+        return [_doubt(Text(text, name=table.path.name, low=digits(low, 4)))]
     if step * middle < 1:  # nor does a counter give a reading in less
         doubt = Text(
             "{name:s}: the readings lie {step:.3g} ms apart, the top needs {turn:.3g} ms for a turn; if the times are "

@@ -86,6 +86,22 @@ def test_a_few_points_without_u_are_seldom_off_their_line_by_chance(n):
     assert all(("few left" in said) == (n == 3) for said in kinds)
 
 
+@pytest.mark.parametrize("ratio", [2.0, 0.5, 60.0, 2 * np.pi])
+def test_a_precession_that_is_a_multiple_of_the_drive_by_count_or_unit_is_named(ratio):
+    drive, noise = np.arange(44.0, 26, -2), np.random.default_rng(1).standard_normal(9)
+    said = fit_sweep(Sweep(drive, ratio * (drive + 0.02 * noise))).remarks
+    assert [one.values for one in said if one.kind == "ratio"] == [(ratio,)]
+
+
+@pytest.mark.parametrize(("lost", "said"), [(0, []), (2, [2])])
+def test_points_whose_spin_is_off_the_drive_are_named(lost, said):
+    drive, random = np.arange(44.0, 26, -2), np.random.default_rng(2)
+    spin = drive + 1e-3 * random.standard_normal(9)
+    spin[9 - lost :] += 1.5
+    found = fit_sweep(Sweep(drive, spin + 0.02 * random.standard_normal(9), spin=spin)).remarks
+    assert [one.values[0] for one in found if one.kind == "spins off"] == said
+
+
 def test_a_rounded_point_a_step_beside_the_line_is_no_miscount():
     drive = np.arange(44.0, 26, -2)
     counted = drive - 0.1 * (drive == 42)  # in steps of 0.1 Hz the others lie on the line

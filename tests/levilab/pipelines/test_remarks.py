@@ -40,6 +40,8 @@ OF_SWEEP = {
     of("uncertain drive", 1.0): "up to 1 u of the precession: let it count with `orthogonal` = True",
     of("uncertain clock", 2e-3, 2e-3, 1e-3): "as that of a clock: the slope is uncertain by 0.002 beside its u",
     of("drive u unknown"): "taken as large as that of the precession",
+    of("ratio", 2.0): "the precession is 2 times the drive: two pulses a turn were counted",
+    of("spins off", 2.0, 8.0, 2.6): "the spin of 2 of 8 points lies up to 2.6 Hz farther off the drive than the others",
     of("spin off", -0.4): "the spin that was counted lies 0.4 Hz below the drive",
     of("slopes differ", 2.0, 1e-3): "the slopes of the 2 runs differ by more than their u says (p = 0.001)",
 }
@@ -53,6 +55,7 @@ OF_FIELD = {
     of("no ring", 4e-4, 4e-3): "the residuals are 0.4 mT (rms) where the field is 4 mT at most: no ring magnet",
     of("no strength"): "the strength is not significantly different from zero",
     of("stray reading", 0.075, 6.0): "the reading at 75 mm lies 6.0 u off the others",
+    of("no such mass", 0.244): "a top of 240 g would float over this base, and Levitrons weigh 16 to 30 g",
     of("another zero", 0.06, 0.07, 0.075): "said to float at 60 mm, by this scan tops float from 70 to 75 mm",
     of("rough mass", 1e-3, 5e-4): "the mass to set is known to 1 g only, and the window is 0.5 g wide",
 }

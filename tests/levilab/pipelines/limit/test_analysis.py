@@ -44,9 +44,9 @@ def test_the_published_limits_give_the_published_statistics(sample_data):
 @pytest.mark.parametrize(
     ("title", "factor", "said"),
     [
-        ("f [Hz]", 1, ""), ("omega [1/s]", 2 * np.pi, ""), ("omega", 2 * np.pi, ""),
+        ("f [Hz]", 1, ""), ("Grenzfrequenz in Hz", 1, ""), ("omega [1/s]", 2 * np.pi, ""), ("omega", 2 * np.pi, ""),
         ("f [Hz]", 2, "with 2 marks a turn they are lower ones, at 21.80 Hz"),
-        ("f [Hz]", 2 * np.pi, "is no upper limit of a top: is it in rad/s"),
+        ("f [Hz]", 2 * np.pi, "is no upper limit of a top: is it in rad/s (21.8 Hz)"),
     ],
 )  # fmt: skip
 def test_lower_limits_in_other_units_are_read_or_named(tmp_path, title, factor, said):

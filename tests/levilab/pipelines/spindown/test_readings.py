@@ -199,6 +199,15 @@ def test_spins_with_which_no_top_floats_are_doubted(tmp_path):
     assert "the spin is about 13.5 Hz, a Levitron spins at 20 to 60 Hz" in readings.warnings[0]
 
 
+@pytest.mark.parametrize(("slowest", "doubted"), [(10.7, True), (21.4, False)])
+def test_a_spin_below_which_no_levitron_floats_asks_whether_turns_were_left_out(slowest, doubted, tmp_path):
+    falls = np.linspace(25, slowest, 20) if doubted else np.append(np.linspace(50, slowest, 20), [9.0, 4.0, 3.0])
+    rows = "".join(f"{10 * k},{spin:.3f},.01\n" for k, spin in enumerate(falls))
+    said = [text for text in spin_readings(table_of(tmp_path, HEADER + rows)).warnings if "below 15 Hz" in text]
+    assert bool(said) is doubted  # of a fall some readings are lower
+    assert all("f=NAME [1/0.5s]" in text for text in said)
+
+
 def test_readings_between_two_spins_are_fitted_and_the_result_says_so(tmp_path):
     path = spin_down_csv(tmp_path / "a.csv")
     whole = SPINDOWN.analyze([path], SpinDownOptions(tilt="none"))
