@@ -47,7 +47,8 @@ _ROUNDING = 1e-9
 #: Logarithms of unknown scatters over the rms residual, from 0.7 %, which adds 5×10⁻⁵ to a variance, to 20; the steps
 #: of their grid, and how far the logarithm of the likelihood falls on it: what lies beyond is less than 10⁻⁵.
 _LOGS, _STEPS, _FAR = (-5.0, 3.0), 20, 12.0
-#: A field below this multiple of the background's u, that changes by less than this u, counts as none.
+#: A field below this multiple of the background's u counts as none, unless the means of its lower and its upper half
+#: differ by more than this u.
 _NO_FIELD = 5.0
 #: The Durbin–Watson statistic of residuals in no order; it is smaller where neighbours are alike.
 _BY_CHANCE = 2.0
@@ -238,7 +239,7 @@ def fit_scan(
         ShapesDiffer, NotFinite, NotPositive: the arrays cannot be fitted.
         ImpossibleRing: no ring has such radii.
         TooFewHeights: fewer than four heights.
-        NoField: the readings neither exceed the background nor change by more than its u.
+        NoField: the readings neither exceed the background nor change with height by more than its u.
         FieldStandsStill: the probe is saturated.
         FieldTurnsOver: the probe was turned over.
         NotFitted: the search did not end.
@@ -285,7 +286,8 @@ def _refuse_bad_scans(z: Array, b: Array, known: Known) -> None:
         raise TooFewHeights(seen=starts.size, needed=FEWEST_HEIGHTS, lowest=lowest, highest=highest)
     distinct = z[starts]
     mean = np.array([part.mean() for part in np.split(b, starts[1:])])
-    if np.abs(b).max() < _NO_FIELD * known.background.u and np.ptp(b) < known.background.u:
+    change = float(np.ptp([half.mean() for half in np.array_split(mean, 2)]))
+    if np.abs(b).max() < _NO_FIELD * known.background.u and change < known.background.u:
         raise NoField(largest=float(np.abs(b).max()), background_u=known.background.u)
     _refuse_plateau(distinct, mean)
     # the reversal is known as well as the origin is; the field near it is small, and may have either sign

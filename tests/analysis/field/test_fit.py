@@ -216,6 +216,12 @@ def test_a_weak_field_far_from_the_base_is_no_background_as_it_changes():
     assert abs(strength.value - TRUTH.strength) < 3 * strength.u < 0.3 * TRUTH.strength
 
 
+def test_noise_beside_no_base_is_no_field():
+    noise = 3e-4 + 2e-4 * np.random.default_rng(0).standard_normal(Z.size)  # range 0.7 mT, u of the zero 0.5 mT
+    with pytest.raises(NoField):
+        fit_scan(Z, noise, replace(KNOWN, background=Known.background))
+
+
 def test_diameters_for_radii_make_the_field_that_of_no_ring():
     known = replace(KNOWN, inner_radius=Prior(0.060, 1e-4), outer_radius=Prior(0.110, 1e-4), origin=None)
     found = fit_scan(Z, scan(1, u_b=2e-5), known, None, None)
