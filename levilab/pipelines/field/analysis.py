@@ -12,6 +12,7 @@ from levilab.pipelines.field.readings import FieldReadings
 from levilab.pipelines.field.words import about_top, remark, scan_as_text, scans_as_text
 from levilab.pipelines.inputs.source import Source
 from levilab.pipelines.options import FieldOptions
+from levilab.texts.note import Note
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +97,11 @@ def analyze_source(source: Source[FieldReadings], options: FieldOptions) -> Fiel
     if floating is None and scan.is_of_a_ring:
         warnings = ["no top of this kind floats above this base at any mass and spin: are radii and inertias right?"]
     if readings.u is None:
-        warnings.append("no uncertainty of the readings is given: their scatter about the fit stands for it")
+        said = "no uncertainty of the readings is given: their scatter about the fit stands for it"
+        warnings.append(Note("no u", said, weight="advice"))
     if readings.height_u is None:
-        warnings.append("no uncertainty of the heights is given: their scatter about the fit stands for it")
+        said = "no uncertainty of the heights is given: their scatter about the fit stands for it"
+        warnings.append(Note("no height u", said, weight="advice"))
     return FieldRun(scan, top, floating, tuple(warnings), taken)
 
 

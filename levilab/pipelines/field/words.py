@@ -247,11 +247,14 @@ _REMARKS: Mapping[str, str | Callable[..., str] | Weighed] = MappingProxyType(
             ),
             "doubt",
         ),
-        "rough mass": lambda u, width: Text(
-            "the mass to set is known to {u:n} g only, and the window is {width:n} g wide: try masses "
-            "about it; the height at which one floats gives the moment",
-            u=digits(1e3 * u),
-            width=digits(1e3 * width),
+        "rough mass": Weighed(
+            lambda u, width: Text(
+                "the mass to set is known to {u:n} g only, and the window is {width:n} g wide: try masses "
+                "about it; the height at which one floats gives the moment",
+                u=digits(1e3 * u),
+                width=digits(1e3 * width),
+            ),
+            "advice",
         ),
     }
 )

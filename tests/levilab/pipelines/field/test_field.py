@@ -21,6 +21,7 @@ from levilab.pipelines.result import save
 from levilab.pipelines.top import calculate_top
 from levilab.report.page import render
 from levilab.runs.find import RECORD
+from levilab.texts.note import weight_of
 from levilab.world.base import Base
 from support.figures import faults
 
@@ -130,6 +131,15 @@ def test_of_a_top_that_is_not_described_the_result_says_whose_it_is(scan, sample
     assert FIELD.recall([scan]).text == real.text
     known = FIELD.analyze([scan], FieldOptions(device=read_device(sample_data / "device.toml")))
     assert known.text.startswith("Tops float from")
+
+
+def test_of_a_sound_scan_without_u_all_notes_but_one_on_its_top_are_advice(tmp_path):
+    """A class takes all other notes for reasons to look at a group."""
+    noisy = FIELD_MT + 0.02 * np.random.default_rng(1).standard_normal(HEIGHTS_MM.size)
+    file = csv(tmp_path / "own.csv", "z [mm],B [mT]", HEIGHTS_MM, noisy)
+    found = FIELD.analyze([file], FieldOptions(device=CALLIPER))
+    notes = [text for run in found.runs for text in found.about_run(run) if weight_of(text) != "advice"]
+    assert [text[:24] for text in notes] == ["the top is not described"]
 
 
 def test_no_masses_follow_from_a_field_that_no_ring_has(tmp_path):
