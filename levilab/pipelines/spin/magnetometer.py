@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.arrays import Array
 from analysis.pulses import Finding, SpinFrequency
@@ -25,6 +26,9 @@ QUANTITIES = ("time_s", *COMPONENTS, "flux_density_t", MAGNITUDE)
 NEEDED = tuple(("time_s", name) for name in (*COMPONENTS, MAGNITUDE))
 #: No field that a phone survives is as strong [T]: the unit is in doubt.
 STRONGEST_T = 0.1
+#: Samples were written again where more than this part of them stands twice to this often in succession; of a field at
+#: rest they are alike for longer.
+_REPEATS, _LONGEST = 0.3, 6
 #: A slower record shows no spin [samples/s]: a scan of the field by hand has one a second.
 SLOWEST_RATE = 20.0
 
@@ -86,6 +90,14 @@ def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
         k = int(back[0])
         back_to = "the time {then:.9g} s comes after {now:.9g} s: cut the file where the recording was started again"
         raise TableError(path, Text(back_to, then=times[k + 1], now=times[k]), line=int(table.lines[k + 1]))
+    first = _first_of_each(field)
+    if first.size < times.size:
+        said = (
+            "{name:s}: {n} of {samples} samples repeat the one before, as of an app that writes faster than the sensor "
+            "is read: they are left out"
+        )
+        warnings.append(of_file("repeats", Text(said, path.name, times.size - first.size, times.size)))
+        times, field = times[first], field[first]
     strongest = float(np.abs(np.median(field, axis=0)).max())
     if strongest > STRONGEST_T:
         units = ",".join(f"{'babs' if axis == '|B|' else 'b' + axis}=NAME [µT]" for axis in axes.values())
@@ -102,6 +114,17 @@ def read_field_record(path: Path, options: InputOptions) -> FieldRecord | None:
         warnings.append(of_file("magnitude", Text(alone, name=path.name)))
     record = FieldRecord(times, field, tuple(axes.values()), tuple(warnings))
     return record if record.duration > 0 and record.rate > SLOWEST_RATE else None
+
+
+def _first_of_each(field: Array) -> NDArray[np.intp]:
+    """Return the indices of samples that do not repeat the one before; all where few do, or a field is at rest.
+
+    field: shape (n, k).
+    """
+    starts = np.flatnonzero(np.append(True, np.any(np.diff(field, axis=0) != 0, axis=1)))
+    lengths = np.diff(np.append(starts, len(field)))
+    again = lengths[(lengths > 1) & (lengths <= _LONGEST)].sum()
+    return starts if again > _REPEATS * len(field) else np.arange(len(field))
 
 
 def _needed(path: Path, options: InputOptions) -> tuple[str, str] | None:

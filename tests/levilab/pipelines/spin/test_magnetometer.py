@@ -50,6 +50,22 @@ def test_a_phones_record_gives_spin_amplitudes_and_budget(short):
     assert "clockwise" in " ".join(meaning(found))
 
 
+def test_samples_that_an_app_writes_again_are_left_out(tmp_path):
+    """Of a sensor read 50 times a second and written 100 times; with its repeats it has lines of both rates."""
+    times, field = synthetic_field(np.random.default_rng(53))
+    (run,) = ANALYSES["spin"].analyze([phone(tmp_path / "twice.csv", times, np.repeat(field[::2], 2, axis=0))]).runs
+    assert 31.0 in {round(fold.frequency, 1) for fold in run.line.folds}
+    (once,) = ANALYSES["spin"].analyze([phone(tmp_path / "once.csv", times[::2], field[::2])]).runs
+    assert run.spin.frequency.value == pytest.approx(once.spin.frequency.value, abs=1e-9)
+
+
+def test_a_field_at_rest_is_no_sample_written_again(tmp_path):
+    _, field = synthetic_field(np.random.default_rng(54))
+    field = np.vstack([field, np.repeat(field[-1:], 700, axis=0)])  # a coarse sensor, after the top was taken away
+    found = ANALYSES["spin"].analyze([phone(tmp_path / "rest.csv", np.arange(len(field)) / 100, field)])
+    assert not any("repeat the one before" in text for text in said(found))
+
+
 def test_the_tilt_of_the_moment_follows_from_distance_and_moment(short):
     found = ANALYSES["spin"].analyze([short], SpinOptions(distance_m=0.2, moment_a_m2=0.714))
     (run,) = found.runs
