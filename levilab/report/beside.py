@@ -16,11 +16,13 @@ import numpy as np
 from analysis.comparison import Comparison, compare, gross_errors
 from analysis.numbers import digits
 from analysis.spindown.drag import LAWS
+from analysis.spindown.fit import SpinDown
 from analysis.uncertainty import Estimate, mean, student
 from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import as_typed, unquote
 from levilab.pipelines.inputs.names import seed_of_group, short_paths
 from levilab.pipelines.options import OF_FILES
+from levilab.pipelines.spindown.words import law_name
 from levilab.present.numbers import enumeration, plain, with_sign, with_uncertainty
 from levilab.present.units import unit
 from levilab.report.reproduction import typed_options
@@ -55,6 +57,7 @@ class Group:
         best_model: the law that describes its readings best, or "undecided"; empty where no laws compete.
         warnings: about it, without advice, doubts and those of models that are not compared.
         doubts: that make its numbers worthless where they are right, with the command that follows their advice.
+        excluded: laws that its readings exclude.
     """
 
     source: Source[Any]
@@ -62,6 +65,7 @@ class Group:
     best_model: str
     warnings: tuple[str, ...]
     doubts: tuple[str, ...] = ()
+    excluded: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -222,8 +226,9 @@ def class_of(analysis: Analysis[Any], found: Any, more: Sequence[str] = ()) -> C
             part.get("best_model", "") if part.get("decided", True) else "undecided",
             tuple(plain_text(text) for text in texts if not is_doubt(text)),
             tuple(_with_command(text, analysis, source, origin.options) for text in texts if is_doubt(text)),
+            run.verdict.excluded if isinstance(run, SpinDown) else (),
         )
-        for source, part, texts, origin in zip(found.sources, parts, said, found.origins, strict=True)
+        for source, run, part, texts, origin in zip(found.sources, found.runs, parts, said, found.origins, strict=True)
     )
     names = analysis.compared or (_constants(document, model) if has_models else []) or _common(parts)
     doubts = [bool(group.doubts) for group in groups]
@@ -391,8 +396,16 @@ def _mark(of: Class, k: int) -> Mark:
     if short or group.doubts:
         why = (*group.doubts, *filter(None, [short]), *wrong, *odd)
         return Mark(REPEAT if wrong or group.doubts else LOOK, why, group.warnings)
-    odd += [*filter(None, [_other_seed(of, k)]), *group.warnings]
+    odd += [*filter(None, [_other_law(of, k), _other_seed(of, k)]), *group.warnings]
     return Mark(REPEAT if wrong else LOOK if odd else GOOD, (*wrong, *odd))
+
+
+def _other_law(of: Class, k: int) -> str:
+    """Return that a group's readings exclude the law of the class, which most groups' do not."""
+    exclude = [of.model in group.excluded for group in of.groups]
+    if not exclude[k] or 2 * sum(exclude) >= len(exclude):
+        return ""
+    return Text("its readings exclude the {law} law, by which the class is compared", law=law_name(of.model))
 
 
 def _beside_others(one: Compared, k: int) -> str:

@@ -423,7 +423,7 @@ def _doubts(table: Table, time: "NDArray[np.float64]", frequency: "NDArray[np.fl
     if low < SLOWEST_SPIN_HZ:
         text = (
             "{name:s}: the spin goes down to {low:n} Hz, and no Levitron floats below 15 Hz: if every second turn was "
-            "counted, say so with its column, as f=NAME [1/0.5s]; rows after the fall leave out"
+            "counted, say so with its column, as f=NAME [1/0.5s]; leave out rows after the fall"
         )
         return [_doubt(Text(text, name=table.path.name, low=digits(low, 4)))]
     if step * middle < 1:  # nor does a counter give a reading in less

@@ -154,6 +154,20 @@ def test_groups_are_in_the_order_of_their_numbers_and_one_that_was_not_read_has_
     assert [row.cells[0] for row in shown[0].rows] == ["g1.csv", "g3.csv", "g10.csv"]
 
 
+def test_a_group_whose_readings_exclude_the_law_of_the_class_is_to_look_at(tmp_path):
+    for seed in range(10, 22):  # with few others its law is that of the class
+        spin_down_csv(tmp_path / f"{seed}.csv", seed=seed)
+    rows, omega = ["time_s,spin_frequency_hz,spin_frequency_u_hz"], 2 * np.pi * 40
+    for k, noise in enumerate(0.03 * np.random.default_rng(5).standard_normal(20)):  # a hair touches the top
+        rows.append(f"{10 * k},{omega / 2 / np.pi + noise:.4f},0.03")
+        for _ in range(1000):
+            omega -= 0.01 * (2.0e-4 * omega**1.5 + 0.12)
+    (tmp_path / "5.csv").write_text("\n".join([*rows, ""]), encoding="utf-8")
+    page = Page(write_class(sorted(tmp_path.glob("*.csv")), tmp_path / "class.html").read_text(encoding="utf-8")).text
+    assert page.count("its readings exclude the disc law, by which the class is compared") == 1
+    assert re.search(r"5.csv look .*its readings exclude the disc law", page)
+
+
 def test_the_only_folder_beside_runs_is_a_group(of_three, tmp_path):
     shutil.copytree(of_three, tmp_path / "class")
     (tmp_path / "class" / "Group 5").mkdir()
