@@ -22,7 +22,6 @@ from levilab.crosscheck.truth import Truth, truth_of
 from levilab.errors import as_typed, unquote
 from levilab.pipelines.inputs.names import seed_of_group, short_paths
 from levilab.pipelines.options import OF_FILES
-from levilab.pipelines.spindown.words import law_name
 from levilab.present.numbers import enumeration, plain, with_sign, with_uncertainty
 from levilab.present.units import unit
 from levilab.report.reproduction import typed_options
@@ -405,7 +404,7 @@ def _other_law(of: Class, k: int) -> str:
     exclude = [of.model in group.excluded for group in of.groups]
     if not exclude[k] or 2 * sum(exclude) >= len(exclude):
         return ""
-    return Text("its readings exclude the {law} law, by which the class is compared", law=law_name(of.model))
+    return Text("its readings exclude the law by which the class is compared")
 
 
 def _beside_others(one: Compared, k: int) -> str:

@@ -164,8 +164,8 @@ def test_a_group_whose_readings_exclude_the_law_of_the_class_is_to_look_at(tmp_p
             omega -= 0.01 * (2.0e-4 * omega**1.5 + 0.12)
     (tmp_path / "5.csv").write_text("\n".join([*rows, ""]), encoding="utf-8")
     page = Page(write_class(sorted(tmp_path.glob("*.csv")), tmp_path / "class.html").read_text(encoding="utf-8")).text
-    assert page.count("its readings exclude the disc law, by which the class is compared") == 1
-    assert re.search(r"5.csv look .*its readings exclude the disc law", page)
+    assert page.count("its readings exclude the law by which the class is compared") == 1
+    assert re.search(r"5.csv look .*its readings exclude the law", page)
 
 
 def test_the_only_folder_beside_runs_is_a_group(of_three, tmp_path):
