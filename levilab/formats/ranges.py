@@ -84,7 +84,7 @@ def problem_of(key: str, value: float, factor: float = 1.0, *, asks: bool = True
         asks: whether it was typed without its unit.
 
     >>> problem_of("top.mass_kg", 25.0)
-    'a number from 1e-06 to 1 kg is expected.  Were grams meant?  25 g are 0.025'
+    'a number from 1e-06 to 1 kg is expected.  Were grams meant?  25 g are 0.025, 25 mg are 2.5e-05'
     >>> problem_of("camera_m", 0.0015, 1e-3), problem_of("rim_m", 0.029)
     ('a number from 20 to 50000 mm is expected.  Were metres meant?  1.5 m are 1500', '')
     """

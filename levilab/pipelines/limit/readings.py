@@ -2,6 +2,7 @@
 
 import math
 import re
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import ClassVar
@@ -13,7 +14,7 @@ from analysis.errors import AnalysisError
 from analysis.limits import U_OF_WAY, spin_at_fall
 from analysis.rotation import track_of_field
 from analysis.spindown.fall import STOPPED_ABOVE_HZ
-from levilab.errors import DataError, DoesNotSuit, UsageError
+from levilab.errors import DoesNotSuit
 from levilab.formats.columns import TableError
 from levilab.formats.table import FEWEST, Table, must_be_positive, read_table
 from levilab.formats.texts import locate, texts_of
@@ -67,8 +68,10 @@ def read_limit_file(path: Path, options: InputOptions) -> LimitReadings:
         return limits_in_field(path, field, options.near)
     try:
         table = read_table(path, quantities=QUANTITIES, needed=NEEDED, **options.of_tables)
-    except (DataError, UsageError) as error:  # a title of several words looks like several columns
-        single = single_column(path, guess=options.guess)
+    except TableError as error:  # a title of several words looks like several columns
+        single = None
+        with suppress(OSError):  # the error says that it may not be read
+            single = single_column(path, guess=options.guess)
         if single is None:
             raise error from None
         table = single

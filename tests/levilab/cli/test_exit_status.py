@@ -232,6 +232,7 @@ def test_what_is_not_understood_is_wrong_usage(place, words):
 @pytest.mark.parametrize("words", ["runs", "analyze", "analyze spindown"])
 def test_what_may_not_be_read_is_said_in_one_line(monkeypatch, tmp_path, words):
     """Typer would refuse it as wrong usage of `levilab analyze each`, with no advice."""
+    command("analyze", spin_down_csv(tmp_path / "open.csv"), cwd=tmp_path)  # modules read tables as they are imported
     monkeypatch.setattr("os.access", lambda *_, **__: False)
     file = spin_down_csv(tmp_path / "closed.csv")
 
