@@ -28,7 +28,7 @@ _NEAR = 0.01
 #: A point is off by whole counts if it is within a fifth of one, and one count is at least three standard deviations.
 _OF_A_COUNT, _STANDS_OUT = 0.2, 3.0
 #: Standard deviation of a normal distribution, over the median distance from its median.
-_MAD = 1.482602218505602
+MAD = 1.482602218505602
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,7 @@ def robust_line(x: Array, y: Array) -> Robust:
     slope, low, high = _median_slope(x[chosen], y[chosen])
     left = y - slope * x
     intercept = float(np.median(left))
-    scatter = _MAD * float(np.median(np.abs(left - intercept)))
+    scatter = MAD * float(np.median(np.abs(left - intercept)))
     ends = [float(np.median(y - end * x)) for end in (high, low)]
     return Robust(
         Estimate(slope, (high - low) / 2, "1", (low, high)),

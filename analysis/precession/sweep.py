@@ -15,7 +15,7 @@ from analysis.checks import check_finite, check_positive
 from analysis.errors import ShapesDiffer
 from analysis.precession.gates import Gates
 from analysis.precession.line import FEWEST, NO_FIT, Line, fit_line, fit_orthogonal, influence
-from analysis.precession.miscounts import Miscount, Robust, find_miscounts, robust_line
+from analysis.precession.miscounts import MAD, Miscount, Robust, find_miscounts, robust_line
 from analysis.precession.power import Power, power_of
 from analysis.remarks import Remark
 from analysis.uncertainty import FEW_LEFT, student
@@ -317,7 +317,7 @@ def _about_spins(fit: SweepFit, sweep: Sweep) -> list[Remark]:
         return said
     off = sweep.spin - sweep.drive
     away = np.abs(off - np.median(off))
-    scatter = 1.4826 * float(np.median(away))  # of few points it is known badly
+    scatter = MAD * float(np.median(away))  # of few points it is known badly
     far = away > np.maximum(_SPIN_SHARE * sweep.drive, student(off.size - 1, _SPIN_FAR) * scatter)
     if far.any():
         said.append(Remark("spins off", values=(int(far.sum()), off.size, float(away[far].max()))))

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from analysis.numbers import digits
 from analysis.precession.miscounts import Miscount
 from analysis.precession.power import Power
-from analysis.precession.sweep import EXCLUDED_P, Point, SweepFit
+from analysis.precession.sweep import EXCLUDED_P, RATIOS_OF_UNITS, Point, SweepFit
 from analysis.uncertainty import Estimate
 from levilab.pipelines.note import FEW_LEFT, Weighed, note_of
 from levilab.pipelines.row import Quantity, columns_of, entry, statistic
@@ -110,18 +110,17 @@ def _point(points: tuple[Point, ...], k: float) -> str:
     return Text("point {number:.0f}, at {drive:.5g} Hz", number=k + 1, drive=points[int(k)].drive)
 
 
-#: What makes the precession this multiple of the drive.
-_CAUSES: Mapping[float, str] = MappingProxyType(
-    {
-        2.0: "two pulses a turn were counted",
-        0.5: "every second pulse was counted",
-        3.0: "three pulses a turn were counted",
-        60.0: "the precession is in 1/min",
-        1 / 60: "the drive is in 1/min",
-        2 * math.pi: "the precession is in rad/s",
-        1 / (2 * math.pi): "the drive is in rad/s",
-    }
+#: What makes the precession each multiple of the drive.
+_OF_RATIOS = (
+    "two pulses a turn were counted",
+    "every second pulse was counted",
+    "three pulses a turn were counted",
+    "the precession is in 1/min",
+    "the drive is in 1/min",
+    "the precession is in rad/s",
+    "the drive is in rad/s",
 )
+_CAUSES = dict(zip(RATIOS_OF_UNITS, _OF_RATIOS, strict=True))
 
 
 _REMARKS: Mapping[str, str | Callable[..., str] | Weighed] = MappingProxyType(
